@@ -1,0 +1,65 @@
+"""Statics of tendon-driven notched-tube robots.
+
+Units in Python are mm, N, MPa and rad; robot files are in mm, N, MPa and degrees.
+Names are loaded when first used (PEP 562), so that importing the package costs nothing and does
+not import JAX.  The first use of a computing name imports JAX and switches it to 64-bit floats.
+"""
+
+from importlib import import_module
+
+__version__ = "0.1.0"
+
+# Public name -> the package that exports it. `__init__.pyi` lists the same names for type checkers.
+_HOME = {
+    **dict.fromkeys(("InputError", "RobotFileError"), "notchflex.errors"),
+    **dict.fromkeys(
+        (
+            "ArcNotch",
+            "Capstan",
+            "Frictionless",
+            "Linear",
+            "Robot",
+            "Superelastic",
+            "Tendon",
+            "Tube",
+            "json_schema",
+            "list_robots",
+            "load_robot",
+            "save_robot",
+        ),
+        "notchflex.robot",
+    ),
+    **dict.fromkeys(("Section", "annular_sector", "annular_segment"), "notchflex.section"),
+    **dict.fromkeys(
+        (
+            "Equilibrium",
+            "Load",
+            "LoadPath",
+            "Path",
+            "State",
+            "closing",
+            "equal_stroke_angles",
+            "pull",
+            "simulate",
+            "solve",
+            "tip_from_angles",
+        ),
+        "notchflex.statics",
+    ),
+}
+
+__all__ = [*sorted(_HOME), "__version__"]  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> object:
+    """Import the home of a public name on first use and keep the name here."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted({*globals(), *_HOME})

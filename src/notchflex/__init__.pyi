@@ -1,0 +1,30 @@
+from notchflex.errors import InputError as InputError
+from notchflex.errors import RobotFileError as RobotFileError
+from notchflex.robot import ArcNotch as ArcNotch
+from notchflex.robot import Capstan as Capstan
+from notchflex.robot import Frictionless as Frictionless
+from notchflex.robot import Linear as Linear
+from notchflex.robot import Robot as Robot
+from notchflex.robot import Superelastic as Superelastic
+from notchflex.robot import Tendon as Tendon
+from notchflex.robot import Tube as Tube
+from notchflex.robot import json_schema as json_schema
+from notchflex.robot import list_robots as list_robots
+from notchflex.robot import load_robot as load_robot
+from notchflex.robot import save_robot as save_robot
+from notchflex.section import Section as Section
+from notchflex.section import annular_sector as annular_sector
+from notchflex.section import annular_segment as annular_segment
+from notchflex.statics import Equilibrium as Equilibrium
+from notchflex.statics import Load as Load
+from notchflex.statics import LoadPath as LoadPath
+from notchflex.statics import Path as Path
+from notchflex.statics import State as State
+from notchflex.statics import closing as closing
+from notchflex.statics import equal_stroke_angles as equal_stroke_angles
+from notchflex.statics import pull as pull
+from notchflex.statics import simulate as simulate
+from notchflex.statics import solve as solve
+from notchflex.statics import tip_from_angles as tip_from_angles
+
+__version__: str

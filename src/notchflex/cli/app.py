@@ -1,0 +1,137 @@
+"""The verbs, what their exit codes mean, and how bad input is told.
+
+Each verb is a module of its own, imported only when it is called: `notchflex --help` reads none of
+them, and only those that compute import JAX.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from cyclopts import App, CycloptsError
+
+from notchflex import __version__
+from notchflex.cli import terminal
+from notchflex.errors import InputError
+
+DONE = 0
+NOT_CONVERGED = 1
+BAD_INPUT = 2
+INTERRUPTED = 130  # 128 + SIGINT, as shells expect
+
+ABOUT = """Statics of tendon-driven notched-tube robots.
+
+Shapes, tensions and strains of notched-tube wrists under their tendons, with friction that
+remembers the way it was pulled, superelastic material and closing notches. Robots are described
+in TOML files in mm, N, MPa and degrees; `notchflex robots` lists those that come with the program.
+"""
+
+EPILOGUE = """**Examples**
+
+    notchflex show pacheco2021-a
+    notchflex simulate pacheco2021-a --tension 0:3:31,3:0:31 --plot wrist.png
+    notchflex new my-wrist
+
+Exit codes: 0 done, 1 not converged, 2 bad input.
+"""
+
+VERBS = {
+    "robots": (
+        "List the robots that come with the program.",
+        "notchflex robots",
+    ),
+    "show": (
+        "Show every notch of a robot: section, closing angle and force, strain at closing.",
+        "notchflex show pacheco2021-c\n"
+        "    notchflex show my-wrist.toml --set notch.depth=1.38 --json -",
+    ),
+    "schema": (
+        "Print the JSON Schema of robot files, for editors that check and complete them.",
+        "notchflex schema > robot.schema.json",
+    ),
+    "new": (
+        "Ask for the calliper readings of a wrist and write a commented robot file.",
+        "notchflex new my-wrist\n"
+        "    notchflex new my-wrist --outer-diameter 1.62 --inner-diameter 1.40 --cut on-axis \\\n"
+        "        --notches 4 --depth 1.36,1.39,1.42,1.45 --height 1.0 --uncut-length 1.0",
+    ),
+    "simulate": (
+        "Pull the tendons of a robot through a series of tensions or strokes.",
+        "notchflex simulate pacheco2021-a --tension 0:3:31,3:0:31 --plot wrist.png\n"
+        "    notchflex simulate pacheco2021-a --stroke 0:2:21 --set friction.coefficient=0.1\n"
+        "    notchflex simulate my-wrist.toml --tension 1=0:2:21 --tension 2=0.1 --json -",
+    ),
+    "compare": (
+        "Compare a robot with measured notch angles.",
+        "notchflex compare pacheco2021-a-specimen wrist_A_measured.csv --plot compare.png\n"
+        "    notchflex compare my-wrist.toml pulls.csv --path --set friction.coefficient=0.1",
+    ),
+}
+"""Verb to its one-line help and its examples."""
+
+
+def build() -> App:
+    """Return the command line application; the verbs are loaded when they are called."""
+    app = App(
+        name="notchflex",
+        version=__version__,
+        help=ABOUT,
+        help_epilogue=EPILOGUE,
+        help_format="markdown",
+        console=terminal.output(),
+        error_console=terminal.messages(),
+        result_action="return_value",
+        exit_on_error=False,
+        print_error=False,
+    )
+    for order, (verb, (text, examples)) in enumerate(VERBS.items()):
+        plural = "s" if examples.count("notchflex ") > 1 else ""
+        app.command(
+            f"notchflex.cli.{verb}:{verb}",
+            name=verb,
+            help=text,
+            sort_key=order,
+            help_epilogue=f"**Example{plural}**\n\n    {examples}\n",
+        )
+    return app
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: What stands after `notchflex`; None for those of this process.
+
+    Returns:
+        The exit code: 0 done, 1 not converged, 2 bad input (told in one clear message).
+    """
+    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        return build()(tokens) or DONE
+    except InputError as problem:
+        terminal.error(str(problem))
+    except CycloptsError as problem:
+        verb = next((token for token in tokens if token in VERBS), None)
+        command = f"notchflex {verb} --help" if verb else "notchflex --help"
+        terminal.error(f"{_sentence(str(problem))} See {command}.")
+    except KeyboardInterrupt:
+        terminal.error("interrupted; nothing more is written.")
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read our output has gone (`notchflex robots | head`). Python would complain once
+        # more when it flushes standard output at exit, so give it somewhere to flush to.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    return BAD_INPUT
+
+
+def main() -> None:
+    """Run the command line and end the process with its exit code."""
+    sys.exit(run())
+
+
+def _sentence(text: str) -> str:
+    text = " ".join(text.split())
+    return text if text.endswith((".", "?", "!")) else f"{text}."

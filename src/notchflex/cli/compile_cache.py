@@ -1,0 +1,55 @@
+"""Keeping compiled code between runs of the command line, so that only the first one is slow."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import sys
+from pathlib import Path
+
+VARIABLE = "JAX_COMPILATION_CACHE_DIR"
+
+
+def use_compile_cache() -> None:
+    """Let JAX keep what it compiles in the user's cache folder.
+
+    Called before the first computation. Nothing happens where the user has chosen a folder
+    (`JAX_COMPILATION_CACHE_DIR`, empty for none) or where no folder can be written. Compiled code
+    belongs to one kind of processor, so each has a folder of its own: a home folder may be shared.
+    """
+    if VARIABLE in os.environ:
+        return
+    folder = _user_cache() / "notchflex" / f"compiled-{_machine()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        writable = os.access(folder, os.W_OK)
+    except OSError:
+        return
+    if not writable:
+        return
+    from notchflex._jax import jax
+
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+
+
+def _machine() -> str:
+    """Return a short name of the kind of processor, its instruction sets included."""
+    facts = [platform.machine(), platform.processor()]
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        lines = text.splitlines()
+        facts += [line for line in lines if line.startswith(("flags", "model name"))][:2]
+    except OSError:
+        pass
+    return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:12]

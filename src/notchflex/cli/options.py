@@ -1,0 +1,73 @@
+"""Options that several verbs share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Group, Parameter
+
+from notchflex.cli import terminal
+from notchflex.robot import Robot, load_robot
+from notchflex.robot.paths import parse_assignment, set_values
+
+OUTPUT = Group("Output", sort_key=9)
+
+RobotName = Annotated[
+    str,
+    Parameter(help="A ready robot (`notchflex robots` lists them) or the path of a robot file."),
+]
+Settings = Annotated[
+    tuple[str, ...],
+    Parameter(
+        name="--set",
+        negative=(),
+        show_default=False,
+        help="Change a value of the robot, such as `material.elastic_modulus=9000`, "
+        "`notch[2].depth=1.3` (the second notch from the base), `notch.depth=1.38` (every notch) "
+        "or `material.kind=linear`. May be given several times, in any order.",
+    ),
+]
+JsonFile = Annotated[
+    str | None,
+    Parameter(
+        name="--json",
+        group=OUTPUT,
+        allow_leading_hyphen=True,
+        help="Write the result as JSON to this file; `-` prints it and nothing else.",
+    ),
+]
+CsvFile = Annotated[
+    str | None,
+    Parameter(
+        name="--csv",
+        group=OUTPUT,
+        allow_leading_hyphen=True,
+        help="Write the result as a CSV table to this file; `-` prints it and nothing else.",
+    ),
+]
+PlotFile = Annotated[
+    str | None,
+    Parameter(name="--plot", group=OUTPUT, help="Draw a picture to this .png, .svg or .pdf file."),
+]
+
+
+def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
+    """Return the robot a user asked for, with the values of `--set`; say what a new kind drops.
+
+    Raises:
+        InputError: No such robot, a file that cannot be used, a bad `--set`.
+    """
+    robot = load_robot(name)
+    if settings:
+        robot, dropped = set_values(robot, [parse_assignment(text) for text in settings])
+        if dropped:
+            terminal.note(f"the new kind has no {', '.join(dropped)}; dropped.")
+    return robot
+
+
+def robot_files(name: str) -> list[Path]:
+    """Return the file that a robot is read from, if it is one: outputs must not replace it."""
+    path = Path(name)
+    return [path] if path.suffix and path.exists() else []

@@ -1,0 +1,18 @@
+"""`notchflex robots`."""
+
+from __future__ import annotations
+
+from rich.table import Table
+
+from notchflex.cli import terminal
+from notchflex.robot import list_robots
+
+
+def robots() -> None:
+    """List the robots that come with the program."""
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    table.add_column("robot", style="cyan", no_wrap=True)
+    table.add_column("what it is")
+    for name, title in dict(list_robots()).items():
+        table.add_row(name, title)
+    terminal.output().print(table)

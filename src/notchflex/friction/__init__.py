@@ -1,0 +1,8 @@
+"""Friction between tendon and tube: how far tension can fall over one contact."""
+
+from notchflex._packages import import_all
+from notchflex.friction.registry import FrictionLaw, friction_law
+
+import_all(__name__, __path__)
+
+__all__ = ["FrictionLaw", "friction_law"]

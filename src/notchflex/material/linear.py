@@ -1,0 +1,40 @@
+"""Linear elastic material."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex.material.registry import section_law
+from notchflex.material.section_law import FibreSection, Response, SectionLaw, elastic_stiffness
+from notchflex.robot import Linear
+
+
+class LinearLaw(SectionLaw):
+    """Hooke's law. Moduli in MPa."""
+
+    elastic_modulus: Float[Array, ""]
+    shear_modulus: Float[Array, ""]
+
+    def stiffness(self, section: FibreSection) -> Float[Array, "6 6"]:
+        """Constant stiffness."""
+        return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
+
+    def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
+        """Resultants in proportion to the strains."""
+        return Response(self.stiffness(section) @ strain, memory)
+
+    def energy(
+        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
+    ) -> Float[Array, ""]:
+        """Half the product of resultants and strains."""
+        del memory
+        return 0.5 * strain @ self.stiffness(section) @ strain
+
+
+@section_law.register
+def _(material: Linear) -> LinearLaw:
+    modulus = np.asarray(material.elastic_modulus, float)
+    return LinearLaw(modulus, modulus / (2.0 * (1.0 + material.poisson_ratio)))

@@ -1,0 +1,117 @@
+"""The law of a cross-section: strains and memory in, resultants out.
+
+Every material answers the same question for one cross-section of a flexure, so the chain never
+asks which material it is. Memory is there for materials whose answer depends on the past; the
+two laws of today have none and hand it back untouched.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import array_module, jax
+
+
+class FibreSection(eqx.Module):
+    """What a law needs of a cross-section, about its neutral axis. Units mm.
+
+    The section's x points to the cut side, z along the rod. Leading axes are allowed.
+
+    Attributes:
+        area: Area, mm^2.
+        second_moment_weak: Second moment for bending that closes the notch (about y), mm^4.
+        second_moment_strong: Second moment for sideways bending (about x), mm^4.
+        torsion_constant: Torsion constant, mm^4.
+        shear_centre: Distance of the shear centre from the neutral axis toward the spine, mm.
+        edge_spine: Distance of the outer fibre on the spine from the neutral axis, mm.
+        edge_near: Distance of the farthest fibre on the cut side, mm.
+    """
+
+    area: Float[Array, "*shape"]
+    second_moment_weak: Float[Array, "*shape"]
+    second_moment_strong: Float[Array, "*shape"]
+    torsion_constant: Float[Array, "*shape"]
+    shear_centre: Float[Array, "*shape"]
+    edge_spine: Float[Array, "*shape"]
+    edge_near: Float[Array, "*shape"]
+
+
+class Response(NamedTuple):
+    """Answer of a section law.
+
+    Attributes:
+        resultants: Moments about x, y, z (N mm) and forces along x, y, z (N).
+        memory: The memory after these strains.
+    """
+
+    resultants: Float[Array, " 6"]
+    memory: Any
+
+
+class SectionLaw(eqx.Module):
+    """A material as the chain sees it. Tangents come from the resultants by differentiation."""
+
+    @abstractmethod
+    def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
+        """Resultants of a cross-section under given strains (beyond those of the free tube)."""
+
+    @abstractmethod
+    def energy(
+        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
+    ) -> Float[Array, ""]:
+        """Energy stored per length under given strains, N mm/mm."""
+
+    @abstractmethod
+    def stiffness(self, section: FibreSection) -> Float[Array, "6 6"]:
+        """Resultants per strain in the free robot, of a section without leading axes."""
+
+    def tangent(
+        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
+    ) -> Float[Array, "6 6"]:
+        """Change of the resultants with the strains."""
+        return jax.jacfwd(lambda varied: self.respond(varied, section, memory).resultants)(strain)
+
+
+def elastic_stiffness(
+    elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
+) -> Float[Array, "6 6"]:
+    """Stiffness of a linear elastic section about its neutral axis.
+
+    The axes through the centroid are principal, so bending and stretch do not couple. Shear
+    along y acts at the shear centre, `shear_centre` on the spine's side, where the section's
+    shear is v_y - shear_centre * twist: that couples it with torsion. The shear areas are the
+    whole area (Gao 2017 takes the same factor of 1).
+
+    Args:
+        elastic_modulus: Young's modulus, MPa.
+        shear_modulus: Shear modulus, MPa.
+        section: The section, without leading axes.
+
+    Returns:
+        Resultants per strain, in the order of the strains.
+    """
+    shear = shear_modulus * section.area
+    lever = section.shear_centre
+    entries = [
+        elastic_modulus * section.second_moment_strong,
+        elastic_modulus * section.second_moment_weak,
+        shear_modulus * section.torsion_constant + shear * lever * lever,
+        -shear * lever,
+        shear,
+        elastic_modulus * section.area,
+    ]
+    return array_module(*entries).tensordot(array_module(*entries).stack(entries), _PLACES, 1)
+
+
+# Where the entries of `elastic_stiffness` stand.
+_PLACES = np.zeros((6, 6, 6))
+for _entry, _places in enumerate(
+    [[(0, 0)], [(1, 1)], [(2, 2)], [(2, 4), (4, 2)], [(3, 3), (4, 4)], [(5, 5)]]
+):
+    for _row, _column in _places:
+        _PLACES[_entry, _row, _column] = 1.0

@@ -1,0 +1,98 @@
+"""Rigid motions of space: the exponential of a twist, products, and wrenches carried along.
+
+A motion is a `Motion(rotation, translation)`: it takes coordinates of the inner frame to the
+outer one, `outer = rotation @ inner + translation`. A twist is (angular 3, linear 3), a wrench
+(moment 3, force 3), so that their dot product is a power.
+"""
+
+from __future__ import annotations
+
+from math import factorial
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import array_module
+
+# Coefficients of sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 as polynomials in a^2. With
+# sixteen terms the first one left out is below 1e-16 for angles up to 5 rad, more than an
+# interval of a flexure ever turns; no branch at zero, so every derivative is smooth.
+_TERMS = 16
+_SERIES = np.array(
+    [[(-1.0) ** k / factorial(2 * k + start) for k in range(_TERMS)] for start in (1, 2, 3)]
+)
+_CROSS = np.zeros((3, 3, 3))
+for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+    _CROSS[_i, _k, _j], _CROSS[_k, _i, _j] = -1.0, 1.0
+
+
+class Motion(NamedTuple):
+    """A rigid motion, from an inner frame to the outer one (translation in mm)."""
+
+    rotation: Float[Array, "... 3 3"]
+    translation: Float[Array, "... 3"]
+
+    def then(self, inner: Motion) -> Motion:
+        """Product: this motion, and inside its frame another."""
+        return Motion(
+            self.rotation @ inner.rotation,
+            self.rotation @ inner.translation + self.translation,
+        )
+
+    def point(self, inside: Float[Array, " 3"]) -> Float[Array, " 3"]:
+        """Outer coordinates of a point of the inner frame (mm)."""
+        return self.rotation @ inside + self.translation
+
+    def point_inside(self, outside: Float[Array, " 3"]) -> Float[Array, " 3"]:
+        """Inner coordinates of a point of the outer frame (mm)."""
+        return (outside - self.translation) @ self.rotation
+
+    def wrench(self, inside: Float[Array, " 6"]) -> Float[Array, " 6"]:
+        """A wrench (moment, force) about the inner origin, about and along the outer frame."""
+        force = self.rotation @ inside[3:]
+        moment = self.rotation @ inside[:3] + skew(self.translation) @ force
+        return array_module(inside).concatenate([moment, force])
+
+
+def identity() -> Motion:
+    """The motion that moves nothing."""
+    return Motion(np.eye(3), np.zeros(3))
+
+
+def skew(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:
+    """Matrix of the cross product: `skew(a) @ b = a x b`."""
+    return _CROSS @ vector
+
+
+def unskew(matrix: Float[Array, "3 3"]) -> Float[Array, " 3"]:
+    """Vector of the skew part of a matrix, the inverse of `skew`."""
+    return 0.5 * array_module(matrix).tensordot(matrix, _CROSS, 2)
+
+
+def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
+    """sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 for a squared angle."""
+    xp = array_module(squared)
+    square = squared * squared
+    low = xp.stack([xp.ones_like(squared), squared, square, squared * square])
+    fourth = square * square
+    eighth = fourth * fourth
+    high = xp.stack([xp.ones_like(squared), fourth, eighth, fourth * eighth])
+    first, second, third = _SERIES @ (high[:, None] * low).ravel()
+    return first, second, third
+
+
+def exponential(twist: Float[Array, " 6"]) -> Motion:
+    """Motion reached by following a constant twist (angular, linear) for one unit of length."""
+    angular, linear = twist[:3], twist[3:]
+    first, second, third = _coefficients(angular @ angular)
+    cross = skew(angular)
+    cross_twice = cross @ cross
+    rotation = np.eye(3) + first * cross + second * cross_twice
+    return Motion(rotation, linear + second * (cross @ linear) + third * (cross_twice @ linear))
+
+
+def rotation_about(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:
+    """Rotation matrix of a rotation vector (rad)."""
+    xp = array_module(vector)
+    return exponential(xp.concatenate([vector, xp.zeros(3)])).rotation

@@ -1,0 +1,103 @@
+"""Look of all pictures: colours that colour-blind people tell apart, sizes, saving.
+
+Figures are made as objects (`matplotlib.figure.Figure`), never through pyplot: no window, no
+global state, no backend to choose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path as FilePath
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from notchflex.results.files import check_picture, replacing
+
+# notation: the eight colours of Okabe and Ito (2008), made for all kinds of colour vision.
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+BLUE = "#0072B2"
+VERMILLION = "#D55E00"
+PURPLE = "#CC79A7"
+GREY = "#7F7F7F"
+
+DOTS_PER_INCH = 200
+
+SETTINGS: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.4,
+    # Text stays text in SVG and PDF: small files, and the words can be searched and edited.
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "notchflex",  # the same picture gives the same file
+}
+
+
+@contextmanager
+def house_style() -> Generator[None]:
+    """Use the settings of our pictures inside the `with`, and only there."""
+    with matplotlib.rc_context(SETTINGS):
+        yield
+
+
+def new_figure(width: float, height: float, title: str = "") -> Figure:
+    """Return an empty figure of the given size in inches that arranges its axes by itself."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    if title:
+        figure.suptitle(title, fontsize=11.0)
+    return figure
+
+
+def sequence_colours(count: int) -> list[tuple[float, float, float, float]]:
+    """Return `count` colours in an order that the eye sees, dark to light, also in grey print."""
+    # The lightest fifth of the map is too pale for lines on white paper.
+    return [tuple(c) for c in matplotlib.colormaps["viridis"](np.linspace(0.0, 0.82, count))]
+
+
+def legend_beside(axes: Axes, **options: object) -> None:
+    """Put a legend right of the axes, where it hides nothing."""
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, **options)
+
+
+def save(figure: Figure, target: str | FilePath) -> None:
+    """Write a figure as PNG, SVG or PDF, by the suffix; the file is whole or not there.
+
+    Args:
+        figure: What to write.
+        target: Path that ends in .png, .svg or .pdf.
+
+    Raises:
+        InputError: Another suffix, or the file cannot be written.
+    """
+    check_picture(str(target), "the picture")
+    suffix = FilePath(target).suffix.lower()
+    # Without dates the same picture is the same file, byte for byte.
+    metadata: dict[str, None] = {
+        ".svg": {"Date": None},
+        ".pdf": {"CreationDate": None},
+        ".png": {},
+    }[suffix]
+    with house_style(), replacing(target) as temporary:
+        figure.savefig(
+            temporary,
+            format=suffix[1:],
+            dpi=DOTS_PER_INCH,
+            metadata=metadata,
+            bbox_inches=None,
+        )

@@ -1,0 +1,5 @@
+"""Results as tables and files: one table of quantities gives names, units and texts to all."""
+
+from notchflex.results.quantities import QUANTITIES, Quantity
+
+__all__ = ["QUANTITIES", "Quantity"]

@@ -1,0 +1,199 @@
+"""Where results go: paths checked before anything is computed, files replaced whole.
+
+A file is first written beside its destination under a temporary name and then renamed over it, so
+that whoever reads it sees the old file or the new one and never half of either.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import os
+import stat
+import sys
+import tempfile
+from collections.abc import Generator, Iterable
+from pathlib import Path
+
+from notchflex.errors import InputError
+
+STANDARD_OUTPUT = "-"
+PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
+
+
+def check_output(target: str, option: str, *, inputs: Iterable[str | Path] = ()) -> None:
+    """Raise if a file cannot be written at `target`; nothing is created or changed.
+
+    Args:
+        target: A path, or `-` for standard output.
+        option: The option that named it, for the message.
+        inputs: Files that are read; an output must not replace one of them.
+
+    Raises:
+        InputError: The folder is missing, the path is a folder or read-only, or it is an input.
+    """
+    if target == STANDARD_OUTPUT:
+        return
+    if not target.strip():
+        raise InputError(f"{option} needs the name of a file, and got an empty one.")
+    if "\0" in target:
+        raise InputError(f"{option} {target!r} cannot be written: it holds a null character.")
+    path = Path(target)
+    folder = path.parent
+    try:
+        if path.is_dir():
+            raise InputError(
+                f"{option} {target}: this is a folder; give the name of a file to write in it."
+            )
+        if not folder.exists():
+            raise InputError(
+                f"{option} {target}: the folder {folder} does not exist; "
+                "make it first or choose another."
+            )
+        if not folder.is_dir():
+            raise InputError(f"{option} {target}: {folder} is a file, not a folder.")
+        if path.exists() and not os.access(path, os.W_OK):
+            raise InputError(f"{option} {target}: this file may not be written; choose another.")
+        if _replaceable(path) and not _folder_takes_files(folder):
+            raise InputError(
+                f"{option} {target}: no file may be written in the folder {folder}; choose another."
+            )
+        for source in inputs:
+            if Path(source).exists() and path.exists() and path.samefile(source):
+                raise InputError(
+                    f"{option} {target}: this would replace the file that is read; choose another."
+                )
+    except (OSError, ValueError) as problem:
+        if isinstance(problem, InputError):
+            raise
+        words = getattr(problem, "strerror", None) or str(problem)
+        raise InputError(f"{option} {target!r} cannot be written: {words}.") from None
+
+
+def check_picture(target: str, option: str, *, inputs: Iterable[str | Path] = ()) -> None:
+    """Raise if a picture cannot be written at `target`: as `check_output`, and its kind too.
+
+    Raises:
+        InputError: The suffix is not .png, .svg or .pdf, or matplotlib is not installed.
+    """
+    if target == STANDARD_OUTPUT:
+        raise InputError(
+            f"{option} - : a picture cannot go to standard output; name a file, "
+            "for example wrist.png."
+        )
+    suffix = Path(target).suffix.lower()
+    if suffix not in PICTURE_SUFFIXES:
+        got = f"the suffix {suffix}" if suffix else "no suffix"
+        raise InputError(
+            f"{option} {target}: got {got}; a picture is written as .png, .svg or .pdf."
+        )
+    check_output(target, option, inputs=inputs)
+    if importlib.util.find_spec("matplotlib") is None:
+        raise InputError(
+            f"{option} needs matplotlib, which is not installed: pip install 'notchflex[plot]'"
+        )
+
+
+def check_distinct(outputs: dict[str, str | None]) -> None:
+    """Raise if two options name the same file, or both standard output.
+
+    Args:
+        outputs: Option to its target; None where the option was not given.
+
+    Raises:
+        InputError: Two targets are the same.
+    """
+    seen: dict[str, str] = {}
+    for option, target in outputs.items():
+        if target is None:
+            continue
+        name = target if target == STANDARD_OUTPUT else os.path.realpath(target)
+        if name in seen:
+            where = "standard output" if target == STANDARD_OUTPUT else target
+            raise InputError(
+                f"{seen[name]} and {option} both write to {where}; give them different files."
+            )
+        seen[name] = option
+
+
+@contextlib.contextmanager
+def replacing(target: str | Path) -> Generator[Path]:
+    """Give a path to write to; on success the file there becomes `target`, whole.
+
+    The temporary file lies in the folder of `target` and keeps its suffix. If the body of the
+    `with` raises, the temporary file is removed and `target` is as it was.
+
+    Args:
+        target: Path of the file to make or replace. A link is followed; what is no ordinary
+            file (/dev/null, a pipe) is written directly.
+
+    Yields:
+        The path to write to.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    destination = Path(os.path.realpath(target))
+    if not _replaceable(destination):
+        yield destination
+        return
+    try:
+        handle, name = tempfile.mkstemp(
+            dir=destination.parent, prefix=f".{destination.stem}-", suffix=destination.suffix
+        )
+        os.close(handle)
+    except OSError as problem:
+        raise InputError(f"{target} cannot be written: {problem.strerror}.") from None
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(_mode_for(destination))
+        os.replace(temporary, destination)
+    except OSError as problem:
+        raise InputError(f"{target} cannot be written: {problem.strerror or problem}.") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(target: str | Path, text: str) -> None:
+    """Write UTF-8 text to a file, whole or not at all, or to standard output for `-`.
+
+    Args:
+        target: Path, or `-`.
+        text: What to write.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    if str(target) == STANDARD_OUTPUT:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+        return
+    with replacing(target) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _replaceable(path: Path) -> bool:
+    """Say whether renaming over `path` is right: an ordinary file, or none yet."""
+    return not path.exists() or path.is_file()
+
+
+def _folder_takes_files(folder: Path) -> bool:
+    """Say whether a file can be made in `folder`, by making one without a name and dropping it.
+
+    Asking for permissions is not enough: a read-only file system or a full quota grants them.
+    """
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _mode_for(destination: Path) -> int:
+    """Return the permissions of the file there is, or those a new file would get."""
+    if destination.exists():
+        return stat.S_IMODE(destination.stat().st_mode)
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

@@ -1,0 +1,261 @@
+"""The one table of quantities: names, symbols, units and texts of everything a result holds.
+
+JSON keys, CSV headers, the axes of pictures, the tables on the terminal and the documentation
+are all made from `QUANTITIES`. A new quantity is one new row here.
+
+Inside Python: mm, N, MPa, rad. At the edges (files, pictures, terminal): mm, N, MPa, deg.
+`Quantity.scale` takes a number from the inside to the edge.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+DEGREES = 180.0 / math.pi
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity of a solved state, and how it is written at the edges.
+
+    Attributes:
+        name: The attribute of `Path` and `Equilibrium` that holds it.
+        title: What an axis or a table calls it, without its unit.
+        symbol: The symbol, as mathtext.
+        unit: The unit at the edges; "" for numbers without one.
+        description: One sentence that says exactly what it is.
+        key: The key in a step of the JSON document; a dot goes one object deeper. "" if left out.
+        column: The CSV column; `{tendon}`, `{notch}`, `{axis}` and `{span}` are filled in.
+            "" where it has no column.
+        per: What its entries stand for within one step, outermost first: "tendon", "notch",
+            "axis", "span", "contact", "row". Empty for a single number.
+        scale: The factor from the inside of the program to the edge (rad to deg).
+    """
+
+    name: str
+    title: str
+    symbol: str
+    unit: str
+    description: str
+    key: str
+    column: str
+    per: tuple[str, ...] = ()
+    scale: float = 1.0
+
+    @property
+    def label(self) -> str:
+        r"""The label of an axis: title, symbol and unit.
+
+        Example:
+            >>> QUANTITIES["total_angle"].label
+            'total bending angle $\\theta$ [deg]'
+        """
+        parts = [self.title, f"${self.symbol}$" if self.symbol else ""]
+        parts.append(f"[{self.unit}]" if self.unit else "")
+        return " ".join(part for part in parts if part)
+
+    def header(self, **indices: object) -> str:
+        """Return the CSV column for the given indices.
+
+        Args:
+            **indices: `tendon`, `notch` (counted from 1), `axis` ("x", "y", "z") or `span`.
+                `tendon=""` is written for the only tendon of a robot.
+
+        Returns:
+            The header, for example `notch_3_deg`.
+
+        Example:
+            >>> QUANTITIES["tension"].header(tendon="")
+            'tendon_force_N'
+            >>> QUANTITIES["tension"].header(tendon=2)
+            'tendon_2_force_N'
+        """
+        if "tendon" in indices:
+            indices["tendon"] = f"_{indices['tendon']}" if indices["tendon"] != "" else ""
+        return self.column.format(**indices)
+
+
+def _rows() -> tuple[Quantity, ...]:
+    q = Quantity
+    return (
+        q(
+            "commanded_tension", "commanded tension", "T", "N",
+            "Tension commanded at the base of a tendon; empty where it is not commanded.",
+            "load.tension_N", "", ("tendon",),
+        ),
+        q(
+            "commanded_stroke", "commanded stroke", "u", "mm",
+            "Tendon length commanded to be drawn out at the base; empty where not commanded.",
+            "load.stroke_mm", "", ("tendon",),
+        ),
+        q(
+            "tension", "tendon tension", "T", "N",
+            "Tension of a tendon at the base, as it is in the solved state.",
+            "tendon_tension_N", "tendon{tendon}_force_N", ("tendon",),
+        ),
+        q(
+            "stroke", "tendon stroke", "u", "mm",
+            "Tendon length drawn out at the base since the state without load.",
+            "tendon_stroke_mm", "tendon{tendon}_displacement_mm", ("tendon",),
+        ),
+        q(
+            "notch_angle", "notch angle", r"\theta_j", "deg",
+            "Rotation of the body beyond a notch against the body before it, with precurvature, "
+            "base to tip.",
+            "notch_angle_deg", "notch_{notch}_deg", ("notch",), DEGREES,
+        ),
+        q(
+            "total_angle", "total bending angle", r"\theta", "deg",
+            "Bending angle of the robot: the sum of its notch angles where they bend in one plane, "
+            "otherwise the angle between the axes of base and tip.",
+            "total_angle_deg", "total_deg", (), DEGREES,
+        ),
+        q(
+            "tip_position", "tip position", "p", "mm",
+            "Position of the tip (the end of the last uncut section) in the base frame.",
+            "tip_position_mm", "tip_{axis}_mm", ("axis",),
+        ),
+        q(
+            "tip_rotation", "tip rotation", "R", "",
+            "Rotation matrix of the tip in the base frame.",
+            "tip_rotation", "", ("row", "axis"),
+        ),
+        q(
+            "span_tension", "span tension", "T", "N",
+            "Tension along a tendon: proximal, gap 1, body 1, gap 2, ... to its last gap.",
+            "span_tension_N", "tendon{tendon}_{span}_N", ("tendon", "span"),
+        ),
+        q(
+            "notch_moment", "notch moment", "M_j", "N mm",
+            "Bending moment carried by what the cut of a notch leaves.",
+            "notch_moment_Nmm", "notch_{notch}_moment_Nmm", ("notch",),
+        ),
+        q(
+            "outer_strain", "outer strain", r"\varepsilon_j", "",
+            "Strain of the outer fibre of the spine (Pacheco 2021, eq. 16).",
+            "outer_strain", "notch_{notch}_outer_strain", ("notch",),
+        ),
+        q(
+            "peak_strain", "peak strain", r"\varepsilon_\mathrm{max}", "",
+            "Strain of the fibre of the notch farthest from its neutral axis.",
+            "peak_strain", "notch_{notch}_peak_strain", ("notch",),
+        ),
+        q(
+            "gap", "notch gap", "g_j", "mm",
+            "What is left of the opening of a notch, at its lips opposite the spine.",
+            "gap_mm", "notch_{notch}_gap_mm", ("notch",),
+        ),
+        q(
+            "closed", "closed", "", "",
+            "True where the lips of a notch touch.",
+            "closed", "notch_{notch}_closed", ("notch",),
+        ),
+        q(
+            "contact_force", "contact force", "N_j", "N",
+            "Force between the touching lips of a closed notch.",
+            "contact_force_N", "notch_{notch}_contact_N", ("notch",),
+        ),
+        q(
+            "contact_log_ratio", "tension ratio over a contact", "x_i", "",
+            "ln(tension on the base side / tension on the tip side) of a friction contact.",
+            "contacts.log_ratio", "", ("tendon", "contact"),
+        ),
+        q(
+            "contact_slid", "slid length", "s_i", "mm",
+            "Tendon length that has slid over a friction contact toward the base.",
+            "contacts.slid_mm", "", ("tendon", "contact"),
+        ),
+        q(
+            "contact_state", "state of a contact", "", "",
+            'What a friction contact does: "stick", "slip toward base" or "slip toward tip".',
+            "contacts.state", "", ("tendon", "contact"),
+        ),
+        q(
+            "stored_energy", "stored energy", "U", "N mm",
+            "Elastic energy held by the flexures.",
+            "stored_energy_Nmm", "stored_energy_Nmm",
+        ),
+        q(
+            "tendon_work", "tendon work", "W", "N mm",
+            "Work done on a tendon at the base since the start of the path.",
+            "tendon_work_Nmm", "tendon{tendon}_work_Nmm", ("tendon",),
+        ),
+        q(
+            "converged", "converged", "", "",
+            "True where the equilibrium was found.",
+            "converged", "converged",
+        ),
+        q(
+            "reason", "reason", "", "",
+            "Why the equilibrium was not found; empty where it was.",
+            "reason", "reason",
+        ),
+        q(
+            "stable", "stable", "", "",
+            "True where the equilibrium is stable with its sticking contacts held.",
+            "stable", "stable",
+        ),
+        q(
+            "smallest_eigenvalue", "smallest eigenvalue", r"\lambda_\mathrm{min}", "N mm",
+            "Smallest eigenvalue of the symmetric part of the stiffness.",
+            "smallest_eigenvalue_Nmm", "",
+        ),
+        q(
+            "residual", "residual", "r", "",
+            "Largest scaled residual of the equations at the end of the iteration.",
+            "residual", "residual",
+        ),
+        q(
+            "iterations", "iterations", "", "",
+            "Number of Newton iterations.",
+            "iterations", "iterations",
+        ),
+    )  # fmt: skip
+
+
+QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _rows()}
+"""Every quantity of a solved state, by the attribute that holds it."""
+
+CONTACT_STATES = {0: "stick", 1: "slip toward base", -1: "slip toward tip"}
+"""What the numbers of `contact_state` mean. Pulling makes a tendon slip toward the base."""
+
+
+def span_names(count: int) -> list[str]:
+    """Return the names of the spans of a tendon, base to tip.
+
+    Args:
+        count: Number of spans, 2 m for a tendon that ends on body m.
+
+    Returns:
+        `["proximal", "gap_1", "body_1", "gap_2", ...]`, `count` names.
+
+    Example:
+        >>> span_names(4)
+        ['proximal', 'gap_1', 'body_1', 'gap_2']
+    """
+    names = ["proximal"]
+    for index in range(1, count):
+        names.append(f"gap_{(index + 1) // 2}" if index % 2 else f"body_{index // 2}")
+    return names
+
+
+def units() -> dict[str, str]:
+    """Return the unit of every JSON key that has one, for the head of a document."""
+    return {q.key: q.unit for q in QUANTITIES.values() if q.key and q.unit}
+
+
+def describe() -> list[dict[str, str]]:
+    """Return the table as plain rows (key, column, symbol, unit, description) for the docs."""
+    return [
+        {
+            "name": q.name,
+            "key": q.key,
+            "column": q.column,
+            "symbol": q.symbol,
+            "unit": q.unit,
+            "description": q.description,
+        }
+        for q in QUANTITIES.values()
+    ]

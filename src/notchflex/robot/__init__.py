@@ -1,0 +1,44 @@
+"""The robot as a person describes it: tube, notches, tendons, material, friction.
+
+Robot files are TOML in mm, N, MPa and degrees.  Nothing here imports JAX.
+"""
+
+from notchflex.robot.friction_capstan import Capstan
+from notchflex.robot.friction_frictionless import Frictionless
+from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
+from notchflex.robot.material_linear import Linear
+from notchflex.robot.material_superelastic import Superelastic
+from notchflex.robot.notch_arc import ArcNotch
+from notchflex.robot.paths import Changed, parse_assignment, set_values
+from notchflex.robot.reading import list_robots, load_robot, robot_from_text
+from notchflex.robot.robot import Robot, from_table, to_table
+from notchflex.robot.schema import json_schema
+from notchflex.robot.tendon import Tendon
+from notchflex.robot.tube import Tube
+from notchflex.robot.writing import robot_text, save_robot
+
+__all__ = [
+    "ArcNotch",
+    "Capstan",
+    "Changed",
+    "Friction",
+    "Frictionless",
+    "Linear",
+    "Material",
+    "Notch",
+    "Robot",
+    "Superelastic",
+    "Tendon",
+    "Tube",
+    "from_table",
+    "json_schema",
+    "kinds_of",
+    "list_robots",
+    "load_robot",
+    "parse_assignment",
+    "robot_from_text",
+    "robot_text",
+    "save_robot",
+    "set_values",
+    "to_table",
+]

@@ -1,0 +1,96 @@
+"""Parts that come in several kinds, and how a new kind is found.
+
+A kind is one class in one file of this folder, named after what it is a kind of: `notch_arc.py`,
+`material_linear.py`, `friction_capstan.py`.  The folder is scanned, so that a new file is all that
+a new kind needs: reading, writing, the JSON Schema and `--set` pick it up.
+"""
+
+import pkgutil
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, Union
+
+from pydantic import Field
+
+from notchflex.robot._explain import kind_of
+from notchflex.robot._part import Float, Int, part, quantity
+from notchflex.robot.tube import Tube
+
+
+@part(kw_only=True)
+class Notch:
+    """What every kind of notch has.
+
+    Args:
+        kind: The word that names the kind in a file.
+        uncut_length: Uncut length behind the notch, toward the tip [mm].
+        direction_deg: Side toward which the notch bends [deg], about the tube axis from x to y.
+        precurvature_deg: Angle of the notch when nothing pulls [deg], positive toward the bend.
+        repeat: How many equal notches follow one another.
+    """
+
+    kind: str
+    uncut_length: Annotated[
+        Float, quantity("mm", "uncut length behind the notch, toward the tip", at_least=0)
+    ]
+    direction_deg: Annotated[Float, quantity("deg", "side toward which the notch bends")] = 0.0
+    precurvature_deg: Annotated[Float, quantity("deg", "angle of the notch when nothing pulls")] = (
+        0.0
+    )
+    repeat: Annotated[
+        Int,
+        Field(ge=1, le=10_000, description="how many equal notches follow"),
+    ] = 1
+
+    def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
+        """Find what does not fit the tube: pairs of a key and the rest of the sentence."""
+        del tube
+        yield from ()
+
+
+@part(kw_only=True)
+class Material:
+    """What every kind of material has.
+
+    Args:
+        kind: The word that names the kind in a file.
+        poisson_ratio: Poisson's ratio, for shear and torsion.
+        density: Density [kg/m3], for the weight of the robot; None where it is not needed.
+        allowed_strain: Strain beyond which a simulation warns; None never warns.
+    """
+
+    kind: str
+    poisson_ratio: Annotated[
+        Float,
+        quantity("", "Poisson's ratio, for shear and torsion", above=-1, at_most=0.5),
+    ] = 0.33
+    density: Annotated[Float | None, quantity("kg/m3", "density, for the weight", above=0)] = None
+    allowed_strain: Annotated[
+        Float | None,
+        quantity("", "strain beyond which a simulation warns", above=0),
+    ] = None
+
+
+@part(kw_only=True)
+class Friction:
+    """What every kind of friction has: a name.
+
+    Args:
+        kind: The word that names the kind in a file.
+    """
+
+    kind: str
+
+
+def kinds_of(base: type) -> dict[str, type]:
+    """Find every kind of notch, material or friction, by the word that names it."""
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        if module.name.startswith(f"{base.__name__.lower()}_"):
+            import_module(f"notchflex.robot.{module.name}")
+    return {kind_of(cls): cls for cls in sorted(base.__subclasses__(), key=kind_of)}
+
+
+def one_of(base: type) -> Any:
+    """Make the type of a field that takes any kind of `base`, told apart by its key `kind`."""
+    return Annotated[Union[tuple(kinds_of(base).values())], Field(discriminator="kind")]  # noqa: UP007

@@ -1,0 +1,68 @@
+"""The notch of Pacheco 2021 and York 2015: a cut that leaves an arc of the wall."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import KW_ONLY
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from notchflex.robot._part import Float, part, quantity
+from notchflex.robot.kinds import Notch
+from notchflex.robot.tube import Tube
+
+
+@part
+class ArcNotch(Notch):
+    """A notch whose remaining wall bends in one plane, with an arc of the tube as its section.
+
+    Args:
+        cut: "on-axis" (a laser on the axis: radial edges, an annular sector is left) or "off-axis"
+            (a saw or wire across the tube: a straight edge, an annular segment is left).
+            The two differ in stiffness by 34-51 % at equal depth, hence there is no default.
+        depth: Depth of the cut [mm], from the outer surface opposite the spine.
+        height: Height of the notch along the tube [mm].
+        uncut_length: Uncut length behind the notch, toward the tip [mm].
+        direction_deg: Side toward which the notch bends [deg].
+        precurvature_deg: Angle of the notch when nothing pulls [deg].
+        repeat: How many equal notches follow one another.
+
+    Raises:
+        InputError: A value is negative, not finite, of a wrong type or not known.
+
+    Example:
+        >>> ArcNotch("on-axis", depth=1.40, height=0.8, uncut_length=1.2, repeat=5).repeat
+        5
+    """
+
+    cut: Annotated[
+        Literal["on-axis", "off-axis"],
+        Field(
+            description='"on-axis" (laser on the axis: radial edges, an annular sector is left) or '
+            '"off-axis" (saw or wire across: straight edge, an annular segment is left)'
+        ),
+    ]
+    depth: Annotated[
+        Float, quantity("mm", "depth of the cut, from the surface opposite the spine", above=0)
+    ]
+    height: Annotated[Float, quantity("mm", "height of the notch along the tube", above=0)]
+    _: KW_ONLY
+    kind: Literal["arc"] = "arc"
+
+    def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
+        """Find a cut that goes through the tube, and a precurvature beyond any closing angle."""
+        if self.depth >= tube.outer_diameter:
+            yield (
+                "depth",
+                f"is {self.depth} mm; it must be greater than 0 and less than the outer diameter, "
+                f"{tube.outer_diameter} mm.",
+            )
+        # The neutral axis lies between the tube axis and the spine, so that no notch closes later
+        # than h / r_o (Pacheco 2021: h / (r_o + centroid)).
+        most = math.degrees(self.height / tube.outer_radius)
+        if self.precurvature_deg >= most:
+            yield (
+                "precurvature_deg",
+                f"is {self.precurvature_deg} deg; a notch {self.height} mm high in this tube is "
+                f"closed before {most:.4g} deg.",
+            )

@@ -1,0 +1,135 @@
+"""Reading robots: the ready ones by name, others from TOML files."""
+
+import os
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from notchflex.errors import InputError, RobotFileError
+from notchflex.robot._explain import nearest
+from notchflex.robot.robot import Robot, from_table, remember_source
+
+READY = Path(__file__).parent / "ready"
+
+
+def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
+    """Read a robot: a ready one by its name, or a robot file.
+
+    Args:
+        name_or_path: A name of `list_robots`, or the path of a TOML file in mm, N, MPa and deg.
+            Text with a folder or the ending `.toml` is a path; other text is a ready robot first
+            and a file in the working folder second.
+
+    Returns:
+        The robot; it remembers the text of its file, so that `save_robot` keeps the comments.
+
+    Raises:
+        RobotFileError: There is no such robot or file, it is no TOML, or a value in it is not
+            allowed; the message names the file, the key and, for TOML syntax, the line.
+
+    Example:
+        >>> load_robot("pacheco2021-a").number_of_notches
+        5
+    """
+    path = _find(name_or_path)
+    shown = path.stem if path.parent == READY else str(path)
+    text = _read_text(path, shown)
+    table = _parse(text, shown)
+    try:
+        robot = from_table(table)
+    except InputError as error:
+        lines = str(error).splitlines()
+        raise RobotFileError("\n".join(f"{shown}: {line}" for line in lines)) from None
+    return remember_source(robot, text)
+
+
+def list_robots() -> dict[str, str]:
+    """List the ready robots.
+
+    Returns:
+        The title of every ready robot by the name that `load_robot` takes, sorted by name.
+
+    Example:
+        >>> list_robots()["pacheco2021-a"]
+        'Pacheco 2021, wrist A'
+    """
+    return {
+        name: str(tomllib.loads((READY / f"{name}.toml").read_text(encoding="utf-8"))["name"])
+        for name in _ready_names()
+    }
+
+
+def _ready_names() -> list[str]:
+    return sorted(path.stem for path in READY.glob("*.toml"))
+
+
+def robot_from_text(text: str, shown: str = "robot file") -> Robot:
+    """Make a robot from the text of a robot file.
+
+    Args:
+        text: TOML in mm, N, MPa and deg.
+        shown: What messages call the text.
+
+    Raises:
+        InputError: The text is no TOML, or a value in it is not allowed.
+    """
+    return remember_source(from_table(_parse(text, shown)), text)
+
+
+def _find(name_or_path: str | os.PathLike[str]) -> Path:
+    """Decide between a ready robot and a file."""
+    text = os.fspath(name_or_path)
+    path = Path(text)
+    is_path = not isinstance(name_or_path, str) or path.suffix == ".toml" or len(path.parts) > 1
+    names = _ready_names()
+    if not is_path and text in names:
+        return READY / f"{text}.toml"
+    if is_path or path.is_file():
+        if path.suffix == ".toml" and path.stem in names and not path.exists():
+            raise RobotFileError(
+                f"{path}: there is no such file; the ready robot is called `{path.stem}`, "
+                "without .toml."
+            )
+        return path
+    raise RobotFileError(
+        f"`{text}` is neither a ready robot{nearest(text, names)} nor a robot file. "
+        f"Ready robots: {', '.join(names)}."
+    )
+
+
+def _read_text(path: Path, shown: str) -> str:
+    try:
+        # -sig: some editors begin a file with a byte order mark, which is no TOML
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise RobotFileError(f"{shown}: there is no such file.") from None
+    except IsADirectoryError:
+        raise RobotFileError(f"{shown} is a folder; give the robot file in it.") from None
+    except UnicodeDecodeError as error:
+        raise RobotFileError(
+            f"{shown} is not UTF-8 text (byte {error.start}); a robot file is a TOML text file, "
+            "saved as UTF-8."
+        ) from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise RobotFileError(f"{shown} cannot be read: {reason}.") from None
+
+
+def _parse(text: str, shown: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        match = re.fullmatch(
+            r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", str(error)
+        )
+        what, line, column = match.groups() if match else (str(error), None, None)
+        # "end of document" is the last line that has something on it
+        line = line or len(text.rstrip().splitlines())
+        at = f", column {column}" if column else ""
+        raise RobotFileError(
+            f"{shown}, line {line}{at}: this is not TOML ({what[:1].lower()}{what[1:]}); "
+            "write one `key = value` a line, text in quotes."
+        ) from None
+    except RecursionError:
+        raise RobotFileError(f"{shown} is nested too deeply for a robot file.") from None

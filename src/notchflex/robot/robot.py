@@ -1,0 +1,212 @@
+"""A robot as a person describes it."""
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from pydantic import Field, ValidationError, model_validator
+
+from notchflex.errors import InputError
+from notchflex.robot._explain import fields_of, sentences
+from notchflex.robot._part import ProblemError, part
+from notchflex.robot.kinds import Friction, Material, Notch, one_of
+from notchflex.robot.tendon import Tendon
+from notchflex.robot.tube import Tube
+
+if TYPE_CHECKING:
+    AnyNotch: TypeAlias = Notch
+    AnyMaterial: TypeAlias = Material
+    AnyFriction: TypeAlias = Friction
+else:
+    AnyNotch, AnyMaterial, AnyFriction = one_of(Notch), one_of(Material), one_of(Friction)
+
+MOST_NOTCHES = 10_000
+
+
+@part
+class Robot:
+    """A notched tube with its tendons, as in a robot file; it never changes, copies are made.
+
+    Args:
+        name: What the robot is called in tables and pictures.
+        tube: The tube before it is cut.
+        notch: The notches from base to tip; one entry may stand for several equal ones (`repeat`).
+        tendon: The tendons.
+        material: The material of the tube.
+        friction: The friction between tendon and tube.
+
+    Raises:
+        InputError: A value is not allowed; the message names it as `--set` does.
+
+    Example:
+        >>> from notchflex.robot import ArcNotch, Capstan, Linear, Robot, Tendon, Tube
+        >>> wrist = Robot(
+        ...     name="one notch",
+        ...     tube=Tube(1.62, 1.40),
+        ...     notch=(ArcNotch("on-axis", depth=1.4, height=0.8, uncut_length=1.2),),
+        ...     tendon=(Tendon(0.70),),
+        ...     material=Linear(7510.0),
+        ...     friction=Capstan(0.05),
+        ... )
+        >>> wrist.with_value("notch[1].depth", 1.3).notch[0].depth
+        1.3
+    """
+
+    name: Annotated[str, Field(strict=True, min_length=1, description="name of the robot")]
+    tube: Tube
+    notch: Annotated[tuple[AnyNotch, ...], Field(min_length=1)]
+    tendon: Annotated[tuple[Tendon, ...], Field(min_length=1)]
+    material: AnyMaterial
+    friction: AnyFriction
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> "Robot":
+        found = list(self._problems())
+        if found:
+            raise ProblemError(found)
+        return self
+
+    def _problems(self) -> Iterator[tuple[str, str]]:
+        """Check what only the whole robot can tell."""
+        number = sum(notch.repeat for notch in self.notch)
+        if number > MOST_NOTCHES:
+            yield ("notch", f"makes {number} notches; at most {MOST_NOTCHES} are allowed.")
+            return
+        first = 1
+        for notch in self.notch:
+            for key, text in notch.problems(self.tube):
+                yield (f"notch[{first}].{key}", text)
+            first += notch.repeat
+        for i, tendon in enumerate(self.tendon, start=1):
+            if tendon.radius > self.tube.outer_radius:
+                yield (
+                    f"tendon[{i}].radius",
+                    f"is {tendon.radius} mm, outside the wall; it must be at most the outer "
+                    f"radius, {self.tube.outer_radius} mm.",
+                )
+            if tendon.end_body is not None and tendon.end_body > number:
+                yield (
+                    f"tendon[{i}].end_body",
+                    f"is {tendon.end_body}; the robot has the bodies 1 to {number}, one after each "
+                    "notch.",
+                )
+
+    @functools.cached_property
+    def notches(self) -> tuple[Notch, ...]:
+        """Every notch from base to tip, each with `repeat` 1."""
+        return tuple(
+            single
+            for notch in self.notch
+            for single in (dataclasses.replace(notch, repeat=1),) * notch.repeat
+        )
+
+    @property
+    def number_of_notches(self) -> int:
+        """How many notches there are, repeated ones counted each."""
+        return sum(notch.repeat for notch in self.notch)
+
+    @property
+    def number_of_tendons(self) -> int:
+        """How many tendons there are."""
+        return len(self.tendon)
+
+    def replace(self, **parts: Any) -> "Robot":
+        """Return a copy with other parts, such as `material=Linear(7510.0)`.
+
+        Args:
+            parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`.
+
+        Raises:
+            InputError: A value is not allowed, or there is no such part.
+        """
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return remember_source(Robot(**(values | parts)), source_of(self))
+
+    def with_value(self, path: str, value: object) -> "Robot":
+        """Return a copy with one value changed.
+
+        Args:
+            path: The name of the value: `material.elastic_modulus`, `notch[2].depth` (the second
+                notch from the base), `notch.depth` or `notch[*].depth` (every notch),
+                `tendon[1].radius`, `friction.kind` and so on.
+            value: The new value, in the units of the robot file (mm, N, MPa, deg).
+
+        Changing a kind (`material.kind`) keeps the keys that both kinds share and drops the others;
+        `notchflex.robot.set_values` tells which.
+
+        Raises:
+            InputError: There is no such value, or the new one is not allowed.
+        """
+        return self.with_values({path: value})
+
+    def with_values(self, values: Mapping[str, object] | Iterable[tuple[str, object]]) -> "Robot":
+        """Return a copy with several values changed at once; their order does not matter.
+
+        Args:
+            values: New values by path, as for `with_value`.
+
+        Raises:
+            InputError: There is no such value, or a new one is not allowed.
+        """
+        from notchflex.robot.paths import set_values  # it makes robots, and so imports this file
+
+        return set_values(self, values).robot
+
+
+def to_table(robot: Robot) -> dict[str, Any]:
+    """Return a robot as the plain table that its file holds: dicts, lists, numbers and text."""
+    return {
+        "name": robot.name,
+        "tube": _part_table(robot.tube),
+        "notch": [_part_table(notch) for notch in robot.notch],
+        "tendon": [_part_table(tendon) for tendon in robot.tendon],
+        "material": _part_table(robot.material),
+        "friction": _part_table(robot.friction),
+    }
+
+
+def from_table(table: Mapping[str, Any]) -> Robot:
+    """Make a robot from the plain table that a file holds.
+
+    Args:
+        table: As returned by `to_table` or read from TOML.
+
+    Raises:
+        InputError: A key is missing, not known, or its value is not allowed.
+    """
+    validator: Any = getattr(Robot, "__pydantic_validator__")  # noqa: B009
+    try:
+        return validator.validate_python(dict(table))
+    except ValidationError as error:
+        raise InputError("\n".join(sentences(error, Robot, _repeats(table)))) from None
+
+
+def source_of(robot: Robot) -> str | None:
+    """Return the text of the file that a robot was read from, where there was one."""
+    return getattr(robot, "_source", None)
+
+
+def remember_source(robot: Robot, text: str | None) -> Robot:
+    """Keep the text of a robot's file beside it, so that its comments survive a rewrite.
+
+    It is no field: two robots with the same values are equal whatever their files say.
+    """
+    object.__setattr__(robot, "_source", text)
+    return robot
+
+
+def _part_table(value: object) -> dict[str, Any]:
+    """List the values of a part, without those that are left out (None)."""
+    values = {name: getattr(value, name) for name in fields_of(type(value))}
+    return {name: one for name, one in values.items() if one is not None}
+
+
+def _repeats(table: Mapping[str, Any]) -> list[int]:
+    """Read `repeat` of every notch of a table that may hold anything."""
+    notches = table.get("notch")
+    found = [
+        one.get("repeat", 1) if isinstance(one, Mapping) else 1
+        for one in (notches if isinstance(notches, list) else [])
+    ]
+    return [one if isinstance(one, int) and one > 0 else 1 for one in found]

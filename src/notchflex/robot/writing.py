@@ -1,0 +1,208 @@
+"""Writing robot files, with the comments of the file that a robot came from."""
+
+import os
+import re
+import tomllib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, cast
+
+import tomlkit
+from tomlkit.exceptions import ParseError
+
+from notchflex.errors import InputError, RobotFileError
+from notchflex.robot._explain import fields_of
+from notchflex.robot.paths import defaults_of
+from notchflex.robot.reading import robot_from_text
+from notchflex.robot.robot import Robot, source_of, to_table
+
+_HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
+_CHANGED = re.compile(r"\s*\(changed from (.*)\)$")
+
+
+def save_robot(
+    robot: Robot, path: str | os.PathLike[str], template: str | os.PathLike[str] | None = None
+) -> None:
+    """Write a robot file in mm, N, MPa and deg.
+
+    Comments are kept.  Where a value with a comment has changed, its comment goes on with
+    "(changed from ...)", because a source given there speaks of the old value.
+
+    Args:
+        robot: The robot to write.
+        path: The file to write; one that is there is replaced.
+        template: The file whose comments and order are kept; None takes the file that the robot
+            was read from, or a fresh layout with the meaning and unit of every key.
+
+    Raises:
+        RobotFileError: The template cannot be read, or the file cannot be written.
+
+    Example:
+        >>> from notchflex.robot import load_robot
+        >>> softer = load_robot("pacheco2021-a").with_value("material.elastic_modulus", 9_500.0)
+        >>> save_robot(softer, "softer.toml")  # doctest: +SKIP
+    """
+    source = source_of(robot)
+    if template is not None:
+        try:
+            source = Path(template).read_text(encoding="utf-8-sig")
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+            raise RobotFileError(f"{template} cannot be read: {reason}.") from None
+    try:
+        Path(path).write_text(robot_text(robot, source), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise RobotFileError(f"{path} cannot be written: {error.strerror}.") from None
+
+
+def robot_text(robot: Robot, template: str | None = None) -> str:
+    """Return the text of a robot file.
+
+    Args:
+        robot: The robot to write.
+        template: Text of a robot file whose comments and order are kept.
+    """
+    if template is not None:
+        try:
+            text = _rewritten(robot, template)
+            if robot_from_text(text) == robot:
+                return text
+        except (InputError, ParseError):
+            pass  # a template laid out in an unusual way; a fresh file is right, if bare
+    return _fresh(robot)
+
+
+def _fresh(robot: Robot) -> str:
+    """Lay out a new file, with the meaning and unit of every key as its comment."""
+    lines = [
+        "# A notchflex robot file. Lengths in mm, forces in N, moduli in MPa, angles in deg.",
+        "",
+    ]
+    for key, value in to_table(robot).items():
+        if key == "name":
+            lines += [f"name = {tomlkit.item(value).as_string()}"]
+            continue
+        parts = getattr(robot, key)
+        for one in parts if isinstance(parts, tuple) else (parts,):
+            header = f"[[{key}]]" if isinstance(parts, tuple) else f"[{key}]"
+            lines += ["", header, *_fresh_part(one)]
+    return "\n".join(lines) + "\n"
+
+
+def _fresh_part(part: Any) -> list[str]:
+    lines: list[str] = []
+    for key, record in fields_of(type(part)).items():
+        value = getattr(part, key)
+        if value is None:
+            continue
+        unit = (record.json_schema_extra or {}).get("unit", "")
+        comment = ", ".join(word for word in (unit, record.description or "") if word)
+        line = f"{key} = {tomlkit.item(value).as_string()}"
+        lines.append(f"{line}  # {comment}" if comment else line)
+    return lines
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A piece of a template: comments above a header, the header, the lines below it."""
+
+    name: str
+    lead: list[str]
+    header: str
+    body: list[str] = field(default_factory=list[str])
+
+    def text(self, values: dict[str, Any]) -> str:
+        """Return the piece with other values."""
+        body = tomlkit.parse("".join(self.body))
+        _update(body, values, self.name)
+        return "".join(self.lead) + self.header + tomlkit.dumps(body)
+
+
+def _rewritten(robot: Robot, template: str) -> str:
+    """Put the values of a robot into the text of a file."""
+    old = to_table(robot_from_text(template))
+    new = to_table(robot)
+    blocks = _split(template)
+    wanted: list[tuple[_Block, dict[str, Any]]] = []
+    done: set[str] = set()
+    for block in blocks:
+        if block.name in ("notch", "tendon"):
+            if block.name not in done:
+                done.add(block.name)
+                mine = [one for one in blocks if one.name == block.name]
+                wanted += _matched(mine, old[block.name], new[block.name])
+        elif block.name:
+            wanted.append((block, new[block.name]))
+        else:  # the head of the file: the name, and whatever is not under a header of its own
+            headed = {one.name for one in blocks}
+            wanted.append((block, {k: v for k, v in new.items() if k not in headed}))
+    return "".join(block.text(table) for block, table in wanted)
+
+
+def _split(template: str) -> list[_Block]:
+    """Split a file at its headers; comments right above a header belong to it."""
+    blocks = [_Block("", [], "")]
+    for line in template.splitlines(keepends=True):
+        line = line if line.endswith("\n") else line + "\n"
+        match = _HEADER.fullmatch(line.rstrip("\n"))
+        if not match:
+            blocks[-1].body.append(line)
+            continue
+        lead: list[str] = []
+        body = blocks[-1].body
+        while body and (not body[-1].strip() or body[-1].lstrip().startswith("#")):
+            lead.insert(0, body.pop())
+        if not body and not blocks[-1].name:  # the comment at the head of the file stays there
+            cut = next((i for i in range(len(lead), 0, -1) if not lead[i - 1].strip()), 0)
+            body.extend(lead[:cut])
+            lead = lead[cut:]
+        blocks.append(_Block(match[1], lead, line))
+    return blocks
+
+
+def _matched(
+    blocks: list[_Block], old: list[dict[str, Any]], new: list[dict[str, Any]]
+) -> list[tuple[_Block, dict[str, Any]]]:
+    """Give every new notch or tendon the piece of the file that described it, or the last one."""
+    owner = [i for i, one in enumerate(old) for _ in range(one.get("repeat", 1))]
+    result: list[tuple[_Block, dict[str, Any]]] = []
+    first, used = 0, -1
+    for table in new:
+        place = owner[min(first, len(owner) - 1)]
+        block = blocks[place]
+        # a group of equal notches that was split: its comment stands once
+        result.append((replace(block, lead=["\n"]) if place == used else block, table))
+        used = place
+        first += table.get("repeat", 1)
+    return result
+
+
+def _update(table: Any, values: dict[str, Any], section: str) -> None:
+    """Bring a tomlkit table to the given values, touching only what differs."""
+    for key in [key for key in table if key not in values]:
+        del table[key]
+    defaults = defaults_of(section, values) if section else {}
+    for key, value in values.items():
+        if key not in table:
+            if key not in defaults or defaults[key] != value:
+                table[key] = value
+        elif isinstance(value, dict):
+            _update(table[key], cast("dict[str, Any]", value), key)
+        elif isinstance(value, list):
+            for item, one in zip(table[key], cast("list[Any]", value), strict=False):
+                _update(item, one, key)
+        elif table[key] != value:
+            _set(table, key, value)
+
+
+def _set(table: Any, key: str, value: object) -> None:
+    """Change a value; a comment beside it says from what."""
+    was, comment = table[key].as_string(), table[key].trivia.comment
+    table[key] = value
+    if not comment:
+        return
+    changed = _CHANGED.search(comment)
+    if changed:
+        comment, was = comment[: changed.start()], changed[1]
+    same = tomllib.loads(f"x = {was}")["x"] == value
+    table[key].trivia.comment = comment if same else f"{comment} (changed from {was})"

@@ -1,0 +1,40 @@
+"""The cross-section that a cut leaves of a tube, as the numbers a rod needs."""
+
+from typing import NamedTuple
+
+from notchflex._jax import jax
+
+
+class Section(NamedTuple):
+    """Properties of one cross-section (or of many: every field then has the same shape).
+
+    The section is symmetric about the line through the tube axis and the spine, the wall
+    that the cut leaves. Positions are measured along that line from the tube axis, positive
+    toward the spine, that is away from the cut. A named tuple is a pytree, so sections go
+    through `jit`, `vmap` and `grad` as they are.
+
+    Attributes:
+        area: Area of the material, mm².
+        centroid: Distance from the tube axis to the centroid, the neutral axis of the bending
+            of the notch, mm.
+        second_moment_weak: Second moment for the bending of the notch, about the axis through
+            the centroid perpendicular to the line of symmetry, mm⁴. (Weak for deep cuts; the
+            name stays for shallow ones, and where it passes the other one.)
+        second_moment_strong: Second moment for bending sideways, about the line of symmetry,
+            mm⁴.
+        torsion_constant: Saint-Venant torsion constant, mm⁴.
+        shear_centre: Distance from the tube axis to the shear centre (Trefftz, that is for
+            Poisson's ratio 0), mm.
+        edge_near: Distance from the neutral axis to the farthest fibre on the side of the cut,
+            mm.
+        edge_spine: Distance from the neutral axis to the outer fibre of the spine, mm.
+    """
+
+    area: jax.Array
+    centroid: jax.Array
+    second_moment_weak: jax.Array
+    second_moment_strong: jax.Array
+    torsion_constant: jax.Array
+    shear_centre: jax.Array
+    edge_near: jax.Array
+    edge_spine: jax.Array

@@ -1,0 +1,126 @@
+"""Torsion constant and shear centre of an annular segment: estimates, corrected by a table.
+
+There is no closed form, so a simple estimate for each of the three shapes is multiplied by a
+factor that `benchmarks/segment_table.py` computed once with `sectionproperties` (warping
+analysis) and fitted with Chebyshev polynomials in two coordinates that make it smooth:
+√(1 − r_i/r_o), and the angle of the chord that the cut plane makes.
+
+ACCURACY_TEXT
+"""
+
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from notchflex._jax import jax, jnp
+from notchflex.section.angles import half_angle
+from notchflex.section.segment_estimates import closed_estimate, open_estimate, solid_estimate
+from notchflex.section.terms import beside
+
+# Where the factors were computed; benchmarks/segment_table.py reads these.
+RATIO_RANGE = (0.2, 0.98)  # r_i / r_o
+LIGAMENT_LEFT = 0.01  # least thickness left under the flat of a closed tube, over the wall
+CHORD_RANGE = {  # of the angle in rad, see `chord_angle`
+    "closed": (2.0 * np.arcsin(np.sqrt(LIGAMENT_LEFT)), np.pi),
+    "open": (0.0, np.pi),
+    "solid": (0.1, np.pi / 2.0),
+}
+
+
+@cache
+def _read_table() -> dict[tuple[str, str], np.ndarray]:
+    """Read the coefficients, by shape and quantity, shape (ratio orders, angle orders)."""
+    text = (files("notchflex.section") / "segment_table.csv").read_text(encoding="utf-8")
+    table: dict[tuple[str, str], list[list[float]]] = {}
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            shape, quantity, *coefficients = line.split(",")
+            table.setdefault((shape, quantity), []).append([float(c) for c in coefficients])
+    return {key: np.array(rows) for key, rows in table.items()}
+
+
+def _chebyshev(count: int, value: jax.Array, low: float, high: float) -> jax.Array:
+    """Values (count, …) of the first Chebyshev polynomials, constant outside low … high."""
+    # The ends are moved in by 1e-12, because the arccosine has no derivative there.
+    x = (2.0 * value - low - high) / (high - low)
+    x = jnp.clip(x, -1.0 + 1e-12, 1.0 - 1e-12)
+    return jnp.cos(beside(np.arange(count, dtype=float), x) * jnp.arccos(x)[None])
+
+
+def chord_angle(shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array) -> jax.Array:
+    """Return the table's coordinate along the depth, an angle in rad.
+
+    Args:
+        shape: "closed", "open" or "solid".
+        outer: Outer radius, mm.
+        inner: Inner radius, mm.
+        depth: Depth of the cut, mm.
+
+    Returns:
+        For the solid segment the half-angle of the outer circle beyond the cut plane, for the
+        open arc that of the inner circle, for the closed tube 2 arccos √(g / wall): all of them
+        make the square roots at the ends of their range smooth.
+    """
+    if shape == "closed":
+        return half_angle(outer, outer - inner - depth, depth)
+    if shape == "open":
+        return half_angle(inner, inner + outer - depth, inner - outer + depth)
+    return half_angle(outer, 2.0 * outer - depth, depth)
+
+
+def _factors(
+    shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Interpolate the factors on the torsion constant and on the shear centre."""
+    low, high = (float(np.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
+    table = _read_table()
+    both = np.stack([table[shape, "torsion"], table[shape, "shear"]])
+    _, rows, columns = both.shape
+    across = _chebyshev(rows, jnp.sqrt(1.0 - inner / outer), low, high)
+    along = _chebyshev(
+        columns, chord_angle(shape, outer, inner, depth), *map(float, CHORD_RANGE[shape])
+    )
+    torsion, shear = jnp.einsum("kpq,p...,q...->k...", both, across, along)
+    return torsion, shear
+
+
+def segment_torsion(
+    outer: jax.Array, inner: jax.Array, depth: jax.Array, area: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Compute torsion constant and shear centre of an annular segment.
+
+    Args:
+        outer: Outer radius, mm.
+        inner: Inner radius, mm, greater than 0; of the same shape.
+        depth: Depth of the cut, mm; of the same shape.
+        area: Area of the section, mm²; of the same shape.
+
+    Returns:
+        Torsion constant, mm⁴, and distance of the (Trefftz) shear centre from the tube axis,
+        toward the spine, mm.
+    """
+    wall, plane = outer - inner, depth - outer
+    closed, solid = plane <= -inner, plane >= inner
+    # All three are computed; outside its own range each one gets a depth in the middle of it,
+    # so that no derivative becomes NaN.
+    shallow = jnp.where((depth < wall) & closed, depth, 0.5 * wall)
+    through = jnp.where(closed | solid, outer, depth)
+    deep = jnp.where(solid, depth, outer + inner)
+
+    estimates = {
+        "closed": closed_estimate(outer, inner, shallow),
+        "open": open_estimate(outer, inner, through, area),
+        "solid": solid_estimate(outer, deep, area),
+    }
+    torsion, shear = {}, {}
+    for (shape, (first, second)), at in zip(
+        estimates.items(), (shallow, through, deep), strict=True
+    ):
+        on_torsion, on_shear = _factors(shape, outer, inner, at)
+        torsion[shape], shear[shape] = first * on_torsion, second * on_shear
+
+    def choose(of: dict[str, jax.Array]) -> jax.Array:
+        return jnp.where(closed, of["closed"], jnp.where(solid, of["solid"], of["open"]))
+
+    return choose(torsion), choose(shear)

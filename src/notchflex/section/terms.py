@@ -1,0 +1,19 @@
+"""Series over arrays of any shape: the terms get an axis of their own, in front."""
+
+import numpy as np
+
+from notchflex._jax import jax, jnp
+
+
+def beside(constants: np.ndarray, like: jax.Array) -> jax.Array:
+    """Shape one constant for each term so that it combines with `like[None]`.
+
+    Args:
+        constants: Constants, shape (terms,).
+        like: Array that the terms are functions of, any shape.
+
+    Returns:
+        The constants, shape (terms, 1, …, 1) with as many ones as `like` has axes; explicit
+        because silent broadcasting across ranks is an error in the tests.
+    """
+    return jnp.asarray(constants).reshape((-1, *([1] * like.ndim)))

@@ -1,0 +1,29 @@
+"""Statics: loads, balance, Newton's method, states with memory."""
+
+from notchflex.statics.closing import Closing, closing
+from notchflex.statics.kinematics import equal_stroke_angles, tip_from_angles
+from notchflex.statics.load import Load, LoadPath, draw, pull
+from notchflex.statics.newton import Settings
+from notchflex.statics.path import ConvergenceError, Equilibrium, Path
+from notchflex.statics.solve import simulate, solve, solve_each
+from notchflex.statics.state import SavedState, State
+
+__all__ = [
+    "Closing",
+    "ConvergenceError",
+    "Equilibrium",
+    "Load",
+    "LoadPath",
+    "Path",
+    "SavedState",
+    "Settings",
+    "State",
+    "closing",
+    "draw",
+    "equal_stroke_angles",
+    "pull",
+    "simulate",
+    "solve",
+    "solve_each",
+    "tip_from_angles",
+]

@@ -1,0 +1,50 @@
+"""What the actuators demand of the tendons at the base: a tension, or a stroke."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from jaxtyping import Array, Bool, Float
+
+from notchflex._jax import jnp
+from notchflex.chain import Chain
+from notchflex.statics.element import Beyond
+from notchflex.statics.walk import per_tendon
+
+
+class Command(NamedTuple):
+    """Demand on every tendon.
+
+    Attributes:
+        value: Tension (N) or stroke (mm).
+        by_stroke: Whether it is a stroke.
+    """
+
+    value: Float[Array, " t"]
+    by_stroke: Bool[Array, " t"]
+
+
+def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Beyond) -> Float[Array, " t"]:
+    """Tendon drawn out at the base since the free robot (mm), with the file's stiffness."""
+    stretch = per_tendon(chain, base.stretch) + base_tension * chain.free_length
+    return per_tendon(chain, base.drawn) + stretch / chain.axial_stiffness
+
+
+def stroke_scale(chain: Chain) -> Float[Array, ""]:
+    """A stiffness of the size of the robot's own, N/mm: how fast tension answers stroke."""
+    return jnp.mean(chain.lip_stiffness) / chain.flexures
+
+
+def command_residual(
+    chain: Chain, command: Command, base_tension: Float[Array, " t"], base: Beyond
+) -> Float[Array, " t"]:
+    """How far the tendons are from what is demanded, scaled to be comparable with angles.
+
+    A tendon drawn by stroke is slack where the robot has set free more than is drawn:
+    tension >= 0, stroke set free >= stroke demanded, product 0.
+    """
+    scale = stroke_scale(chain)
+    pressed = base_tension + scale * (command.value - stroke(chain, base_tension, base))
+    by_stroke = base_tension - jnp.where(pressed >= 0.0, pressed, 0.0)
+    by_tension = base_tension - command.value
+    return jnp.where(command.by_stroke, by_stroke, by_tension) / scale

@@ -1,0 +1,229 @@
+"""What is done to a robot: tension or stroke at the base of every tendon, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from notchflex.errors import InputError
+
+_FORM = "a number, or one entry per tendon with None where nothing is commanded"
+
+
+@dataclass(frozen=True)
+class Load:
+    """One load on a robot.
+
+    Args:
+        tension: Tension at the base of every tendon, N. A single number pulls the first tendon;
+            a sequence has one entry per tendon, None where its tension is not commanded.
+        stroke: Tendon drawn out at the base since the free robot, mm; in the same form.
+        base_rotation: Rotation vector of the base in the world, rad.
+
+    A tendon of which neither is commanded hangs slack (0 N).
+
+    Example:
+        >>> Load(tension=2.0)
+        Load(tension=2.0, stroke=None, base_rotation=(0.0, 0.0, 0.0))
+    """
+
+    tension: float | Sequence[float | None] | None = None
+    stroke: float | Sequence[float | None] | None = None
+    base_rotation: Sequence[float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class LoadPath:
+    """Loads one after the other.
+
+    Args:
+        tension: Commanded tensions, N, steps by tendons, NaN where not commanded.
+        stroke: Commanded strokes, mm, in the same form.
+        base_rotation: Rotation vector of the base in the world, rad.
+    """
+
+    tension: np.ndarray
+    stroke: np.ndarray
+    base_rotation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        """Check shapes and numbers."""
+        tension = np.atleast_2d(np.asarray(self.tension, float))
+        stroke = np.atleast_2d(np.asarray(self.stroke, float))
+        base_rotation = np.asarray(self.base_rotation, float)
+        if tension.shape != stroke.shape or tension.ndim != 2:
+            raise InputError(
+                f"a load path needs tension and stroke of one shape, steps by tendons; "
+                f"got {tension.shape} and {stroke.shape}"
+            )
+        if len(tension) == 0:
+            raise InputError("a load path needs at least one step; got none")
+        if np.isinf(tension).any() or np.isinf(stroke).any():
+            raise InputError("a tension or stroke is infinite; give finite numbers (N, mm)")
+        if (tension < 0).any():
+            raise InputError(
+                f"a tendon can only pull: got a tension of {np.nanmin(tension):g} N, "
+                "give 0 or more"
+            )
+        if (~np.isnan(tension) & ~np.isnan(stroke)).any():
+            raise InputError(
+                "tension and stroke are both given for one tendon in one step; give one of them"
+            )
+        if base_rotation.shape != (3,) or not np.isfinite(base_rotation).all():
+            raise InputError(
+                f"base_rotation needs three finite numbers (rotation vector, rad); "
+                f"got {self.base_rotation!r}"
+            )
+        object.__setattr__(self, "tension", tension)
+        object.__setattr__(self, "stroke", stroke)
+        object.__setattr__(self, "base_rotation", base_rotation)
+
+    def __len__(self) -> int:
+        """Number of steps."""
+        return len(self.tension)
+
+    def release(self) -> LoadPath:
+        """The same way there and back, the peak twice.
+
+        Example:
+            >>> len(pull(0.0, 3.0, steps=31).release())
+            62
+        """
+        return LoadPath(
+            np.concatenate([self.tension, self.tension[::-1]]),
+            np.concatenate([self.stroke, self.stroke[::-1]]),
+            self.base_rotation,
+        )
+
+    def then(self, following: LoadPath) -> LoadPath:
+        """This path and another after it."""
+        return LoadPath(
+            np.concatenate([self.tension, following.tension]),
+            np.concatenate([self.stroke, following.stroke]),
+            self.base_rotation,
+        )
+
+    def for_tendons(self, count: int) -> LoadPath:
+        """The same path for a robot of so many tendons; tendons not named hang slack."""
+        given = self.tension.shape[1]
+        if given > count:
+            raise InputError(
+                f"the load commands {given} tendons, but the robot has {count}; "
+                f"give at most {count}"
+            )
+        added = np.full((len(self), count - given), np.nan)
+        return LoadPath(
+            np.concatenate([self.tension, added], axis=1),
+            np.concatenate([self.stroke, added], axis=1),
+            self.base_rotation,
+        )
+
+
+def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
+    """Pull one tendon by tension, from one value to another in equal steps.
+
+    Args:
+        start: First tension, N.
+        stop: Last tension, N.
+        steps: Number of steps, both ends included.
+        tendon: Which tendon, counted from 1.
+
+    Returns:
+        The path; `.release()` adds the way back.
+
+    Raises:
+        InputError: Fewer than one step, a negative or infinite tension, no such tendon.
+
+    Example:
+        >>> pull(0.0, 3.0, steps=4).tension[:, 0].tolist()
+        [0.0, 1.0, 2.0, 3.0]
+    """
+    return _ramp("tension", start, stop, steps, tendon)
+
+
+def draw(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
+    """Draw one tendon by stroke, from one value to another in equal steps.
+
+    Args:
+        start: First stroke, mm.
+        stop: Last stroke, mm.
+        steps: Number of steps, both ends included.
+        tendon: Which tendon, counted from 1.
+
+    Returns:
+        The path; `.release()` adds the way back.
+
+    Raises:
+        InputError: Fewer than one step, an infinite stroke, no such tendon.
+
+    Example:
+        >>> draw(0.0, 1.0, steps=3).stroke[:, 0].tolist()
+        [0.0, 0.5, 1.0]
+    """
+    return _ramp("stroke", start, stop, steps, tendon)
+
+
+def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> LoadPath:
+    if steps < 1:
+        raise InputError(f"a range needs at least one step; got {steps}")
+    if tendon < 1:
+        raise InputError(f"tendons are counted from 1; got {tendon}")
+    commanded = np.full((steps, tendon), np.nan)
+    commanded[:, tendon - 1] = np.linspace(start, stop, steps)
+    if not np.isfinite(commanded[:, tendon - 1]).all():
+        raise InputError(f"a {what} range needs finite ends; got {start:g} and {stop:g}")
+    nothing = np.full_like(commanded, np.nan)
+    return LoadPath(commanded, nothing) if what == "tension" else LoadPath(nothing, commanded)
+
+
+def load_path(loads: Load | LoadPath | Iterable[Load], tendons: int) -> LoadPath:
+    """Bring loads of any form to one path for a robot of so many tendons.
+
+    Args:
+        loads: A path, one load, or loads in order.
+        tendons: Number of tendons of the robot.
+
+    Returns:
+        The path, every tendon named.
+
+    Raises:
+        InputError: Too many entries, numbers that are no loads, a base that turns on the way.
+    """
+    if isinstance(loads, LoadPath):
+        return loads.for_tendons(tendons)
+    every = [loads] if isinstance(loads, Load) else list(loads)
+    if not every:
+        raise InputError("there are no loads; give at least one")
+    for load in every:
+        if not isinstance(load, Load):
+            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
+    if any(tuple(load.base_rotation) != tuple(every[0].base_rotation) for load in every):
+        raise InputError("base_rotation must be the same for all loads of a path")
+    return LoadPath(
+        np.stack([_entries(load.tension, tendons, "tension") for load in every]),
+        np.stack([_entries(load.stroke, tendons, "stroke") for load in every]),
+        np.asarray(every[0].base_rotation, float),
+    )
+
+
+def _entries(value: float | Sequence[float | None] | None, tendons: int, what: str) -> np.ndarray:
+    """One number per tendon, NaN where nothing is commanded."""
+    given = [value] if value is None or np.isscalar(value) else list(value)  # type: ignore[arg-type]
+    if len(given) > tendons:
+        raise InputError(
+            f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "
+            f"give at most {tendons}"
+        )
+    entries = np.full(tendons, np.nan)
+    for i, entry in enumerate(given):
+        if entry is None:
+            continue
+        try:
+            entries[i] = float(entry)
+        except (TypeError, ValueError):
+            raise InputError(f"{what} must be {_FORM}; got {entry!r}") from None
+        if not np.isfinite(entries[i]):
+            raise InputError(f"{what} must be finite; got {entry!r}")
+    return entries

@@ -1,0 +1,165 @@
+"""Newton's method on the whole chain, from a state near the answer, with a line search."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import equinox as eqx
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Bool, Float, Int
+
+from notchflex._jax import jax, jnp
+from notchflex.chain import Chain
+from notchflex.statics.actuation import Command, command_residual, stroke
+from notchflex.statics.element import Memory, Unknowns
+from notchflex.statics.sweep import linear_step
+from notchflex.statics.walk import evaluate
+
+
+class Settings(eqx.Module):
+    """How hard the solver tries.
+
+    Attributes:
+        tolerance: Largest scaled imbalance (about an angle, rad) of a solved state.
+        max_iterations: Newton iterations for one load step.
+        max_load_steps: Parts a load may be cut into before the solver gives up.
+        smallest_load_step: Smallest such part, of the whole load.
+    """
+
+    tolerance: float = 1e-12
+    max_iterations: int = 40
+    max_load_steps: int = 200
+    smallest_load_step: float = 1e-5
+
+
+class Point(NamedTuple):
+    """A guess or an answer: the unknowns and the base tensions."""
+
+    unknowns: Unknowns
+    base_tension: Float[Array, " t"]
+
+
+class NewtonResult(NamedTuple):
+    """Where Newton's method ended.
+
+    Attributes:
+        point: The answer, or the last guess.
+        slid: Tendon slid over the contacts there, mm.
+        stroke: Tendon drawn out at the base there, mm.
+        lip_gap: What is left of every notch's opening there, mm.
+        residual: Largest scaled imbalance there.
+        iterations: Iterations taken.
+        converged: Whether the imbalance is within the tolerance.
+    """
+
+    point: Point
+    slid: tuple[Float[Array, "n t 2"], ...]
+    stroke: Float[Array, " t"]
+    lip_gap: Float[Array, " n"]
+    residual: Float[Array, ""]
+    iterations: Int[Array, ""]
+    converged: Bool[Array, ""]
+
+
+class _Search(NamedTuple):
+    """State of the search: the best point, and the part of a step that is tried from it."""
+
+    best: NewtonResult
+    size: Float[Array, ""]
+    step: Point
+    part: Float[Array, ""]
+    tries: Int[Array, ""]
+    over: Bool[Array, ""]
+
+
+# A step may turn a flexure by so much (rad) and change a log ratio by so much; beyond, the
+# linear model says nothing of use. Both are far above what a good step needs.
+_LARGEST_TURN = 0.5
+_LARGEST_LOG_RATIO = 1.0
+_TRIES = 7
+# A state whose imbalance has stopped falling at this multiple of the tolerance is as good as
+# rounding allows.
+_ROUNDING = 100.0
+
+
+def newton(
+    chain: Chain, command: Command, memory: Memory, start: Point, settings: Settings
+) -> NewtonResult:
+    """Find the equilibrium under a command near a starting point.
+
+    Every pass of the loop evaluates one point: the start, a full Newton step, or half of the
+    part tried before where that did not lessen the imbalance.
+
+    Args:
+        chain: The chain.
+        command: What is demanded of the tendons.
+        memory: What the contacts remember; not changed.
+        start: Where to begin.
+        settings: How hard to try.
+
+    Returns:
+        The result; a failure is told by `converged`, never raised.
+    """
+
+    def searching(search: _Search) -> Bool[Array, ""]:
+        return ~search.over & (search.best.iterations <= settings.max_iterations)
+
+    def iterate(search: _Search) -> _Search:
+        best = search.best
+        point = jax.tree.map(lambda at, by: at + search.part * by, best.point, search.step)
+        at = evaluate(chain, point.unknowns, memory, point.base_tension)
+        demand = command_residual(chain, command, point.base_tension, at.base)
+        residual = ravel_pytree((at.result.residual, demand))[0]
+        largest, size = jnp.max(jnp.abs(residual)), jnp.linalg.norm(residual)
+        better = size <= (1.0 - 1e-4 * search.part) * search.size
+        at_rounding = (best.residual < _ROUNDING * settings.tolerance) & ~better
+        taken = better | (jnp.isfinite(size) & (search.tries >= _TRIES) & ~at_rounding)
+        solved = taken & (largest < settings.tolerance)
+        found = NewtonResult(
+            point=point,
+            slid=at.result.slid,
+            stroke=stroke(chain, point.base_tension, at.base),
+            lip_gap=at.flexure.lip_gap,
+            residual=largest,
+            iterations=best.iterations + 1,
+            converged=largest < _ROUNDING * settings.tolerance,
+        )
+
+        def again() -> tuple[Point, Array]:
+            step = linear_step(chain, command, point.unknowns, memory, point.base_tension, at)
+            turn = jnp.max(jnp.abs(step.unknowns.modes))
+            logs = [jnp.max(jnp.abs(leaf), initial=0.0) for leaf in step.unknowns.log_ratio]
+            log_ratio = jnp.max(jnp.array([0.0, *logs]))
+            whole = jnp.minimum(_LARGEST_TURN / turn, _LARGEST_LOG_RATIO / log_ratio)
+            return Point(step.unknowns, step.base_tension), jnp.minimum(1.0, whole)
+
+        step, part = jax.lax.cond(
+            taken & ~solved, again, lambda: (search.step, 0.5 * search.part)
+        )
+        return _Search(
+            best=jax.tree.map(lambda old, new: jnp.where(taken, new, old), best, found),
+            size=jnp.where(taken, size, search.size),
+            step=step,
+            part=part,
+            tries=jnp.where(taken, 0, search.tries + 1),
+            over=solved | at_rounding | (~taken & (search.tries >= _TRIES)),
+        )
+
+    nowhere = NewtonResult(
+        point=start,
+        slid=memory.slid,
+        stroke=jnp.zeros(chain.tendons),
+        lip_gap=jnp.zeros(chain.flexures),
+        residual=jnp.array(jnp.inf),
+        iterations=jnp.array(-1),
+        converged=jnp.array(False),
+    )
+    search = _Search(
+        best=nowhere,
+        size=jnp.array(jnp.inf),
+        step=jax.tree.map(jnp.zeros_like, start),
+        part=jnp.ones(()),
+        tries=jnp.zeros((), int),
+        over=jnp.array(False),
+    )
+    return jax.lax.while_loop(searching, iterate, search).best

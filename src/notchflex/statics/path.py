@@ -1,0 +1,342 @@
+"""What a simulation returns: many states with memory, or one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, overload
+
+import jax.tree_util as tree_util
+import numpy as np
+
+from notchflex.chain import Chain
+from notchflex.motion import rotation_about
+from notchflex.robot import Robot
+from notchflex.statics.actuation import Command
+from notchflex.statics.load import LoadPath
+from notchflex.statics.run import Run, stability
+from notchflex.statics.state import State
+from notchflex.statics.stepping import Solved
+
+
+class ConvergenceError(RuntimeError):
+    """A result was asked to be converged and is not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """States along a path of loads. Units mm, N, N mm, rad; s steps, n notches, t tendons.
+
+    Where a step did not converge its row holds the last good state (its `tension` and `stroke`
+    are that state's, not the commanded ones), `converged` is false and `reason` says why; the
+    steps after it were not tried and hold the same state.
+
+    Attributes:
+        robot: The robot.
+        load: The loads.
+        chain: The robot as arrays.
+        run: What the solver returned, as arrays.
+        each_from_rest: Whether every state starts from the same one, rather than from its neighbour.
+    """
+
+    robot: Robot
+    load: LoadPath
+    chain: Chain
+    run: Run
+    each_from_rest: bool = False
+
+    def __len__(self) -> int:
+        """Number of steps."""
+        return len(self.load)
+
+    @overload
+    def __getitem__(self, step: int) -> Equilibrium: ...
+    @overload
+    def __getitem__(self, step: slice) -> list[Equilibrium]: ...
+    def __getitem__(self, step: int | slice) -> Equilibrium | list[Equilibrium]:
+        """One state, or some of them."""
+        if isinstance(step, slice):
+            return [Equilibrium(self, i) for i in range(*step.indices(len(self)))]
+        if not -len(self) <= step < len(self):
+            raise IndexError(f"step {step} of a path of {len(self)} steps")
+        return Equilibrium(self, step % len(self))
+
+    @property
+    def commanded_tension(self) -> np.ndarray:
+        """Commanded base tensions, N, (s, t); NaN where not commanded."""
+        return self.load.tension
+
+    @property
+    def commanded_stroke(self) -> np.ndarray:
+        """Commanded strokes, mm, (s, t); NaN where not commanded."""
+        return self.load.stroke
+
+    def _of(self, name: str) -> np.ndarray:
+        return np.asarray(getattr(self.run.quantities, name))
+
+    @property
+    def tension(self) -> np.ndarray:
+        """Tension of every tendon at the base, N, (s, t)."""
+        return self._of("tension")
+
+    @property
+    def stroke(self) -> np.ndarray:
+        """Tendon drawn out at the base since the free robot, mm, (s, t)."""
+        return self._of("stroke")
+
+    @property
+    def notch_angle(self) -> np.ndarray:
+        """Angle of every notch, base to tip, precurvature included, rad, (s, n)."""
+        return self._of("notch_angle")
+
+    @cached_property
+    def total_angle(self) -> np.ndarray:
+        """Bending angle of the whole robot, rad, (s,).
+
+        Where all notches bend in one plane, the sum of their angles, toward the first one's bend
+        positive; otherwise the angle between the axes of base and tip.
+        """
+        direction = np.radians([notch.direction_deg for notch in self.robot.notches])
+        along = np.cos(direction - direction[0])
+        if np.allclose(np.abs(along), 1.0, atol=1e-12):
+            return self.notch_angle @ np.sign(along)
+        cosine = np.clip(self._of("body_rotation")[..., -1, 2, 2], -1.0, 1.0)
+        return np.arccos(cosine)
+
+    @cached_property
+    def _base(self) -> np.ndarray:
+        return np.asarray(rotation_about(self.load.base_rotation))
+
+    @cached_property
+    def body_position(self) -> np.ndarray:
+        """Origin of every body, base first, in the world, mm, (s, n + 1, 3)."""
+        return self._of("body_position") @ self._base.T
+
+    @cached_property
+    def body_rotation(self) -> np.ndarray:
+        """Rotation of every body in the world, (s, n + 1, 3, 3)."""
+        return self._base @ self._of("body_rotation")
+
+    @cached_property
+    def tip_position(self) -> np.ndarray:
+        """Tip on the tube axis in the world, the proximal end being the origin, mm, (s, 3)."""
+        return self._of("tip_position") @ self._base.T
+
+    @property
+    def tip_rotation(self) -> np.ndarray:
+        """Rotation of the tip in the world, (s, 3, 3)."""
+        return self.body_rotation[..., -1, :, :]
+
+    @property
+    def span_tension(self) -> np.ndarray:
+        """Tension along every tendon: proximal, gap 1, body 1, gap 2, ..., gap n, N, (s, t, 2n).
+
+        NaN beyond the end body of a tendon.
+        """
+        return self._of("span_tension")
+
+    @property
+    def notch_moment(self) -> np.ndarray:
+        """Bending moment of every notch, N mm, (s, n)."""
+        return self._of("notch_moment")
+
+    @property
+    def outer_strain(self) -> np.ndarray:
+        """Strain of the outer fibre on the spine (Pacheco 2021, eq. 16), (s, n)."""
+        return self._of("outer_strain")
+
+    @property
+    def peak_strain(self) -> np.ndarray:
+        """Largest strain of any fibre, (s, n)."""
+        return self._of("peak_strain")
+
+    @property
+    def gap(self) -> np.ndarray:
+        """What is left of every notch's opening at its lips, mm, (s, n)."""
+        return self._of("gap")
+
+    @property
+    def closed(self) -> np.ndarray:
+        """Whether the lips of a notch touch, (s, n)."""
+        return self.contact_force > 0.0
+
+    @property
+    def contact_force(self) -> np.ndarray:
+        """Force between the lips of a closed notch, N, (s, n)."""
+        return self._of("contact_force")
+
+    @property
+    def contact_log_ratio(self) -> np.ndarray:
+        """ln(tension on the base side / on the tip side) at every contact, (s, t, 2n - 1)."""
+        return self._of("contact_log_ratio")
+
+    @property
+    def contact_slid(self) -> np.ndarray:
+        """Tendon slid over every contact toward the base, mm, (s, t, 2n - 1)."""
+        return self._of("contact_slid")
+
+    @property
+    def contact_bound(self) -> np.ndarray:
+        """Largest magnitude of the log ratio at every contact, (s, t, 2n - 1)."""
+        return self._of("contact_bound")
+
+    @property
+    def contact_state(self) -> np.ndarray:
+        """0 sticks, +1 slips toward the base, -1 toward the tip, (s, t, 2n - 1)."""
+        return self._of("contact_state")
+
+    @property
+    def stored_energy(self) -> np.ndarray:
+        """Energy stored in notches and tendons, N mm, (s,)."""
+        return self._of("stored_energy")
+
+    def _accumulated(self, force: str, length: str) -> np.ndarray:
+        """Force integrated over length by the trapezoid rule, from the state before on."""
+        pairs = []
+        for name in (force, length):
+            after, first = self._of(name), np.asarray(getattr(self.run.before, name))[None]
+            earlier = np.broadcast_to(first, after.shape)
+            if not self.each_from_rest:
+                earlier = np.concatenate([first, after[:-1]])
+            pairs.append((earlier, after))
+        if force == "span_tension":  # what a contact takes is the drop from span to span
+            pairs[0] = tuple(value[..., :-1] - value[..., 1:] for value in pairs[0])
+        (force_before, force_after), (length_before, length_after) = pairs
+        work = 0.5 * (force_before + force_after) * (length_after - length_before)
+        return work if self.each_from_rest else np.cumsum(work, axis=0)
+
+    @cached_property
+    def tendon_work(self) -> np.ndarray:
+        """Work done by every tendon's actuator since the start of the path, N mm, (s, t)."""
+        return self._accumulated("tension", "stroke")
+
+    @cached_property
+    def dissipation(self) -> np.ndarray:
+        """Work that every contact turned to heat since the start, N mm, (s, t, 2n - 1)."""
+        return self._accumulated("span_tension", "contact_slid")
+
+    @property
+    def converged(self) -> np.ndarray:
+        """Whether a step was solved, (s,)."""
+        return np.asarray(self.run.converged)
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Largest imbalance of the last attempt, scaled to an angle, (s,); NaN if not tried."""
+        return np.asarray(self.run.residual)
+
+    @property
+    def iterations(self) -> np.ndarray:
+        """Newton iterations, (s,)."""
+        return np.asarray(self.run.iterations)
+
+    @cached_property
+    def reason(self) -> list[str]:
+        """Why a step did not converge; empty where it did."""
+        return [self._reason(step) for step in range(len(self))]
+
+    def _reason(self, step: int) -> str:
+        if self.converged[step]:
+            return ""
+        if not self.run.tried[step]:
+            failed = int(np.argmin(self.converged))
+            return f"not tried, because step {failed + 1} of the path did not converge"
+        state = self.run.quantities
+        tension = ", ".join(f"{value:.4g}" for value in np.asarray(state.tension)[step])
+        drawn = ", ".join(f"{value:.4g}" for value in np.asarray(state.stroke)[step])
+        last = f"the last good state has tension {tension} N and stroke {drawn} mm"
+        if self.run.all_closed[step] and not np.isnan(self.load.stroke[step]).all():
+            return (
+                "every notch closed: the robot can't shorten the tendon further, so this stroke "
+                f"fixes no tension; {last}; command a smaller stroke, or a tension, or give the "
+                "tendon a finite axial_stiffness"
+            )
+        part = 100.0 * float(self.run.reached[step])
+        return (
+            f"no equilibrium found beyond {part:.3g} % of the way from the state before "
+            f"(imbalance {float(self.residual[step]):.2g}); {last}; take smaller steps, or the "
+            "robot has no equilibrium there"
+        )
+
+    @cached_property
+    def _stability(self) -> tuple[np.ndarray, np.ndarray]:
+        value, sign = stability(self.chain, command(self.load), self.run.solved)
+        return np.asarray(value), np.asarray(sign)
+
+    @property
+    def smallest_eigenvalue(self) -> np.ndarray:
+        """Smallest eigenvalue of the stiffness with sticking contacts held, N mm/rad, (s,)."""
+        return self._stability[0]
+
+    @property
+    def stable(self) -> np.ndarray:
+        """Whether the state is a stable equilibrium, (s,)."""
+        return (self.smallest_eigenvalue > 0.0) & (self._stability[1] > 0.0)
+
+    def state_at(self, step: int) -> State:
+        """State after a step (or the last good one before it), to save or continue from."""
+        solved: Solved = tree_util.tree_map(lambda leaf: np.asarray(leaf)[step], self.run.solved)
+        return State(self.robot.name, solved)
+
+    @property
+    def state(self) -> State:
+        """State after the last converged step."""
+        return self.state_at(-1)
+
+    def raise_if_failed(self) -> Path:
+        """Itself, if every step converged.
+
+        Raises:
+            ConvergenceError: A step did not; the message says which and why.
+        """
+        if not self.converged.all():
+            step = int(np.argmin(self.converged))
+            raise ConvergenceError(f"step {step + 1} of {len(self)}: {self.reason[step]}")
+        return self
+
+
+class Equilibrium:
+    """One state of a path: every quantity of `Path`, without the axis of steps.
+
+    Example:
+        >>> from notchflex import Load, load_robot, solve
+        >>> wrist = solve(load_robot("pacheco2021-a"), Load(tension=1.0))
+        >>> wrist.notch_angle.shape
+        (5,)
+    """
+
+    def __init__(self, path: Path, step: int) -> None:
+        """Look at one step of a path."""
+        self._path = path
+        self._step = step
+
+    def __getattr__(self, name: str) -> Any:
+        """A quantity of the path, at this step."""
+        if name.startswith("_") or name in {"run", "before", "chain", "load", "each_from_rest"}:
+            raise AttributeError(name)
+        value = getattr(self._path, name)
+        return value if name == "robot" else value[self._step]
+
+    @property
+    def state(self) -> State:
+        """This state, to save or continue from."""
+        return self._path.state_at(self._step)
+
+    def raise_if_failed(self) -> Equilibrium:
+        """Itself, if it converged.
+
+        Raises:
+            ConvergenceError: It did not; the message says why.
+        """
+        if not self.converged:
+            raise ConvergenceError(self.reason)
+        return self
+
+
+def command(load: LoadPath) -> Command:
+    """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
+    by_stroke = ~np.isnan(load.stroke)
+    return Command(np.where(by_stroke, load.stroke, np.nan_to_num(load.tension)), by_stroke)
+
+
+__all__ = ["ConvergenceError", "Equilibrium", "Path", "command"]

@@ -1,0 +1,73 @@
+"""Is an equilibrium stable? The stiffness of the whole robot with its tendons held."""
+
+from __future__ import annotations
+
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float
+
+from notchflex._jax import jax, jnp
+from notchflex.chain import Chain
+from notchflex.statics.actuation import Command, command_residual
+from notchflex.statics.element import Memory, at_bound
+from notchflex.statics.newton import Point
+from notchflex.statics.stepping import Solved
+from notchflex.statics.walk import evaluate
+
+# Closed lips are held by springs this much stiffer than the notches, so that a contact only
+# stiffens; without it the contact force would be a multiplier and the stiffness not defined.
+_CONTACT_STIFFNESS = 1e3
+
+
+# A contact on its bound goes on sliding: it is taken as having slid by so much (mm).
+_SLIP = 1e-3
+
+
+def smallest_eigenvalue(
+    chain: Chain, command: Command, solved: Solved
+) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """Smallest eigenvalue of the symmetric part of the stiffness, and a determinant's sign.
+
+    Tensions, contact forces and base tensions are eliminated first: a contact that sticks holds
+    its tendon, one that slides keeps its tension ratio (the stiffness is not symmetric then).
+
+    Args:
+        chain: The chain.
+        command: What is demanded of the tendons: by stroke a tendon is held, by tension it
+            gives way.
+        solved: The equilibrium.
+
+    Returns:
+        The eigenvalue, N mm per unit of mode squared (N mm/rad for arc notches), and the sign
+        of the determinant of the whole system.
+    """
+    point = solved.point
+    modes = point.unknowns.modes.size
+    flat, point_of = ravel_pytree(point)
+    here = evaluate(chain, point.unknowns, solved.memory, point.base_tension)
+    slid = tuple(
+        over - _SLIP * at_bound(ratio, bound)
+        for over, ratio, bound in zip(
+            here.result.slid, point.unknowns.log_ratio, here.result.bound, strict=True
+        )
+    )
+    memory = Memory(point.unknowns.log_ratio, slid)
+
+    def imbalance(flat: Array) -> Array:
+        varied: Point = point_of(flat)
+        at = evaluate(chain, varied.unknowns, memory, varied.base_tension)
+        demand = command_residual(chain, command, varied.base_tension, at.base)
+        residual = at.result.residual
+        residual = residual._replace(modes=residual.modes * chain.stiffness)
+        return ravel_pytree((residual, demand))[0]
+
+    matrix = jax.jacfwd(imbalance)(flat)
+    natural_gap = chain.rods.length.sum(-1)
+    give = 1.0 / (_CONTACT_STIFFNESS * chain.lip_stiffness * natural_gap)
+    lips = jnp.arange(modes, modes + chain.flexures)
+    matrix = matrix.at[lips, lips].add(give)
+    others = matrix[modes:, modes:]
+    stiffness = matrix[:modes, :modes] - matrix[:modes, modes:] @ jnp.linalg.solve(
+        others, matrix[modes:, :modes]
+    )
+    sign, _ = jnp.linalg.slogdet(matrix)
+    return jnp.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0], sign

@@ -1,0 +1,113 @@
+"""A state that can be saved and continued from: shape, tensions and memory."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import jax.tree_util as tree_util
+import numpy as np
+
+from notchflex.chain import Chain
+from notchflex.errors import InputError
+from notchflex.statics.stepping import Solved, at_rest
+
+_FORMAT = "notchflex state 1"
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that the next load needs to know of the past.
+
+    Attributes:
+        robot: Name of the robot it belongs to.
+        solved: Unknowns, base tensions (N), memory of the contacts and stroke (mm).
+    """
+
+    robot: str
+    solved: Solved
+
+    def save(self, path: str | FilePath) -> None:
+        """Write the state to a JSON file.
+
+        Args:
+            path: Where to; an existing file is replaced.
+        """
+        leaves, _ = tree_util.tree_flatten_with_path(self.solved)
+        arrays = {tree_util.keystr(key): np.asarray(leaf).tolist() for key, leaf in leaves}
+        content = {"format": _FORMAT, "robot": self.robot, "arrays": arrays}
+        FilePath(path).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | FilePath) -> SavedState:
+        """Read a state back; it is fitted to a robot when it is continued from.
+
+        Args:
+            path: A file written by `save`.
+
+        Returns:
+            The state.
+
+        Raises:
+            InputError: The file is missing or is no state.
+        """
+        try:
+            content = json.loads(FilePath(path).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise InputError(f"there is no state file {path}") from None
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            raise InputError(
+                f"{path} cannot be read as a state: {error}; give a file written by --save-state"
+            ) from None
+        if not isinstance(content, dict) or content.get("format") != _FORMAT:
+            raise InputError(f"{path} is no notchflex state; give a file written by --save-state")
+        return SavedState(str(content.get("robot")), content.get("arrays"), str(path))
+
+
+@dataclass(frozen=True)
+class SavedState:
+    """A state as read from a file, not yet fitted to a robot."""
+
+    robot: str
+    arrays: Any
+    source: str
+
+    def fitted(self, chain: Chain) -> Solved:
+        """The state for a chain.
+
+        Raises:
+            InputError: It belongs to a robot of another make.
+        """
+        leaves, structure = tree_util.tree_flatten_with_path(at_rest(chain))
+        read = []
+        for key, leaf in leaves:
+            name = tree_util.keystr(key)
+            try:
+                array = np.asarray(self.arrays[name], float)
+            except (KeyError, TypeError, ValueError):
+                array = np.array(np.nan)
+            if array.shape != leaf.shape or not np.isfinite(array).all():
+                raise InputError(
+                    f"{self.source} holds a state of robot {self.robot!r} with other notches or "
+                    "tendons than this robot; continue from a state of the same robot"
+                )
+            read.append(array)
+        return tree_util.tree_unflatten(structure, read)
+
+
+def fitted(state: State | SavedState | None, chain: Chain) -> Solved:
+    """What to start from: rest, or a state that must fit the chain."""
+    if state is None:
+        return at_rest(chain)
+    if isinstance(state, SavedState):
+        return state.fitted(chain)
+    rest = at_rest(chain)
+    shapes = [leaf.shape for leaf in tree_util.tree_leaves(rest)]
+    if [np.shape(leaf) for leaf in tree_util.tree_leaves(state.solved)] != shapes:
+        raise InputError(
+            f"the state belongs to robot {state.robot!r} with other notches or tendons; "
+            "continue from a state of the same robot"
+        )
+    return state.solved

@@ -1,0 +1,93 @@
+"""`notchflex compare`: a computed table compared as if it had been measured."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.cli import run
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def runner(*arguments):
+        code = run(list(arguments))
+        return (code, *capsys.readouterr())
+
+    return runner
+
+
+@pytest.fixture
+def loop(call):
+    """A computed loop, written as a table that `compare` reads."""
+    assert (
+        call("simulate", "pacheco2021-b", "--tension", "0:1.5:4,1.5:0:4", "--csv", "b.csv")[0] == 0
+    )
+    return "b.csv"
+
+
+def test_path_compared_with_itself_has_no_error(call, loop):
+    code, out, _ = call("compare", "pacheco2021-b", loop, "--path", "--json", "-")
+    assert code == 0
+    found = json.loads(out)
+    assert found["points"] == 8
+    assert found["rmse_deg"]["notches"] == pytest.approx([0.0] * 5, abs=1e-7)
+    assert found["rmse_deg"]["total"] == pytest.approx(0.0, abs=1e-7)
+    assert found["tip_rmse_mm"] == pytest.approx(0.0, abs=1e-8)
+    assert found["converged"] is True
+
+
+def test_pulls_from_rest_do_not_know_the_way_back(call, loop):
+    found = json.loads(call("compare", "pacheco2021-b", loop, "--json", "-")[1])
+    assert found["from_rest"] is True
+    assert found["rmse_deg"]["total"] > 1.0
+
+
+def test_errors_are_those_of_the_rows(call, tmp_path):
+    rows = [(-0.002, 1.0), (0.5, 12.0), (0.5, 10.0)]
+    lines = ["trial,tendon_force_N,notch_1_deg,notch_2_deg,notch_3_deg,notch_4_deg,notch_5_deg,rig"]
+    lines += [f"{i},{force},{angle},1,2,3,4,x" for i, (force, angle) in enumerate(rows)]
+    (tmp_path / "d.csv").write_text("\n".join(lines))
+    code, out, err = call("compare", "pacheco2021-a", "d.csv", "--json", "-", "--csv", "points.csv")
+    assert code == 0
+    found = json.loads(out)
+    robot = nf.load_robot("pacheco2021-a")
+    model = np.degrees(
+        [nf.solve(robot, nf.Load(tension=t)).notch_angle[0] for t in (0.0, 0.5, 0.5)]
+    )
+    expected = np.sqrt(np.mean((model - [1.0, 12.0, 10.0]) ** 2))
+    assert found["rmse_deg"]["notches"][0] == pytest.approx(expected, rel=1e-9)
+    assert found["negative_forces"] == 1
+    assert found["ignored_columns"] == ["rig"]
+    assert found["rows"][0]["measured"]["tendon_tension_N"] == [-0.002]
+    assert found["rows"][0]["model"]["tendon_tension_N"] == [0.0]
+    assert "1 measured force is negative" in err
+    assert "ignored columns: rig" in err
+    table = list(csv.DictReader((tmp_path / "points.csv").read_text().splitlines()))
+    assert float(table[1]["notch_1_deg_model"]) == pytest.approx(model[1])
+
+
+def test_table_and_picture_with_other_models(call, loop, tmp_path):
+    code, out, _ = call(
+        "compare",
+        "pacheco2021-b",
+        loop,
+        "--path",
+        "--beside",
+        "linear: material.kind=linear, material.elastic_modulus=7510",
+        "--beside",
+        "kinematics",
+        "--plot",
+        "b.svg",
+    )
+    assert code == 0
+    names = [line.split("  ")[0].strip() for line in out.splitlines()]
+    assert {"model", "linear", "kinematics"} <= set(names)
+    assert max(len(line) for line in out.splitlines()) <= 80
+    picture = (tmp_path / "b.svg").read_text(encoding="utf-8")
+    for words in ("notch 5", "total", "centre lines", "kinematics", "tip error"):
+        assert words in picture

@@ -1,0 +1,148 @@
+"""`notchflex new`: from options, from a pipe, from a person; nothing is overwritten."""
+
+import io
+
+import pytest
+
+from notchflex import load_robot
+from notchflex.cli import run
+from notchflex.cli.ask import choice, reading, readings, whole
+from notchflex.errors import InputError
+
+OPTIONS = {
+    "--outer-diameter": "1.62",
+    "--inner-diameter": "1.40",
+    "--cut": "on-axis",
+    "--notches": "4",
+    "--depth": "1.36,1.39,1.42,1.42",
+    "--height": "1.0",
+    "--uncut-length": "1",
+}
+
+
+@pytest.fixture(autouse=True)
+def in_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def command(name="w", *more, **changed):
+    options = {**OPTIONS, **{f"--{k.replace('_', '-')}": v for k, v in changed.items()}}
+    return ["new", name, *more, *(x for pair in options.items() if pair[1] for x in pair)]
+
+
+def pipe(monkeypatch, *lines):
+    monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{line}\n" for line in lines)))
+
+
+def test_options_alone_make_a_robot(monkeypatch, tmp_path, capsys):
+    pipe(monkeypatch)
+    assert run(command(friction="0.1", precurvature="-1")) == 0
+    robot = load_robot(tmp_path / "w.toml")
+    assert robot.name == "w"
+    assert [notch.depth for notch in robot.notches] == [1.36, 1.39, 1.42, 1.42]
+    assert [notch.repeat for notch in robot.notch] == [1, 1, 2]
+    assert robot.notches[0].precurvature_deg == -1.0
+    assert robot.tendon[0].radius == 0.7
+    assert robot.friction.coefficient == 0.1
+    assert "notchflex show w.toml" in capsys.readouterr().out
+
+
+def test_file_says_what_was_not_measured(monkeypatch, tmp_path):
+    pipe(monkeypatch)
+    assert run(command(elastic_modulus="9000")) == 0
+    lines = (tmp_path / "w.toml").read_text(encoding="utf-8").splitlines()
+    assert any("coefficient" in line and "estimate" in line for line in lines)
+    assert any(line.startswith("radius") and "assumed" in line for line in lines)
+    assert not any(line.startswith("elastic_modulus") and "estimate" in line for line in lines)
+
+
+def test_answers_come_line_by_line_from_a_pipe(monkeypatch, tmp_path):
+    pipe(monkeypatch, "My wrist", "1.62", "1.62-2*0.11", "", "on", "5", "1.62-0.22", "0.8", "1.2")
+    assert run(["new", "piped.toml"]) == 0
+    robot = load_robot(tmp_path / "piped.toml")
+    assert robot.name == "My wrist"
+    assert robot.tube.inner_diameter == 1.4
+    assert robot.notches[0].depth == 1.4
+    assert robot.notch[0].repeat == 5
+
+
+def test_a_person_is_asked_again_and_told_why(monkeypatch, tmp_path, capsys):
+    tube = ["", "1,62", "1.62", "1.7", "1.40", ""]
+    notches = ["x", "on-axis", "0", "2", "9", "1.4", "0.8", "1.2", "", ""]
+    rest = ["", "", "linear", "60000", "0"]
+    answers = iter([*tube, *notches, *rest])
+
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    asked = []
+
+    def typed(prompt):
+        asked.append(prompt)
+        return next(answers)
+
+    monkeypatch.setattr("sys.stdin", Terminal())
+    monkeypatch.setattr("builtins.input", typed)
+    assert run(["new", "asked"]) == 0
+    robot = load_robot(tmp_path / "asked.toml")
+    assert robot.number_of_notches == 2
+    assert robot.material.elastic_modulus == 60000.0
+    out = capsys.readouterr().out
+    assert "give a finite number greater than 0 and less than 1.62" in out
+    assert "give on-axis or off-axis" in out
+    assert asked[1] == "Outer diameter of the tube [mm]: "
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"inner_diameter": "1.7"}, "less than 1.62"),
+        ({"outer_diameter": "-1"}, "greater than 0"),
+        ({"outer_diameter": "nan"}, "got 'nan'"),
+        ({"depth": "1.62"}, "less than 1.62"),
+        ({"depth": "0"}, "greater than 0"),
+        ({"depth": "1.3,1.4"}, "got 2 numbers; give one for all, or 4"),
+        ({"height": "1e400"}, "finite"),
+        ({"uncut_length": "-0.1"}, "at least 0"),
+        ({"notches": "2.5"}, "whole number"),
+        ({"notches": "0"}, "give 1 to"),
+        ({"cut": "o"}, "give on-axis or off-axis"),
+        ({"tendon_radius": "0.9"}, "at most 0.81"),
+        ({"friction": "-0.1"}, "at least 0"),
+        ({"depth": "__import__('os')"}, "give a number such as"),
+        ({"depth": "9**9**9**9"}, "give a number such as"),
+        ({"height": None}, "No answer to: Height of the notch"),
+        ({"tendon_radius": "0.7,0.7"}, "No answer to: Side on which the tendon runs"),
+    ],
+)
+def test_bad_readings_write_nothing(monkeypatch, tmp_path, capsys, changed, words):
+    pipe(monkeypatch)
+    assert run(command(**changed)) == 2
+    assert words in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_file_that_is_there_is_kept(monkeypatch, tmp_path, capsys):
+    pipe(monkeypatch)
+    (tmp_path / "w.toml").write_text("mine")
+    assert run(command()) == 2
+    assert "already there" in capsys.readouterr().err
+    assert (tmp_path / "w.toml").read_text() == "mine"
+
+
+def test_folder_that_is_missing_is_told_before_asking(monkeypatch, capsys):
+    monkeypatch.setattr("builtins.input", lambda prompt: pytest.fail("asked"))
+    assert run(["new", "missing/w"]) == 2
+    assert "does not exist" in capsys.readouterr().err
+
+
+def test_readings():
+    assert reading("−0.5") == -0.5
+    assert reading("3/2") == 1.5
+    assert readings("1", 3) == [1.0, 1.0, 1.0]
+    assert choice("on", ("on-axis", "off-axis")) == "on-axis"
+    assert whole("3", at_least=1, at_most=3) == 3
+    for bad in ("", "1,2", "1/0", "True", "(", "2**3"):
+        with pytest.raises(InputError):
+            reading(bad)

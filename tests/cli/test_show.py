@@ -1,0 +1,29 @@
+"""`notchflex show`: sections and closing of every notch."""
+
+import json
+
+import pytest
+
+from notchflex.cli import run
+
+
+def test_table_fits_80_columns_and_numbers_are_right(capsys):
+    assert run(["show", "pacheco2021-c"]) == 0
+    out = capsys.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    # Closing forces of wrist C: tests/reference/pacheco_closing.csv
+    assert all(number in out for number in ("2.309", "38.62", "9.20", "1.3735", "0.1369"))
+
+
+def test_json(capsys):
+    assert run(["show", "pacheco2021-a", "--json", "-", "--set", "notch[5].depth=1.45"]) == 0
+    document = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    first, last = document["notches"][0], document["notches"][4]
+    assert first["centroid_mm"] == pytest.approx(0.6865332868, rel=1e-9)
+    assert first["second_moment_mm4"] == pytest.approx(0.0005816412685, rel=1e-9)
+    assert first["moment_arm_mm"] == pytest.approx([1.386533287], rel=1e-9)
+    assert first["closing_angle_deg"] == pytest.approx(30.62853597, rel=1e-9)
+    assert first["closing_tension_N"] == pytest.approx(1.61530605, rel=1e-8)
+    assert first["closing_outer_strain"] == pytest.approx(0.08250181552, rel=1e-9)
+    assert last["depth_mm"] == 1.45
+    assert last["area_mm2"] < first["area_mm2"]

@@ -1,0 +1,131 @@
+"""`notchflex simulate` on the real solver: files, tables, warnings, states, exit codes."""
+
+import csv
+import json
+import math
+
+import pytest
+
+import notchflex as nf
+from notchflex.cli import run
+
+LOOP = ["simulate", "pacheco2021-a", "--tension", "0:3:7,3:0:7"]
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    """Run the command in an empty folder; return exit code, standard output and error."""
+    monkeypatch.chdir(tmp_path)
+
+    def runner(*arguments):
+        code = run(list(arguments))
+        return (code, *capsys.readouterr())
+
+    return runner
+
+
+def test_json_alone_on_standard_output(call):
+    code, out, err = call(*LOOP, "--json", "-")
+    assert code == 0
+    assert out.count("\n") == 1
+    document = json.loads(out, parse_constant=pytest.fail)
+    assert len(document["steps"]) == 14
+    peak = document["steps"][6]
+    assert peak["load"] == {"tension_N": [3.0], "stroke_mm": [None]}
+    assert peak["closed"] == [True] * 5
+    assert peak["total_angle_deg"] == pytest.approx(153.14, abs=0.01)
+    assert len(peak["span_tension_N"][0]) == 10
+    assert "allowed strain of 8 %" in err
+
+
+def test_files_and_table_say_the_same(call, tmp_path):
+    code, out, _ = call(*LOOP, "--json", "a.json", "--csv", "a.csv", "--plot", "a.png")
+    assert code == 0
+    steps = json.loads((tmp_path / "a.json").read_text())["steps"]
+    rows = list(csv.DictReader((tmp_path / "a.csv").read_text().splitlines()))
+    assert [float(row["total_deg"]) for row in rows] == [step["total_angle_deg"] for step in steps]
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert "Pacheco 2021, wrist A" in out
+    assert f"{steps[3]['total_angle_deg']:.2f}" in out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.json", "a.png"]
+
+
+def test_long_paths_are_thinned_and_say_so(call):
+    _, out, _ = call("simulate", "pacheco2021-a", "--tension", "0:3:31,3:0:31")
+    assert "62 steps, 21 of them shown" in out
+    shown = [int(line.split()[0]) for line in out.splitlines() if line[:4].strip().isdigit()]
+    assert {1, 31, 32, 62} <= set(shown)
+
+
+def test_bends_toward_x(call):
+    _, out, _ = call("simulate", "pacheco2021-a", "--tension", "1", "--json", "-")
+    assert json.loads(out)["steps"][0]["tip_position_mm"][0] > 1.0
+
+
+def test_set_changes_the_robot(call):
+    _, out, err = call(
+        *LOOP[:2],
+        "--tension",
+        "1",
+        "--set",
+        "material.kind=linear",
+        "--set",
+        "friction.kind=frictionless",
+        "--json",
+        "-",
+    )
+    document = json.loads(out)
+    assert document["robot"]["material"]["kind"] == "linear"
+    angles = document["steps"][0]["notch_angle_deg"]
+    assert angles == pytest.approx([angles[0]] * 5)
+    assert "superelastic_modulus" in err
+    assert "dropped" in err
+
+
+def test_state_is_continued_with_its_friction(call):
+    call(*LOOP[:2], "--tension", "0:1:4", "--save-state", "state.json", "--json", "up.json")
+    code, out, _ = call(*LOOP[:2], "--tension", "0.6", "--from-state", "state.json", "--json", "-")
+    assert code == 0
+    continued = json.loads(out)["steps"][0]
+    robot = nf.load_robot("pacheco2021-a")
+    whole = nf.simulate(robot, [nf.Load(tension=t) for t in (0.0, 1 / 3, 2 / 3, 1.0, 0.6)])
+    assert continued["total_angle_deg"] == pytest.approx(
+        math.degrees(whole.total_angle[-1]), abs=1e-9
+    )
+    rest = nf.solve(robot, nf.Load(tension=0.6))
+    assert continued["total_angle_deg"] > math.degrees(rest.total_angle) + 0.5
+
+
+def test_stroke_past_the_last_closing_is_not_converged(call, tmp_path):
+    code, out, err = call("simulate", "pacheco2021-a", "--stroke", "0,3,4", "--json", "a.json")
+    assert code == 1
+    document = json.loads((tmp_path / "a.json").read_text())
+    assert document["converged"] is False
+    assert "every notch closed" in document["reason"]
+    assert [step["converged"] for step in document["steps"]] == [True, True, False]
+    assert "every notch closed" in err
+    assert "Error: not converged: step 3 of 3" in err
+    assert "4.000" in out
+
+
+def test_turned_base_turns_the_tip(call):
+    _, straight, _ = call(*LOOP[:2], "--tension", "1", "--json", "-")
+    _, turned, _ = call(*LOOP[:2], "--tension", "1", "--base-rotation", "0,0,90", "--json", "-")
+    x, y, z = json.loads(straight)["steps"][0]["tip_position_mm"]
+    assert json.loads(turned)["steps"][0]["tip_position_mm"] == pytest.approx([-y, x, z])
+
+
+def test_several_tendons(call, tmp_path):
+    robot = nf.load_robot("pacheco2021-a")
+    tendon = robot.tendon[0]
+    opposite = nf.Tendon(0.7, direction_deg=180.0)
+    nf.save_robot(robot.replace(tendon=(tendon, opposite)), tmp_path / "two.toml")
+    code, out, _ = call(
+        "simulate", "two.toml", "--tension", "1=0:1:3", "--tension", "2=0.2", "--json", "-"
+    )
+    assert code == 0
+    steps = json.loads(out)["steps"]
+    assert [step["load"]["tension_N"] for step in steps] == [[0.0, 0.2], [0.5, 0.2], [1.0, 0.2]]
+    assert len(steps[0]["contacts"]) == 2
+    assert call("simulate", "two.toml", "--tension", "2")[0] == 2

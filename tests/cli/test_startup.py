@@ -1,0 +1,112 @@
+"""What must be quick stays free of JAX, and standard output stays clean: real processes."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+
+QUICK = (["--help"], ["robots"], ["schema"], ["simulate", "--help"], ["compare", "--help"])
+ROOT_VERBS = ("robots", "show", "schema", "new", "simulate", "compare")
+
+
+def notchflex(*arguments, cwd=None, stdin=""):
+    return subprocess.run(
+        [sys.executable, "-m", "notchflex", *arguments],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        cwd=cwd,
+        input=stdin,
+        timeout=300,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("arguments", QUICK, ids=" ".join)
+def test_quick_verbs_do_not_import_jax(arguments):
+    code = (
+        "import sys; from notchflex.cli import run\n"
+        f"code = run({arguments!r})\n"
+        "heavy = {'jax', 'equinox', 'scipy', 'matplotlib'} & set(sys.modules)\n"
+        "sys.exit(f'{heavy}' if heavy else code)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_importing_the_package_does_not_import_jax():
+    code = "import sys, notchflex; sys.exit('jax' in sys.modules or 'pydantic' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("arguments", QUICK[:3], ids=" ".join)
+def test_quick_verbs_take_under_half_a_second_of_processor_time(arguments):
+    # Processor time of the child: what else runs on the machine does not count. The best of three,
+    # because the first may still write byte code.
+    def once() -> float:
+        before = os.times()
+        started = time.perf_counter()
+        assert notchflex(*arguments).returncode == 0
+        after = os.times()
+        used = after.children_user + after.children_system
+        used -= before.children_user + before.children_system
+        return min(used, time.perf_counter() - started)
+
+    # 0.5 s is the promise on an idle machine; a busy one shares its cache and gets some grace.
+    assert min(once() for _ in range(3)) < 0.75
+
+
+def test_help_of_every_verb_has_an_example():
+    for verb in ROOT_VERBS:
+        done = notchflex(verb, "--help")
+        assert done.returncode == 0
+        assert f"notchflex {verb}" in done.stdout.partition("Example")[2]
+
+
+def test_help_names_every_verb_and_the_exit_codes():
+    text = notchflex("--help").stdout
+    assert all(verb in text for verb in ROOT_VERBS)
+    assert "2 bad input" in text
+
+
+def test_output_into_a_pipe_has_no_colours_and_fits_80_columns():
+    for arguments in (["robots"], ["--help"], ["simulate", "--help"]):
+        text = notchflex(*arguments).stdout
+        assert "\x1b" not in text
+        assert max(len(line) for line in text.splitlines()) <= 80
+
+
+def test_schema_is_json():
+    schema = json.loads(notchflex("schema").stdout)
+    assert "tube" in json.dumps(schema)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["simulate"], "ROBOT"),
+        (["simulat"], "simulat"),
+        (["simulate", "pacheco2021-a", "--tenson", "2"], "--tension"),
+        (["simulate", "pacheco2021-a", "more", "--tension", "2"], "more"),
+        (["show", "pacheco2021-d"], "pacheco2021-"),
+    ],
+)
+def test_wrong_use_is_told_in_one_message(arguments, words):
+    done = notchflex(*arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(re.findall("Error:", done.stderr)) == 1
+
+
+def test_new_reads_a_real_pipe(tmp_path):
+    answers = "\n1.62\n1.40\n\non-axis\n5\n1.4\n0.8\n1.2\n"
+    assert notchflex("new", "w", cwd=tmp_path, stdin=answers).returncode == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["w.toml"]

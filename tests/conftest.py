@@ -1,0 +1,21 @@
+"""Settings that all tests share."""
+
+import os
+
+import pytest
+from hypothesis import settings
+
+# JAX compiles within a test, which no deadline should time; CI draws the same examples each time.
+settings.register_profile("here", deadline=None)
+settings.register_profile("ci", deadline=None, derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "here")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Set JAX up by its environment variables: it need not be imported, and subprocesses follow."""
+    os.environ["JAX_ENABLE_X64"] = "1"
+    # Compiled code is kept beside pytest's own cache, for the other process of `-n 2` and later.
+    if config.cache is not None:
+        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")

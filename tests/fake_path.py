@@ -1,0 +1,99 @@
+"""A path as the statics return it, made from closed formulas: results and pictures need no solver.
+
+The angles are those of five equal notches that grow in proportion to the tension and stop at their
+closing angle; letting go follows five sixths of the angle later. It is no physics, only numbers of the
+right shapes and sizes.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from notchflex import load_robot
+
+CENTROID = 0.6865  # mm, of the section of wrist A
+CLOSING = np.radians(30.63)
+
+
+@dataclass
+class FakePath:
+    """Has the attributes that results and pictures read, S steps."""
+
+    robot: Any
+    columns: dict[str, Any] = field(default_factory=dict)
+
+    def __getattr__(self, name: str) -> Any:
+        columns = self.__dict__.get("columns", {})
+        if name in columns:
+            return columns[name]
+        raise AttributeError(name)
+
+    def __len__(self) -> int:
+        return len(self.tension)
+
+
+def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath:
+    """Return a pull to 3 N and back, `steps` each way; the last `failed` steps not converged."""
+    robot = load_robot("pacheco2021-a") if robot is None else robot
+    way = np.linspace(0.0, 3.0, steps)
+    tension = np.concatenate([way, way[::-1]])
+    lag = np.concatenate([way, np.minimum(1.0, way[::-1] * 6 / 5 / 3) * 3])
+    n, count = robot.number_of_notches, len(tension)
+    stiffness = np.linspace(1.0, 1.1, n)
+    angle = np.minimum(np.radians(18.0) * lag[:, None] / stiffness, CLOSING)
+    closed = angle >= CLOSING
+    pose = [_chain(robot, row) for row in angle]
+    good = np.arange(count) < count - failed
+    spans = np.full((count, 1, 2 * n), np.nan)
+    spans[:] = tension[:, None, None] * np.exp(-0.03 * np.arange(2 * n))
+    contacts = (count, 1, 2 * n - 1)
+    columns = {
+        "tension": tension[:, None],
+        "stroke": (angle * (0.7 + CENTROID)).sum(axis=1)[:, None],
+        "commanded_tension": tension[:, None],
+        "commanded_stroke": np.full((count, 1), np.nan),
+        "notch_angle": angle,
+        "total_angle": angle.sum(axis=1),
+        "tip_position": np.array([p[-1] + r[-1] @ [0, 0, 1.2] for p, r in pose]),
+        "tip_rotation": np.array([r[-1] for _, r in pose]),
+        "body_position": np.array([p for p, _ in pose]),
+        "body_rotation": np.array([r for _, r in pose]),
+        "span_tension": spans,
+        "notch_moment": 1.38 * tension[:, None] * np.ones(n),
+        "outer_strain": angle * 0.1235 / 0.8,
+        "peak_strain": angle * 0.177 / 0.8,
+        "gap": np.maximum(0.8 - angle * (0.81 + CENTROID), 0.0),
+        "closed": closed,
+        "contact_force": 0.4 * closed,
+        "contact_log_ratio": np.full(contacts, 0.03),
+        "contact_slid": np.full(contacts, 0.1),
+        "contact_bound": np.full(contacts, 0.03),
+        "contact_state": np.tile(np.array([0, 1, -1], np.int8), 2 * n)[: 2 * n - 1]
+        * np.ones(contacts, np.int8),
+        "stored_energy": tension**2,
+        "dissipation": np.zeros(contacts),
+        "tendon_work": tension[:, None] ** 2,
+        "converged": good,
+        "reason": np.where(good, "", "every notch closed"),
+        "residual": np.full(count, 1e-12),
+        "iterations": np.full(count, 4),
+        "stable": np.ones(count, bool),
+        "smallest_eigenvalue": np.full(count, 7.0),
+    }
+    return FakePath(robot, columns)
+
+
+def _chain(robot: Any, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return position and rotation of every body for angles in one plane, x toward the bend."""
+    position, rotation = [np.zeros(3)], [np.eye(3)]
+    length = robot.tube.base_length
+    for notch, angle in zip(robot.notches, angles, strict=True):
+        arc = notch.height - CENTROID * angle
+        c, s = np.cos(angle), np.sin(angle)
+        over = angle if angle > 1e-9 else 1.0
+        step = arc * np.array([(1 - c) / over, 0.0, s / over if angle > 1e-9 else 1.0])
+        position.append(position[-1] + rotation[-1] @ (step + np.array([0.0, 0.0, length])))
+        rotation.append(rotation[-1] @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
+        length = notch.uncut_length
+    return np.array(position), np.array(rotation)

@@ -1,0 +1,65 @@
+"""The JSON document of a path: its keys, its numbers, and no NaN."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from fake_path import fake_path
+from notchflex.results.json import json_text, path_document, write_json
+
+
+def test_document_is_strict_json_and_holds_every_step():
+    path = fake_path(5)
+    document = json.loads(json_text(path_document(path)), parse_constant=pytest.fail)
+    assert document["name"] == "Pacheco 2021, wrist A"
+    assert document["converged"] is True
+    assert document["reason"] == ""
+    assert len(document["steps"]) == 10
+    assert document["units"]["notch_angle_deg"] == "deg"
+    assert document["robot"]["tube"]["outer_diameter"] == 1.62
+
+
+def test_step_holds_lists_per_tendon_and_degrees():
+    path = fake_path(5)
+    step = json.loads(json_text(path_document(path)))["steps"][2]
+    assert step["load"] == {"tension_N": [1.5], "stroke_mm": [None]}
+    assert step["tendon_tension_N"] == [1.5]
+    assert step["notch_angle_deg"] == pytest.approx(np.degrees(path.notch_angle[2]).tolist())
+    assert step["total_angle_deg"] == pytest.approx(math.degrees(path.total_angle[2]))
+    assert np.shape(step["tip_rotation"]) == (3, 3)
+    assert len(step["span_tension_N"][0]) == 10
+    assert len(step["contacts"][0]) == 9
+    assert step["contacts"][0][1]["state"] == "slip toward base"
+    assert set(step["contacts"][0][0]) == {"log_ratio", "slid_mm", "state"}
+    assert step["closed"] == [bool(closed) for closed in path.closed[2]]
+    assert type(step["iterations"]) is int
+
+
+def test_spans_end_where_the_tendon_ends():
+    short = fake_path(2).robot.with_value("tendon.end_body", 3)
+    step = path_document(fake_path(2, robot=short))["steps"][0]
+    assert len(step["span_tension_N"][0]) == 6
+    assert len(step["contacts"][0]) == 5
+
+
+def test_failure_is_told_at_the_top():
+    document = path_document(fake_path(3, failed=1))
+    assert document["converged"] is False
+    assert document["reason"] == "every notch closed"
+    assert document["steps"][-1]["converged"] is False
+
+
+def test_nan_becomes_null():
+    assert json_text({"a": [float("nan"), np.float64("nan"), 1]}) == '{"a": [null, null, 1]}\n'
+    assert json_text({"a": np.array([[np.nan, 2.0]])}) == '{"a": [[null, 2.0]]}\n'
+
+
+def test_infinity_is_text_that_reads_back():
+    assert json.loads(json_text({"stiffness": math.inf})) == {"stiffness": "inf"}
+
+
+def test_dash_is_standard_output(capsys):
+    write_json("-", {"a": 1})
+    assert capsys.readouterr().out == '{"a": 1}\n'

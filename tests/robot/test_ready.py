@@ -1,0 +1,102 @@
+"""The robots that come with the package, against the papers' tables."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import notchflex as nf
+from notchflex.robot.reading import READY
+from shared_data import measured, numbers
+
+NAMES = [
+    "pacheco2021-a",
+    "pacheco2021-a-specimen",
+    "pacheco2021-b",
+    "pacheco2021-b-specimen",
+    "pacheco2021-c",
+    "pacheco2021-c-specimen",
+    "york2015",
+]
+
+
+def test_list():
+    robots = nf.list_robots()
+    assert list(robots) == NAMES
+    assert robots["pacheco2021-a"] == "Pacheco 2021, wrist A"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_value_has_its_source_beside_it(name: str):
+    for line in (READY / f"{name}.toml").read_text().splitlines():
+        if "=" in line.partition("#")[0] and not line.startswith(("name", "kind")):
+            assert "#" in line, line
+
+
+def test_every_york_value_is_marked_as_an_estimate():
+    for line in (READY / "york2015.toml").read_text().splitlines():
+        if "=" in line.partition("#")[0] and not line.startswith(("name", "kind", "free_length")):
+            assert "estimate" in line.partition("#")[2], line
+
+
+@pytest.mark.parametrize(
+    ("wrist", "depths", "height", "uncut"),  # Pacheco 2021, Table 2
+    [
+        ("a", [1.4] * 5, 0.8, 1.2),
+        ("b", [1.4] * 5, 0.5, 1.5),
+        ("c", [1.36, 1.39, 1.42, 1.45], 1.0, 1.0),
+    ],
+)
+@pytest.mark.parametrize("form", ["", "-specimen"])
+def test_pacheco_geometry(wrist: str, form: str, depths: list, height: float, uncut: float):
+    robot = nf.load_robot(f"pacheco2021-{wrist}{form}")
+    assert (robot.tube.outer_diameter, robot.tube.inner_diameter) == (1.62, 1.40)
+    assert robot.tube.base_length == 0.0
+    assert [notch.depth for notch in robot.notches] == depths
+    assert {notch.height for notch in robot.notches} == {height}
+    assert {notch.uncut_length for notch in robot.notches} == {uncut}
+    assert {notch.cut for notch in robot.notches} == {"on-axis"}
+    (tendon,) = robot.tendon
+    assert (tendon.radius, tendon.direction_deg, tendon.path) == (0.70, 0.0, "wall-arc")
+    assert tendon.end_body == robot.number_of_notches
+    assert robot.friction.wrap == "whole-before"
+
+
+@pytest.mark.parametrize("wrist", "abc")
+def test_pacheco_table_3_and_set_196(wrist: str):
+    nominal = nf.load_robot(f"pacheco2021-{wrist}")
+    law = nominal.material
+    assert law == nf.Superelastic(10e3, 3e3, 0.028, density=6450.0, allowed_strain=0.08)
+    assert nominal.friction == nf.Capstan(0.13, wrap="whole-before")
+    assert {notch.precurvature_deg for notch in nominal.notches} == {0.0}
+
+    specimen = nf.load_robot(f"pacheco2021-{wrist}-specimen")
+    law = specimen.material
+    assert law.elastic_modulus == 9993.685186
+    assert law.superelastic_modulus == 2994.787499
+    assert law.transition_strain == 0.027869593
+    assert specimen.friction.coefficient == 0.127548461
+
+
+@pytest.mark.parametrize("wrist", "abc")
+def test_precurvature_of_the_specimens(wrist: str):
+    rows = [row for row in measured("pacheco2021_specimens.csv") if row["wrist"] == wrist.upper()]
+    robot = nf.load_robot(f"pacheco2021-{wrist}-specimen")
+    assert [n.precurvature_deg for n in robot.notches] == numbers(rows, "precurvature_deg")
+
+
+def test_york():
+    robot = nf.load_robot("york2015")
+    assert robot.number_of_notches == 5
+    assert {notch.cut for notch in robot.notches} == {"off-axis"}
+    assert robot.tendon[0].radius == robot.tube.inner_radius
+    assert robot.material.elastic_modulus == 40e3
+    assert robot.friction.coefficient == 0.2
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_copy_of_the_file_is_the_same_robot(name: str, tmp_path: Path):
+    copy = tmp_path / "copy.toml"
+    copy.write_bytes((READY / f"{name}.toml").read_bytes())
+    assert nf.load_robot(copy) == nf.load_robot(name)
+    assert tomllib.loads(copy.read_text())["name"] == nf.load_robot(name).name

@@ -1,0 +1,48 @@
+"""The JSON Schema of robot files."""
+
+import json
+from importlib import import_module
+
+import pytest
+
+import notchflex as nf
+from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
+
+
+def test_it_is_json():
+    text = json.dumps(nf.json_schema(), allow_nan=False)
+    assert json.loads(text) == nf.json_schema()
+
+
+def test_what_a_file_must_hold():
+    schema = nf.json_schema()
+    assert schema["required"] == ["name", "tube", "notch", "tendon", "material", "friction"]
+    assert schema["additionalProperties"] is False
+    arc = schema["$defs"]["ArcNotch"]
+    assert arc["required"] == ["kind", "cut", "depth", "height", "uncut_length"]
+    assert arc["additionalProperties"] is False
+    assert arc["properties"]["cut"]["enum"] == ["on-axis", "off-axis"]
+    assert arc["properties"]["depth"]["exclusiveMinimum"] == 0
+    assert arc["properties"]["depth"]["unit"] == "mm"
+    assert arc["properties"]["repeat"]["minimum"] == 1
+    assert "default" not in schema["$defs"]["Tendon"]["properties"]["axial_stiffness"]
+    assert schema["properties"]["notch"]["minItems"] == 1
+
+
+def test_every_key_says_what_it_is():
+    schema = nf.json_schema()
+    for model in schema["$defs"].values():
+        assert model["description"]
+        for key, value in model["properties"].items():
+            assert key == "kind" or value["description"], key
+            assert value["type"] in ("number", "integer", "string")
+
+
+@pytest.mark.parametrize("base", [Notch, Material, Friction])
+def test_every_kind_is_in_it(base: type):
+    defs = nf.json_schema()["$defs"]
+    assert kinds_of(base)
+    for kind, cls in kinds_of(base).items():
+        assert defs[cls.__name__]["properties"]["kind"]["const"] == kind
+        # found by its file, which is named after it
+        import_module(f"notchflex.robot.{base.__name__.lower()}_{kind}")

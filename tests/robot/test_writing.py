@@ -1,0 +1,219 @@
+"""Robot files that are written: comments kept, and the same robot read back."""
+
+import dataclasses
+import math
+import re
+import string
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import notchflex as nf
+from notchflex.robot import robot_from_text, robot_text
+from notchflex.robot.reading import READY
+
+READY_NAMES = sorted(path.stem for path in READY.glob("*.toml"))
+
+
+@pytest.mark.parametrize("name", READY_NAMES)
+def test_writing_what_was_read_changes_nothing(name: str, tmp_path: Path):
+    path = tmp_path / "copy.toml"
+    nf.save_robot(nf.load_robot(name), path)
+    assert path.read_text() == (READY / f"{name}.toml").read_text()
+
+
+@pytest.mark.parametrize("name", READY_NAMES)
+def test_a_fresh_file_is_the_same_robot(name: str):
+    robot = nf.load_robot(name)
+    text = robot_text(robot)
+    assert robot_from_text(text) == robot
+    assert "# mm, outer diameter of the tube" in text
+
+
+def test_a_changed_value_keeps_its_comment_and_says_from_what(tmp_path: Path):
+    robot = nf.load_robot("pacheco2021-a").with_value("material.elastic_modulus", 9_500.0)
+    nf.save_robot(robot, tmp_path / "a.toml")
+    old = (READY / "pacheco2021-a.toml").read_text().splitlines()
+    new = (tmp_path / "a.toml").read_text().splitlines()
+    assert [line for line in new if line not in old] == [
+        "elastic_modulus = 9500.0  # MPa; E_lin, Table 3 (changed from 10000.0)"
+    ]
+    assert len(new) == len(old)
+
+    # changed again: still the value that the comment speaks of; changed back: as it was
+    again = nf.load_robot(tmp_path / "a.toml").with_value("material.elastic_modulus", 9_000.0)
+    assert "9000.0  # MPa; E_lin, Table 3 (changed from 10000.0)\n" in robot_text(
+        again, (tmp_path / "a.toml").read_text()
+    )
+    back = again.with_value("material.elastic_modulus", 10_000.0)
+    nf.save_robot(back, tmp_path / "a.toml")
+    assert (tmp_path / "a.toml").read_text().splitlines() == old
+
+
+def test_a_split_group_keeps_every_comment_of_the_file():
+    source = (READY / "pacheco2021-a.toml").read_text()
+    robot = nf.load_robot("pacheco2021-a").with_value("notch[2].depth", 1.3)
+    text = robot_text(robot, source)
+    assert robot_from_text(text) == robot
+    assert text.count("[[notch]]") == 3
+    comments = [line.partition("#")[2] for line in source.splitlines() if "#" in line]
+    assert all(comment in text for comment in comments)
+    assert "depth = 1.3  # mm; g of wrist A, Table 2 (changed from 1.40)" in text
+
+
+def test_comments_above_and_layout_stay():
+    source = """\
+# Head of the file.
+
+# about the name
+name = "x"  # mine
+
+   # about the tube
+[ tube ]  # bought
+outer_diameter = 1.620  # measured
+  inner_diameter = 1.4
+# wall 0.11
+
+# about notches
+[[notch]]
+kind = "arc"
+cut = "on-axis"
+depth = 1.4
+height = 0.8
+uncut_length = 1.2
+# after a notch
+
+# the second
+[[notch]]
+kind = "arc"
+cut = "on-axis"
+depth = 1.4
+height = 0.8
+uncut_length = 1.2
+repeat = 4
+[[tendon]]
+radius = 7e-1 # thin
+[material]
+kind = "linear"
+elastic_modulus = 10_000
+[friction]
+kind = "frictionless"
+# The end.
+"""
+    robot = robot_from_text(source)
+    assert robot_text(robot, source) == source
+    changes = {"notch[4].depth": 1.3, "tube.base_length": 2.0, "friction.kind": "capstan"}
+    robot = robot.with_values(changes | {"friction.coefficient": 0.1})
+    text = robot_text(robot, source)
+    assert robot_from_text(text) == robot
+    assert text.count("[[notch]]") == 4
+    for comment in re.findall(r"#.*", source):
+        assert text.count(comment) == 1
+    assert "outer_diameter = 1.620  # measured\n  inner_diameter = 1.4\n" in text
+    assert (
+        text.endswith('kind = "capstan"\ncoefficient = 0.1\n# The end.\n') or "# The end." in text
+    )
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        'name = "x"  # named\ntube.outer_diameter = 1.6  # o\ntube.inner_diameter = 1.4\n',
+        'name = "x"  # named\ntube = { outer_diameter = 1.6, inner_diameter = 1.4 } # o\n',
+    ],
+)
+def test_other_ways_of_toml(source: str):
+    rest = (READY / "pacheco2021-a.toml").read_text().partition("[[notch]]")
+    source += "".join(rest[1:])
+    robot = robot_from_text(source)
+    assert robot_text(robot, source) == source
+    text = robot_text(robot.with_value("tube.inner_diameter", 1.41), source)
+    assert robot_from_text(text).tube == nf.Tube(1.6, 1.41)
+    assert "# o" in text
+    assert "# named" in text
+
+
+def test_notches_as_one_array():
+    notch = "{kind='arc', cut='on-axis', depth=1.4, height=0.8, uncut_length=1.2, repeat=2}"
+    rest = (READY / "pacheco2021-a.toml").read_text().partition("[[tendon]]")
+    rest = "".join(rest[1:]).replace("end_body = 5", "end_body = 2")
+    source = (
+        f"name='x'\nnotch=[{notch}] # n\n[tube]\nouter_diameter=1.62\ninner_diameter=1.4\n{rest}"
+    )
+    robot = robot_from_text(source)
+    assert robot_text(robot, source) == source
+    for path in ("notch.depth", "notch[2].depth"):
+        new = robot.with_value(path, 1.3)
+        assert robot_from_text(robot_text(new, source)) == new
+
+
+def test_template(tmp_path: Path):
+    (tmp_path / "t.toml").write_text("# mine\n" + (READY / "pacheco2021-b.toml").read_text())
+    robot = nf.load_robot("pacheco2021-c")
+    nf.save_robot(robot, tmp_path / "c.toml", template=tmp_path / "t.toml")
+    assert (tmp_path / "c.toml").read_text().startswith("# mine\n")
+    assert nf.load_robot(tmp_path / "c.toml") == robot
+
+
+def test_what_cannot_be_written(tmp_path: Path):
+    robot = nf.load_robot("pacheco2021-a")
+    with pytest.raises(nf.RobotFileError, match="cannot be written"):
+        nf.save_robot(robot, tmp_path / "none" / "a.toml")
+    with pytest.raises(nf.RobotFileError, match="cannot be written"):
+        nf.save_robot(robot, tmp_path)
+    with pytest.raises(nf.RobotFileError, match="cannot be read"):
+        nf.save_robot(robot, tmp_path / "a.toml", template=tmp_path / "none.toml")
+    assert list(tmp_path.iterdir()) == []
+
+
+lengths = st.floats(1e-3, 1e3)
+angles = st.floats(-360, 360)
+notches = st.builds(
+    nf.ArcNotch,
+    cut=st.sampled_from(["on-axis", "off-axis"]),
+    depth=st.floats(1e-6, 1.999),
+    height=lengths,
+    uncut_length=st.floats(0, 1e3),
+    direction_deg=angles,
+    precurvature_deg=st.floats(-30, 0),
+    repeat=st.integers(1, 9),
+)
+tendons = st.builds(
+    nf.Tendon,
+    radius=st.floats(1e-3, 1.0),
+    direction_deg=angles,
+    end_body=st.none() | st.just(1),
+    axial_stiffness=lengths | st.just(math.inf),
+    path=st.sampled_from(["wall-arc", "straight"]),
+    free_length=lengths,
+)
+materials = st.builds(nf.Linear, lengths, density=st.none() | lengths) | st.builds(
+    nf.Superelastic, lengths, lengths, st.floats(1e-4, 0.09)
+)
+robots = st.builds(
+    nf.Robot,
+    name=st.text(string.printable + 'äμ"\\', min_size=1),
+    tube=st.builds(nf.Tube, st.just(2.0), st.floats(0.1, 1.9), base_length=lengths),
+    notch=st.lists(notches, min_size=1, max_size=4).map(tuple),
+    tendon=st.lists(tendons, min_size=1, max_size=3).map(tuple),
+    material=materials,
+    friction=st.builds(nf.Frictionless) | st.builds(nf.Capstan, st.floats(0, 2)),
+)
+
+
+@given(robot=robots, other=robots)
+def test_any_robot_survives_its_file_and_any_template(robot: nf.Robot, other: nf.Robot):
+    text = robot_text(robot)
+    assert robot_from_text(text) == robot
+    other_text = robot_text(other, text)
+    assert robot_from_text(other_text) == other
+    assert "# mm, outer diameter of the tube" in other_text
+
+
+def test_a_copy_remembers_its_comments(tmp_path: Path):
+    robot = nf.load_robot("pacheco2021-a")
+    changed = dataclasses.replace(robot.material, poisson_ratio=0.3)
+    nf.save_robot(robot.replace(material=changed), tmp_path / "a.toml")
+    assert "Wrist A of Pacheco" in (tmp_path / "a.toml").read_text()

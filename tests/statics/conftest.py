@@ -1,0 +1,5 @@
+"""What the tests of statics share."""
+
+from margins import margin
+
+__all__ = ["margin"]

@@ -1,0 +1,91 @@
+"""A tendon drawn by a given stroke gives the shape of the tension that draws it so far."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from loads import strokes, tensions
+from robots import ready, specimen
+
+ANGLE = 1e-9  # rad
+# Base tension at which the last notch closes [N] (tests/reference/pacheco_closing.csv).
+LAST_CLOSING = {"A": 2.1329, "B": 1.872, "C": 2.309}
+BELOW = np.array([0.0, 0.02, 0.2, 0.45, 0.6, 0.75, 0.85, 0.93, 0.97, 0.999])
+
+
+@pytest.mark.parametrize("make", [ready, specimen], ids=["ready", "specimen"])
+@pytest.mark.parametrize("name", "ABC")
+def test_stroke_gives_the_shape_of_its_tension(name, make, margin):
+    robot = make(name)
+    last = LAST_CLOSING[name] if make is ready else 0.95 * LAST_CLOSING[name]
+    pulled = nf.simulate(robot, tensions(BELOW * last))
+    assert pulled.converged.all(), pulled.reason
+    assert pulled.closed.any(), "no notch closes below the last: nothing is tried"
+    assert not pulled.closed.all(axis=1).any()
+
+    drawn = nf.simulate(robot, strokes(pulled.stroke))
+    assert drawn.converged.all(), drawn.reason
+    margin.within("angles along a path", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
+    margin.within("stroke kept", drawn.stroke - pulled.stroke, 1e-9, "mm")
+    for i in (1, 4, 7, 9):
+        state = nf.solve(robot, nf.Load(stroke=float(pulled.stroke[i, 0])))
+        assert state.converged, state.reason
+        margin.within("angles from rest", state.notch_angle - pulled.notch_angle[i], ANGLE, "rad")
+        margin.within("tension found", state.tension - pulled.tension[i], 1e-6, "N")
+
+
+@pytest.mark.parametrize("wrap", ["geometric", "whole-before"])
+def test_stroke_given_on_the_way_back(wrap, margin):
+    """Let go far enough that the tendon slides at the base, a stroke fixes the tension again."""
+    robot = ready("A").replace(friction=nf.Capstan(0.13, wrap=wrap))
+    tension = np.array([0.5, 1.2, 1.9, 1.2, 0.8, 0.4, 0.9, 1.5])
+    pulled = nf.simulate(robot, tensions(tension))
+    assert pulled.converged.all(), pulled.reason
+    assert (np.abs(np.diff(pulled.stroke[:, 0])) > 1e-2).all(), "a stroke that does not move"
+    drawn = nf.simulate(robot, strokes(pulled.stroke))
+    assert drawn.converged.all(), drawn.reason
+    margin.within("angles", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
+
+
+@pytest.mark.parametrize("name", "ABC")
+def test_beyond_the_last_closing_a_stroke_fixes_no_tension(name):
+    closed = nf.solve(ready(name), nf.Load(tension=2.5))
+    assert closed.closed.all()
+    for excess in (1e-3, 0.5):
+        state = nf.solve(ready(name), nf.Load(stroke=float(closed.stroke[0]) + excess))
+        assert not state.converged
+        assert "every notch closed" in state.reason
+
+
+def test_path_stops_being_good_where_the_last_notch_closes():
+    full = float(nf.solve(ready("A"), nf.Load(tension=2.5)).stroke[0])
+    stroke = np.array([0.25, 0.5, 0.75, 0.99, 1.01, 1.2]) * full
+    path = nf.simulate(ready("A"), strokes(stroke))
+    assert path.converged.tolist() == [True, True, True, True, False, False]
+    assert all("every notch closed" in reason for reason in path.reason[4:])
+    assert all(reason == "" for reason in path.reason[:4])
+
+
+def test_elastic_tendon_reaches_beyond_the_last_closing(margin):
+    robot = ready("A").with_value("tendon[1].axial_stiffness", 500.0)
+    robot = robot.with_value("tendon[1].free_length", 300.0)
+    pulled = nf.simulate(robot, tensions([1.0, 2.0, 2.6]))
+    assert pulled.closed[-1].all()
+    drawn = nf.simulate(robot, strokes(pulled.stroke))
+    assert drawn.converged.all(), drawn.reason
+    margin.within("angles", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
+    margin.within("tension", drawn.tension - pulled.tension, 1e-7, "N")
+    stiff = nf.simulate(ready("A"), tensions(pulled.tension))
+    # 300 mm under 1 N stretch by 0.6 mm; what lies in the wrist adds less than 10 mm to that.
+    longer = (pulled.stroke - stiff.stroke) / pulled.tension
+    assert (longer > 300 / 500).all()
+    assert (longer < 310 / 500).all()
+
+
+def test_no_stroke_leaves_the_tendon_slack(margin):
+    state = nf.solve(ready("A"), nf.Load(stroke=0.0))
+    assert state.converged, state.reason
+    margin.within("tension", state.tension, 1e-12, "N")
+    margin.within("angles", state.notch_angle, 1e-12, "rad")

@@ -1,0 +1,50 @@
+"""Examples in docstrings and in the README run, and print what they say."""
+
+import doctest
+import pkgutil
+import re
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import notchflex
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+MODULES = sorted(
+    module.name
+    for module in pkgutil.walk_packages(notchflex.__path__, "notchflex.")
+    if not module.name.endswith("__main__")
+)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_docstrings(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)  # an example may write a file
+    module = import_module(name)
+    # an example reads as after `import notchflex as nf`
+    globs = vars(module) | {"nf": notchflex}
+    failed, _ = doctest.testmod(
+        module, extraglobs=globs, optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    )
+    assert failed == 0
+
+
+def test_readme_example(capsys: pytest.CaptureFixture[str]):
+    code, shown = re.findall(r"```python\n(.*?)```(?:\n+```text\n(.*?)```)?", README, re.DOTALL)[0]
+    exec(compile(code, "README.md", "exec"), {})
+    assert capsys.readouterr().out == shown
+
+
+def test_readme_robot_file():
+    (text,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    assert notchflex.robot.robot_from_text(text).number_of_notches == 5
+
+
+def test_readme_commands():
+    lines = [line for line in README.splitlines() if line.startswith("python3 -m venv")]
+    assert lines == [
+        "python3 -m venv .venv && .venv/bin/pip install '.[plot]' && .venv/bin/notchflex simulate "
+        "pacheco2021-a --tension 0:3:31,3:0:31 --plot wrist.png",
+        "python3 -m venv .venv && .venv/bin/pip install '.[test]' && .venv/bin/pytest -n 2",
+    ]

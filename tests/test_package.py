@@ -1,0 +1,95 @@
+"""The package as a whole: its names, what it imports, and the JAX it stands on."""
+
+import ast
+import importlib.metadata
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import notchflex as nf
+
+FOLDER = Path(nf.__file__).parent
+
+# fmt: off
+NAMES = [
+    "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
+    "Linear", "Superelastic", "Frictionless", "Capstan", "Load", "LoadPath", "pull", "solve",
+    "simulate", "Equilibrium", "Path", "State", "tip_from_angles", "equal_stroke_angles", "closing",
+    "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError",
+]
+# fmt: on
+
+
+def python(code: str, **env: str) -> str:
+    """Run code in a Python of its own and return what it prints."""
+    clean = {k: v for k, v in os.environ.items() if not k.startswith("JAX_")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=clean | env, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+def test_names():
+    assert set(nf.__all__) == {*NAMES, "__version__"}
+    for name in NAMES:
+        assert getattr(nf, name).__name__ == name
+        assert name in dir(nf)
+    with pytest.raises(AttributeError, match="nothing_like_it"):
+        _ = nf.nothing_like_it
+
+
+def test_type_checkers_see_the_same_names_from_the_same_places():
+    stub = ast.parse((FOLDER / "__init__.pyi").read_text())
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    told = {alias.asname: node.module for node in imports for alias in node.names}
+    assert told == nf._HOME
+    assert all(alias.name == alias.asname for node in imports for alias in node.names)
+
+
+def test_version():
+    assert nf.__version__ == importlib.metadata.version("notchflex")
+    citation = (Path(__file__).parents[1] / "CITATION.cff").read_text()
+    assert f"version: {nf.__version__}\n" in citation
+
+
+def test_typed():
+    assert (FOLDER / "py.typed").is_file()
+
+
+def processor_time(code: str) -> float:
+    """Seconds of processor time that code takes, the best of three: the machine may be busy."""
+    code = f"import time; start = time.process_time(); {code}; print(time.process_time() - start)"
+    return min(float(python(code)) for _ in range(3))
+
+
+def test_import_costs_nothing():
+    assert processor_time("import notchflex") < 0.1
+    code = "import notchflex, sys; print({'jax', 'numpy', 'pydantic'} & set(sys.modules))"
+    assert python(code) == "set()"
+
+
+def test_robots_are_quick_and_do_without_jax():
+    use = (
+        "import notchflex as nf; nf.json_schema(); nf.list_robots();"
+        "nf.load_robot('york2015').with_value('notch[2].depth', 0.9)"
+    )
+    assert processor_time(use) < 0.5
+    code = f"{use}; import sys; print({{'jax', 'jaxlib', 'numpy', 'scipy'}} & set(sys.modules))"
+    assert python(code) == "set()"
+
+
+def test_64_bit_floats_are_switched_on_by_the_package():
+    code = "from notchflex._jax import jnp; print(jnp.ones(1).dtype)"
+    assert python(code) == "float64"
+
+
+def test_jax_adds_up_right():
+    # jax-ml/jax#39103: compiled by 0.10.2 and 0.11.0 the last of these is not 16384 squared
+    from notchflex._jax import jax, jnp
+
+    rows = jnp.zeros((16_385, 3)).at[:, 0].set(jnp.arange(16_385.0))
+    squares = jax.jit(jax.vmap(lambda row: jnp.sum((jnp.eye(3) @ row) ** 2)))(rows)
+    assert float(squares[-1]) == 268_435_456.0
