@@ -1,7 +1,7 @@
 """A path as the statics return it, made from closed formulas: results and pictures need no solver.
 
 The angles are those of five equal notches that grow in proportion to the tension and stop at their
-closing angle; letting go follows five sixths of the angle later. It is no physics, only numbers of the
+closing angle; letting go follows later. It is no physics, only numbers of the
 right shapes and sizes.
 """
 

@@ -24,7 +24,7 @@ _SERIES = np.array(
 )
 _CROSS = np.zeros((3, 3, 3))
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-    _CROSS[_i, _k, _j], _CROSS[_k, _i, _j] = -1.0, 1.0
+    _CROSS[_i, _k, _j], _CROSS[_k, _i, _j] = 1.0, -1.0
 
 
 class Motion(NamedTuple):
@@ -78,7 +78,7 @@ def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
     fourth = square * square
     eighth = fourth * fourth
     high = xp.stack([xp.ones_like(squared), fourth, eighth, fourth * eighth])
-    first, second, third = _SERIES @ (high[:, None] * low).ravel()
+    first, second, third = _SERIES @ (high[:, None] * low[None]).ravel()
     return first, second, third
 
 

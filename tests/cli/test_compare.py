@@ -91,3 +91,29 @@ def test_table_and_picture_with_other_models(call, loop, tmp_path):
     picture = (tmp_path / "b.svg").read_text(encoding="utf-8")
     for words in ("notch 5", "total", "centre lines", "kinematics", "tip error"):
         assert words in picture
+
+
+def test_displacements_past_the_last_closing_fail_but_not_in_the_kinematic_model(call, tmp_path):
+    header = "tendon_displacement_mm," + ",".join(f"notch_{j}_deg" for j in range(1, 6))
+    rows = ["0.5,4,4,4,4,4", "1.5,12,12,12,12,12", "3.9,30,30,30,30,30"]
+    (tmp_path / "d.csv").write_text("\n".join([header, *rows]))
+    arguments = ("compare", "pacheco2021-a", "d.csv", "--beside", "kinematics", "--json", "-")
+    code, out, err = call(*arguments)
+    assert code == 1
+    found = json.loads(out)
+    assert found["points"] == 2
+    assert "every notch closed" in found["reason"]
+    assert found["beside"]["kinematics"]["points"] == 3
+    assert "1 of 3 points, first row 3" in err
+
+
+def test_nothing_solved_is_still_written_and_drawn(call, tmp_path):
+    header = "tendon_displacement_mm," + ",".join(f"notch_{j}_deg" for j in range(1, 6))
+    (tmp_path / "d.csv").write_text(f"{header}\n9,30,30,30,30,30\n")
+    code, out, _ = call(
+        "compare", "pacheco2021-a", "d.csv", "--json", "-", "--plot", "d.png", "--beside",
+        "linear: material.kind=linear",
+    )  # fmt: skip
+    assert code == 1
+    assert json.loads(out)["tip_rmse_mm"] is None
+    assert (tmp_path / "d.png").exists()

@@ -1,4 +1,4 @@
-"""Reading measured data: what is taken, what is ignored, and what is refused with line and column."""
+"""Reading measured data: what is taken, what is ignored, what is refused with line and column."""
 
 import numpy as np
 import pytest

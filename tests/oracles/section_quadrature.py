@@ -6,6 +6,7 @@ rule, because of the square roots at the ends), the sector over radius and angle
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,7 @@ def _lines(outer: float, inner: float, depth: float) -> tuple[np.ndarray, ...]:
     stops = [Real(0), *(h for h in (-inner - plane, inner - plane) if 0 < h < top), top]
     s, rest, weight = _tanh_sinh()
     parts = []
-    for low, high in zip(stops[:-1], stops[1:], strict=True):
+    for low, high in pairwise(stops):
         span = high - low
         w = low + span * s
         # Half widths squared, r^2 - y^2 = (r - y)(r + y), from the distance to the nearer end.

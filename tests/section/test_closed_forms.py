@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from notchflex.section import Section, annular_sector, annular_segment
 from oracles import section_quadrature
 from reference_data import reference
 from shared_data import measured
-
-from notchflex.section import Section, annular_sector, annular_segment
 
 SECTIONS = {"on-axis": annular_sector, "off-axis": annular_segment}
 ORACLES = {"on-axis": section_quadrature.sector, "off-axis": section_quadrature.segment}

@@ -18,6 +18,8 @@ from robots import ready
 
 # Steps per 3 N of the long paths: with 4,000 the trapezoid of the loops is right to 6e-7.
 FINE = 4000
+# A contact that sticks all round a loop loses nothing, and slides by rounding only [N mm].
+ROUNDING = 1e-12
 
 
 def legs(turns: list[float], steps_per_newton: float) -> np.ndarray:
@@ -119,10 +121,11 @@ def check_loop(path: nf.Path, start: int, margin) -> None:
     work, lost = tendon_work(path, start), friction_work(path, start)
     margin.within("work of the loop = dissipation", (work - lost.sum()) / work, 1e-6)
     assert work > 0.05, "nothing is lost round the loop"
-    assert (lost >= 0).all()
+    margin.note(f"least loss of a contact {lost.min():.1e} N mm")
+    assert (lost > -ROUNDING).all()
     reported = path.dissipation[-1, 0] - path.dissipation[start, 0]
     margin.within("reported dissipation", (reported - lost) / lost.sum(), 1e-11)
-    assert (reported >= 0).all()
+    assert (reported > -ROUNDING).all()
 
 
 @pytest.mark.parametrize("turns", [[3.0, 0.0], [2.0, 0.5, 1.5, 0.0]], ids=str)

@@ -88,6 +88,6 @@ def test_tendon_that_ends_before_the_tip(end_body, margin):
     assert state.converged, state.reason
     start = UNEVEN.start
     margin.within("free notches", state.notch_angle[end_body:] - start[end_body:], 1e-14, "rad")
-    assert (state.notch_angle[:end_body] - start[:end_body] > 0.01).all()
+    assert (np.abs(state.notch_angle - start)[:end_body] > 1e-3).all()
     assert np.isnan(state.span_tension[0, 2 * end_body :]).all()
     assert np.isfinite(state.span_tension[0, : 2 * end_body]).all()

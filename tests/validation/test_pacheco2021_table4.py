@@ -12,7 +12,8 @@
 
 Measured angles are read from ../shared/data. The paper's model is the specimen's: unrounded
 constants (the authors' set 196) and notches that are bent when free. Its "experimental" tip is
-the forward kinematics of the measured angles.
+the forward kinematics of the measured angles. The simpler models are in
+test_pacheco2021_compare.py, through the command line.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import pytest
 
 import notchflex as nf
 from loads import tensions
-from robots import linear_copy, specimen
+from robots import specimen
 from shared_data import measured, notch_columns, numbers
 
 # Table 4, RMSE of every notch [deg]; totals: 2.5, 1.8, 2.6 % of 150, 90, 150 deg.
@@ -34,25 +35,14 @@ TABLE_4 = {
 TOTAL = {"A": 3.73, "B": 1.61, "C": 3.95}
 PERCENT = {"A": (150.0, 2.5), "B": (90.0, 1.8), "C": (150.0, 2.6)}
 POINTS = {"A": 68, "B": 75, "C": 83}
-# Fig. 12, tip RMSE over all wrists [mm]. The linear models' constants are the authors' set 198.
-TIP = {"full": 0.33, "linear with friction": 0.92, "linear frictionless": 0.90}
+TIP = 0.33  # fig. 12, tip RMSE over all wrists [mm]
 
 
-def model(name: str, kind: str) -> nf.Robot:
-    robot = specimen(name)
-    if kind == "full":
-        return robot
-    friction = nf.Frictionless()
-    if kind == "linear with friction":
-        friction = nf.Capstan(0.05, wrap="whole-before")
-    return linear_copy(robot, 7510.0).replace(friction=friction)
-
-
-def errors(name: str, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def errors(name: str) -> tuple[np.ndarray, np.ndarray]:
     """Errors [deg] of every notch and the total, and of the tip [mm], a row a photograph."""
     rows = measured(f"pacheco2021_wrist_{name}_measured.csv")
     assert len(rows) == POINTS[name]
-    robot = model(name, kind)
+    robot = specimen(name)
     measured_angle = np.array(notch_columns(rows))
     force = np.clip(numbers(rows, "tendon_force_N"), 0.0, None)
     # Every row is a pull from rest, so any rising order is one pull through all of them.
@@ -72,7 +62,7 @@ def rmse(error: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", "ABC")
 def test_table_4(name, margin):
-    found = rmse(errors(name, "full")[0])
+    found = rmse(errors(name)[0])
     margin.note(f"RMSE of the notches and the total: {np.round(found, 4).tolist()} deg")
     assert tuple(np.round(found[:-1], 2)) == TABLE_4[name]
     assert np.round(found[-1], 2) == TOTAL[name]
@@ -80,10 +70,9 @@ def test_table_4(name, margin):
     assert np.round(100 * found[-1] / full_scale, 1) == percent
 
 
-@pytest.mark.parametrize("kind", TIP)
-def test_tip_of_all_wrists_together(kind, margin):
-    square = np.concatenate([np.sum(errors(name, kind)[1] ** 2, axis=1) for name in "ABC"])
+def test_tip_of_all_wrists_together(margin):
+    square = np.concatenate([np.sum(errors(name)[1] ** 2, axis=1) for name in "ABC"])
     assert len(square) == 226
     found = np.sqrt(square.mean())
-    margin.note(f"pooled tip RMSE, {kind}: {found:.4f} mm")
-    assert np.round(found, 2) == TIP[kind]
+    margin.note(f"pooled tip RMSE: {found:.4f} mm")
+    assert np.round(found, 2) == TIP

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError
@@ -19,6 +20,7 @@ from notchflex.errors import InputError
 DONE = 0
 NOT_CONVERGED = 1
 BAD_INPUT = 2
+INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
 INTERRUPTED = 130  # 128 + SIGINT, as shells expect
 
 ABOUT = """Statics of tendon-driven notched-tube robots.
@@ -129,7 +131,14 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def main() -> None:
     """Run the command line and end the process with its exit code."""
-    sys.exit(run())
+    try:
+        code = run()
+    except Exception:
+        # Python would end with code 1, which means "not converged" here.
+        traceback.print_exc()
+        terminal.error("this is a bug in notchflex; please report it with the lines above.")
+        code = INTERNAL_ERROR
+    sys.exit(code)
 
 
 def _sentence(text: str) -> str:

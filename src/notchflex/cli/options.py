@@ -49,7 +49,12 @@ CsvFile = Annotated[
 ]
 PlotFile = Annotated[
     str | None,
-    Parameter(name="--plot", group=OUTPUT, help="Draw a picture to this .png, .svg or .pdf file."),
+    Parameter(
+        name="--plot",
+        group=OUTPUT,
+        allow_leading_hyphen=True,
+        help="Draw a picture to this .png, .svg or .pdf file.",
+    ),
 ]
 
 

@@ -2,44 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 from notchflex.cli import terminal
-from notchflex.results.quantities import AXES, QUANTITIES, Quantity
+from notchflex.results.quantities import AXES, QUANTITIES
 
 if TYPE_CHECKING:
     from notchflex.statics import Path
 
 MOST_ROWS = 21
-MOST_NOTCH_COLUMNS = 6
-MOST_TENDON_COLUMNS = 4
+NO_NUMBER = "–"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table: its head, its unit and the text of every row."""
+
+    head: str
+    unit: str
+    cells: list[str]
+
+    @property
+    def width(self) -> int:
+        """Characters that the column takes, with the gap behind it."""
+        return max(map(len, (self.head, self.unit, *self.cells))) + 1
 
 
 def print_path(path: Path) -> None:
-    """Print the steps of a path, thinned if there are many, with units in the header."""
+    """Print the steps of a path with units: not all rows of a long one, what fits of a wide one."""
     console = terminal.output()
-    console.print(f"[bold]{_escape(path.robot.name)}[/]", markup=True)
+    console.print(path.robot.name, style="bold", soft_wrap=True)
     rows = telling_rows(path)
+    columns, left_out = _fitting(_groups(path, rows), terminal.NARROW)
     table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
-    columns = _columns(path)
-    for head, unit, _ in columns:
-        table.add_column(f"{head}\n{unit}", justify="right", no_wrap=True)
-    for row in rows:
-        good = bool(path.converged[row])
-        cells = [write(row) if good else _failed(path, head, row) for head, _, write in columns]
-        table.add_row(*cells, style=None if good else "red")
+    for column in columns:
+        table.add_column(f"{column.head}\n{column.unit}", justify="right", no_wrap=True)
+    for place, row in enumerate(rows):
+        style = None if path.converged[row] else "red"
+        table.add_row(*(column.cells[place] for column in columns), style=style)
     console.print(table)
-    if len(rows) < len(path):
-        console.print(
-            f"{len(path)} steps, {len(rows)} of them shown; --csv F or --json F writes all."
-        )
-    if np.asarray(path.closed).any():
+    if any("*" in cell for column in columns for cell in column.cells):
         console.print("* closed notch")
+    if len(rows) < len(path):
+        console.print(f"{len(path)} steps, {len(rows)} of them shown.")
+    if left_out:
+        console.print(f"Too wide to be shown: {', '.join(left_out)}.")
+    if len(rows) < len(path) or left_out:
+        console.print("--csv FILE or --json FILE writes everything.")
 
 
 def telling_rows(path: Path, most: int = MOST_ROWS) -> list[int]:
@@ -58,76 +71,109 @@ def telling_rows(path: Path, most: int = MOST_ROWS) -> list[int]:
     if len(must) > most:  # a jagged path: even spreading tells more than some of its turns
         must = {0, steps - 1}
     # Evenly spread steps fill up what the marked ones leave of the rows.
-    for count in range(most - len(must) + 2, 1, -1):
+    for count in range(most, 1, -1):
         chosen = must | {round(x) for x in np.linspace(0, steps - 1, count)}
         if len(chosen) <= most:
             return sorted(chosen)
     return sorted(must)
 
 
-def _columns(path: Path) -> list[tuple[str, str, Callable[[int], str]]]:
-    """Return head, unit and writer of every column; the writer takes the step."""
-    columns: list[tuple[str, str, Callable[[int], str]]] = [("step", "", lambda row: str(row + 1))]
+@dataclass(frozen=True)
+class Group:
+    """Columns that are shown or left out together.
+
+    Attributes:
+        name: What is said to be left out.
+        rank: Groups of a low rank are shown first.
+        columns: The columns, in their place in the table.
+    """
+
+    name: str
+    rank: int
+    columns: list[Column]
+
+
+def _fitting(groups: list[Group], room: int) -> tuple[list[Column], list[str]]:
+    """Return the columns that fit, in the order of the table, and the names of what does not."""
+    chosen: set[str] = set()
+    for group in sorted(groups, key=lambda group: group.rank):
+        width = sum(column.width for column in group.columns)
+        if width <= room:
+            room -= width
+            chosen.add(group.name)
+    columns = [column for group in groups if group.name in chosen for column in group.columns]
+    return columns, [group.name for group in groups if group.name not in chosen]
+
+
+def _groups(path: Path, rows: list[int]) -> list[Group]:
+    """Return all columns, in the order of the table."""
+
+    def numbers(name: str, head: str, values: Any, form: str = ".3f") -> Column:
+        quantity = QUANTITIES[name]
+        cells = [
+            _rounded(float(values[row]) * quantity.scale, form)
+            if path.converged[row]
+            else NO_NUMBER
+            for row in rows
+        ]
+        return Column(head, quantity.unit, cells)
+
+    groups = [Group("step", 0, [Column("step", "", [str(row + 1) for row in rows])])]
     tendons = path.tension.shape[1]
-    for tendon in range(min(tendons, MOST_TENDON_COLUMNS)):
-        mark = str(tendon + 1) if tendons > 1 else ""
-        columns.append(_numbers("tension", f"T{mark}", path.tension[:, tendon], ".3f"))
-        columns.append(_numbers("stroke", f"u{mark}", path.stroke[:, tendon], ".3f"))
-    notches = path.notch_angle.shape[1]
-    room = MOST_NOTCH_COLUMNS - 2 * (min(tendons, MOST_TENDON_COLUMNS) - 1)
-    if notches <= room:
-        for notch in range(notches):
-            columns.append(_notch(path, notch))
-    columns.append(_numbers("total_angle", "total", path.total_angle, ".2f"))
+    for tendon in range(tendons):
+        number = str(tendon + 1) if tendons > 1 else ""
+        tension = numbers("tension", f"T{number}", path.tension[:, tendon])
+        stroke = numbers("stroke", f"u{number}", path.stroke[:, tendon])
+        # A step that was not solved still shows what was commanded.
+        for column, command in (
+            (tension, path.commanded_tension[:, tendon]),
+            (stroke, path.commanded_stroke[:, tendon]),
+        ):
+            for place, row in enumerate(rows):
+                if not path.converged[row] and np.isfinite(command[row]):
+                    column.cells[place] = _rounded(float(command[row]), ".3f")
+        commanded = np.isfinite([path.commanded_tension, path.commanded_stroke])[..., tendon].any()
+        groups.append(Group(f"tendon {tendon + 1}", 1 if commanded else 5, [tension, stroke]))
+    groups.append(Group("notch angles", 4, [_notch(path, j, rows) for j in _notches(path)]))
+    groups.append(
+        Group("total angle", 2, [numbers("total_angle", "total", path.total_angle, ".2f")])
+    )
     out_of_plane = np.nanmax(np.abs(path.tip_position[:, 1]), initial=0.0) > 1e-9
-    for tip, axis in zip(path.tip_position.T, AXES, strict=True):
-        if axis != "y" or out_of_plane:
-            columns.append(_numbers("tip_position", f"tip {axis}", tip, ".3f"))
-    peak = 100.0 * np.abs(path.peak_strain).max(axis=1)
-    columns.append(("strain", "%", lambda row: f"{peak[row]:.2f}"))
-    return columns
+    groups.append(
+        Group(
+            "tip position",
+            2,
+            [
+                numbers("tip_position", f"tip {axis}", values)
+                for axis, values in zip(AXES, path.tip_position.T, strict=True)
+                if axis != "y" or out_of_plane
+            ],
+        )
+    )
+    peak = np.abs(path.peak_strain).max(axis=1)
+    strain = [f"{100 * peak[row]:.2f}" if path.converged[row] else NO_NUMBER for row in rows]
+    groups.append(Group("peak strain", 3, [Column("strain", "%", strain)]))
+    return groups
 
 
-def _numbers(
-    name: str, head: str, values: NDArray[np.float64], form: str
-) -> tuple[str, str, Callable[[int], str]]:
-    quantity: Quantity = QUANTITIES[name]
-    scaled = values * quantity.scale
+def _notches(path: Path) -> range:
+    return range(path.notch_angle.shape[1])
 
-    def write(row: int) -> str:
-        return _rounded(float(scaled[row]), form)
 
-    return head, quantity.unit, write
+def _notch(path: Path, notch: int, rows: list[int]) -> Column:
+    """Return the angles of a notch; a star marks where it is closed."""
+    quantity = QUANTITIES["notch_angle"]
+    cells = [
+        _rounded(float(path.notch_angle[row, notch]) * quantity.scale, ".2f")
+        + ("*" if path.closed[row, notch] else " ")
+        if path.converged[row]
+        else f"{NO_NUMBER} "
+        for row in rows
+    ]
+    return Column(f"n{notch + 1} ", f"{quantity.unit} ", cells)
 
 
 def _rounded(value: float, form: str) -> str:
     """Write a number without the minus sign of a zero that rounding made."""
     text = format(value, form)
     return text.lstrip("-") if not text.strip("-0.") else text
-
-
-def _notch(path: Path, notch: int) -> tuple[str, str, Callable[[int], str]]:
-    quantity = QUANTITIES["notch_angle"]
-    angles: Any = path.notch_angle[:, notch] * quantity.scale
-
-    def write(row: int) -> str:
-        return f"{_rounded(float(angles[row]), '.2f')}{'*' if path.closed[row, notch] else ' '}"
-
-    return f"n{notch + 1} ", f"{quantity.unit} ", write
-
-
-def _failed(path: Path, head: str, row: int) -> str:
-    """Write what is known of a step that was not solved: its number and what was commanded."""
-    if head == "step":
-        return str(row + 1)
-    for name, letter in (("commanded_tension", "T"), ("commanded_stroke", "u")):
-        if head.startswith(letter) and head[1:].strip("0123456789") == "":
-            value = getattr(path, name)[row, int(head[1:] or 1) - 1]
-            return f"{value:.3f}" if np.isfinite(value) else "–"
-    return "–"
-
-
-def _escape(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)

@@ -43,7 +43,7 @@ def _print(robot: Robot, notches: list[dict[str, Any]]) -> None:
     console = terminal.output()
     tube = robot.tube
     length = tube.base_length + sum(n["height_mm"] + n["uncut_length_mm"] for n in notches)
-    console.print(f"[bold]{_escaped(robot.name)}[/]", markup=True)
+    console.print(robot.name, style="bold", soft_wrap=True)
     console.print(
         f"tube      outer diameter {tube.outer_diameter:g} mm, inner diameter "
         f"{tube.inner_diameter:g} mm, length {length:g} mm"
@@ -94,8 +94,8 @@ def _notch_rows(notches: list[dict[str, Any]]) -> Table:
 
 
 def _section_rows(notches: list[dict[str, Any]]) -> Table:
-    table = _table()
     several = len(notches[0]["moment_arm_mm"]) > 1
+    table = _table(gap=1 if several else 2)
     for head in (
         "notch\n",
         "A\nmm²",
@@ -125,8 +125,8 @@ def _section_rows(notches: list[dict[str, Any]]) -> Table:
     return table
 
 
-def _table() -> Table:
-    return Table(box=None, padding=(0, 2, 0, 0), header_style="bold", pad_edge=False)
+def _table(gap: int = 2) -> Table:
+    return Table(box=None, padding=(0, gap, 0, 0), header_style="bold", pad_edge=False)
 
 
 def _grouped(rows: list[dict[str, Any]], keys: tuple[str, ...]) -> list[tuple[dict[str, Any], str]]:
@@ -168,9 +168,3 @@ def _hanging(title: str, text: str) -> str:
     return textwrap.fill(
         text, width=terminal.NARROW, initial_indent=title.ljust(10), subsequent_indent=" " * 10
     )
-
-
-def _escaped(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)

@@ -132,10 +132,22 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
             f"the kinematic model shares the stroke of one tendon; {robot.name} has "
             f"{robot.number_of_tendons}."
         )
-    angles = np.asarray(nf.equal_stroke_angles(robot, comparison.stroke[:, 0]))
+    given = ~np.isnan(comparison.measured.stroke[:, 0])
+    stroke = np.where(given, comparison.measured.stroke[:, 0], comparison.stroke[:, 0])
+    angles = np.asarray(nf.equal_stroke_angles(robot, stroke))
     tip, _ = nf.tip_from_angles(robot, angles)
+    # A stroke past the last closing has no equilibrium, but here it is the closed shape.
+    solved = comparison.converged | given
     return replace(
-        comparison, notch_angle=angles, total_angle=angles.sum(axis=1), tip=np.asarray(tip)
+        comparison,
+        stroke=stroke[:, None],
+        notch_angle=angles,
+        total_angle=angles.sum(axis=1),
+        tip=np.asarray(tip),
+        converged=solved,
+        reason=tuple(
+            "" if good else why for good, why in zip(solved, comparison.reason, strict=True)
+        ),
     )
 
 

@@ -59,7 +59,8 @@ def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
     curvatures times their levers, v_z + u_x y - u_y x. This is the concentric wall arc of
     Pacheco's tendon (its l = h - theta (r_i + ybar)) and the edge of a notch alike.
     """
-    return _ALONG + across @ _ACROSS
+    weights = across @ _ACROSS
+    return weights + np.broadcast_to(_ALONG, weights.shape)
 
 
 _ALONG = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -102,7 +103,7 @@ def flexure_state(
     every_strain = strain(rod, modes)
     elastic = every_strain - rod.reference_strain
     response = jax.vmap(law.respond)(elastic, rod.section, memory)
-    to_lip = rod.length[:, None] * fibre_stretch(rod.lip)
+    to_lip = rod.length[:, None] * fibre_stretch(rod.lip)[None]
     return FlexureState(
         pose=pose,
         twist=twist,

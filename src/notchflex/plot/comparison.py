@@ -72,8 +72,9 @@ def comparison_figure(
                         x[part], pick(one)[part] * DEGREES, color=colour, linestyle=line, zorder=3
                     )
             axes.set_title(f"{title}, error {rmse * DEGREES:.2f}° rms", loc="left")
+            axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
             axes.set_xlabel(x_label)
-            axes.set_ylabel(QUANTITIES["notch_angle"].unit)
+            axes.set_ylabel(f"angle [{QUANTITIES['notch_angle'].unit}]")
         _draw_centre_lines(figure.add_subplot(next(cells)), comparison)
         if others:
             _draw_errors(figure.add_subplot(next(cells)), models)
@@ -145,6 +146,9 @@ def _draw_centre_lines(axes: Axes, comparison: Comparison) -> None:
     view = np.radians(robot.notches[0].direction_deg)
     points = _telling_points(comparison)
     colours = sequence_colours(len(points))
+    if not points:
+        axes.text(0.5, 0.5, "no point was solved", transform=axes.transAxes, ha="center")
+        return
     for angles, style in ((comparison.notch_angle, "-"), (measured.notch_angle, (0, (1, 1.2)))):
         bodies = bodies_from_angles(robot, angles[points])
         for position, rotation, colour in zip(*bodies, colours, strict=True):
@@ -183,7 +187,7 @@ def _draw_errors(axes: Axes, models: Mapping[str, Comparison]) -> None:
     axes.bar_label(bars, fmt="%.2f", padding=3, fontsize=8.0)
     axes.set_yticks(places, list(models))
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.2 * max(values))
+    axes.set_xlim(0.0, 1.2 * max((v for v in values if v > 0.0), default=1.0))
     axes.grid(visible=False, axis="y")
     axes.set_title("tip error, rms", loc="left")
     axes.set_xlabel("mm")

@@ -54,10 +54,10 @@ def branches(x: NDArray[np.float64]) -> Iterator[tuple[slice, bool]]:
     start, direction = 0, 0.0
     for index, sign in enumerate(change):
         if sign and direction and sign != direction:
-            yield slice(start, index + 1), direction > 0
+            yield slice(start, index + 1), bool(direction > 0)
             start = index
         direction = sign or direction
-    yield slice(start, len(x)), direction >= 0
+    yield slice(start, len(x)), bool(direction >= 0)
 
 
 def draw_total(axes: Axes, path: Path) -> None:

@@ -32,7 +32,6 @@ _sideways = cancelling_sum(
 )
 
 
-@jax.jit
 def annular_segment(
     outer_radius: jax.typing.ArrayLike,
     inner_radius: jax.typing.ArrayLike,
@@ -53,11 +52,11 @@ def annular_segment(
     where they keep their digits. Sideways
     $\frac{r^4}{12}(3\alpha - 3\sin\alpha\cos\alpha - 2\sin^3\alpha\cos\alpha)$.
 
-    The torsion constant falls from that of a closed tube to that of an open one, some hundred
-    times less for a thin wall, where the cut plane reaches the inner wall (g = r_o − r_i). It
-    does so within a ligament of about the thickness (r_o − r_i)³/r_o², as the square root of
-    what is left of it; for a designer this is a jump, and the derivative with respect to the
-    depth is unbounded there. Either side has its own law, see `segment_torsion`.
+    The torsion constant drops by two or three orders of magnitude where the cut plane reaches the
+    inner wall, g = r_o − r_i, and opens the tube. On the closed side it falls as the square
+    root of the thickness that is left under the flat, half of it being lost at about
+    (r_o − r_i)²/(r_o + r_i); the slope there is unbounded. Take it for a jump: either side has
+    its own law, see `segment_torsion`, and at the very place that of the open one holds.
 
     Args:
         outer_radius: Outer radius r_o of the tube, mm; any shape.
@@ -77,12 +76,15 @@ def annular_segment(
     Example:
         >>> section = annular_segment(0.81, 0.70, 1.40)
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
-        0.111776 mm², 0.701657 mm
+        0.111621 mm², 0.701661 mm
     """
-    outer, inner, depth = (
-        jnp.asarray(x, dtype=float)
-        for x in jnp.broadcast_arrays(outer_radius, inner_radius, depth)
-    )
+    outer, inner, depth = jnp.broadcast_arrays(outer_radius, inner_radius, depth)
+    # Compiled as a whole: called one by one its operations take seconds to get ready.
+    return _compiled(*(jnp.asarray(x, dtype=float) for x in (outer, inner, depth)))
+
+
+def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
+    """Compute all properties of arrays of one shape."""
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     plane = depth - outer  # d
     alpha = half_angle(outer, left, depth)
@@ -127,3 +129,6 @@ def annular_segment(
         edge_near=from_plane,
         edge_spine=left - from_plane,
     )
+
+
+_compiled = jax.jit(_properties)

@@ -101,10 +101,11 @@ def segment_torsion(
         toward the spine, mm.
     """
     wall, plane = outer - inner, depth - outer
-    closed, solid = plane <= -inner, plane >= inner
+    closed = (plane < -inner) & (depth < wall)  # both: they may differ by rounding
+    solid = plane >= inner
     # All three are computed; outside its own range each one gets a depth in the middle of it,
     # so that no derivative becomes NaN.
-    shallow = jnp.where((depth < wall) & closed, depth, 0.5 * wall)
+    shallow = jnp.where(closed, depth, 0.5 * wall)
     through = jnp.where(closed | solid, outer, depth)
     deep = jnp.where(solid, depth, outer + inner)
 

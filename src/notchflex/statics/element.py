@@ -23,7 +23,7 @@ from notchflex.tendon import Crossing, TendonGroup
 # while Newton searches, and drops out at the solution; `STICTION` (1/mm) only keeps the equation
 # regular where a slack tendon makes the tension ratio meaningless.
 RATE = 10.0
-STICTION = 1e12
+STICTION = 1e15
 
 
 class Unknowns(NamedTuple):

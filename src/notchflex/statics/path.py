@@ -23,6 +23,11 @@ class ConvergenceError(RuntimeError):
     """A result was asked to be converged and is not."""
 
 
+# A stroke is followed up to the last good state before the last notch closes, which leaves it
+# open by less than this part of its height.
+_NEARLY_CLOSED = 1e-3
+
+
 @dataclass(frozen=True, eq=False)
 class Path:
     """States along a path of loads. Units mm, N, N mm, rad; s steps, n notches, t tendons.
@@ -245,7 +250,9 @@ class Path:
         tension = ", ".join(f"{value:.4g}" for value in np.asarray(state.tension)[step])
         drawn = ", ".join(f"{value:.4g}" for value in np.asarray(state.stroke)[step])
         last = f"the last good state has tension {tension} N and stroke {drawn} mm"
-        if self.run.all_closed[step] and not np.isnan(self.load.stroke[step]).all():
+        opening = np.sum(self.chain.rods.length, axis=-1)
+        all_closed = (self.gap[step] < _NEARLY_CLOSED * opening).all()
+        if all_closed and not np.isnan(self.load.stroke[step]).all():
             return (
                 "every notch closed: the robot can't shorten the tendon further, so this stroke "
                 f"fixes no tension; {last}; command a smaller stroke, or a tension, or give the "

@@ -57,7 +57,7 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
     absent = per_tendon(chain, tuple(group.visits for group in chain.groups)) == 0.0
     body_length = per_tendon(chain, tuple(group.body_length for group in chain.groups))
     natural_gap = per_tendon(chain, tuple(group.natural_gap for group in chain.groups))
-    compliance = 1.0 / chain.axial_stiffness
+    compliance = jnp.broadcast_to(1.0 / chain.axial_stiffness, gap_tension.shape)
     drawn = per_tendon(chain, at.beyond.drawn)
     stretch = per_tendon(chain, at.beyond.stretch)
     at_entry = drawn + (stretch + body_tension * body_length) * compliance
@@ -79,7 +79,7 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
     stored = (
         jnp.sum(chain.rods.length * density)
         + 0.5 * jnp.sum(in_tendons * (1.0 - absent) * compliance)
-        + 0.5 * jnp.sum(point.base_tension**2 * chain.free_length * compliance)
+        + 0.5 * jnp.sum(point.base_tension**2 * chain.free_length / chain.axial_stiffness)
     )
     curvature = flexure.strain[..., 1]
     section = chain.rods.section

@@ -33,7 +33,6 @@ class Run(NamedTuple):
         converged: Whether the load was reached.
         tried: Whether it was tried at all; after a failure the rest of a path is not.
         reached: Part of the way from the load before that was reached.
-        all_closed: Whether every notch was closed in the last attempt.
     """
 
     solved: Solved
@@ -44,7 +43,6 @@ class Run(NamedTuple):
     converged: Bool[Array, " s"]
     tried: Bool[Array, " s"]
     reached: Float[Array, " s"]
-    all_closed: Bool[Array, " s"]
 
 
 # Numbers of loads that programs are compiled for: a solve, a usual path, and longer ones.
@@ -127,7 +125,6 @@ def _run(
         converged=came.converged,
         tried=tried,
         reached=came.reached,
-        all_closed=came.all_closed,
     )
 
 
@@ -143,5 +140,4 @@ def _not_tried(last: Solved) -> Advance:
         iterations=jnp.zeros((), int),
         converged=jnp.array(False),
         reached=jnp.zeros(()),
-        all_closed=jnp.array(False),
     )

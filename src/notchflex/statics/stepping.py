@@ -36,7 +36,6 @@ class Advance(NamedTuple):
         iterations: Newton iterations, all parts together.
         converged: Whether the load was reached.
         reached: Part of the way from the state before to the load that was reached.
-        all_closed: Whether every notch was closed in the last attempt.
     """
 
     solved: Solved
@@ -44,7 +43,6 @@ class Advance(NamedTuple):
     iterations: Int[Array, ""]
     converged: Bool[Array, ""]
     reached: Float[Array, ""]
-    all_closed: Bool[Array, ""]
 
 
 def at_rest(chain: Chain) -> Solved:
@@ -106,8 +104,6 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
             iterations=advanced.iterations + found.iterations,
             converged=found.converged & (aim >= 1.0),
             reached=jnp.where(found.converged, aim, advanced.reached),
-            all_closed=jnp.all(found.point.unknowns.lip_force > 0.0)
-            & jnp.all(found.lip_gap < 1e-3 * chain.rods.length.sum(-1)),
         )
         return advanced, jnp.where(found.converged, 2.0 * part, 0.5 * part), tries + 1
 
@@ -117,7 +113,6 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
         iterations=jnp.zeros((), int),
         converged=jnp.array(False),
         reached=jnp.zeros(()),
-        all_closed=jnp.array(False),
     )
     advanced, _, _ = jax.lax.while_loop(going, follow, (start, jnp.ones(()), 0))
     return advanced

@@ -70,7 +70,7 @@ class Straight(TendonGroup):
         del rod
         pose = flexure.pose
         assert pose is not None  # acts_on_bodies asks for it
-        point = (carried.point - pose.translation) @ pose.rotation
+        point = (carried.point - pose.translation[None]) @ pose.rotation
         direction = carried.direction @ pose.rotation
         span = self.entry - point
         length = guarded_norm(span)
