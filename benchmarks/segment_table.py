@@ -25,7 +25,9 @@ LAYERS = 3  # elements across the wall; halving them changes J by less than 5e-4
 COARSEST = 0.1  # size of an element over the outer radius
 NODES = {"closed": (9, 16), "open": (9, 20), "solid": (1, 12)}  # ratios, chord angles
 ORDERS = {"closed": (7, 11), "open": (8, 16), "solid": (0, 8)}  # highest of the polynomials
-SHEAR_NOISE = 3e-3  # over the outer radius: a shear centre this near the axis weighs half in the fit
+SHEAR_NOISE = (
+    3e-3  # over the outer radius: a shear centre this near the axis weighs half in the fit
+)
 
 
 def spaced(end, size):

@@ -59,7 +59,7 @@ def of_frames(robot: frames.Robot) -> nf.Robot:
             for radius, direction in zip(robot.tendons.radius, robot.tendons.direction, strict=True)
         ),
         material=_material(w.material),
-        friction=nf.Capstan(w.mu, wrap=w.wrap) if w.mu else nf.Frictionless(),
+        friction=nf.Capstan(w.mu, wrap=w.wrap),
     )
 
 

@@ -15,16 +15,22 @@ from notchflex.robot import save_robot as save_robot
 from notchflex.section import Section as Section
 from notchflex.section import annular_sector as annular_sector
 from notchflex.section import annular_segment as annular_segment
+from notchflex.statics import Closing as Closing
+from notchflex.statics import ConvergenceError as ConvergenceError
 from notchflex.statics import Equilibrium as Equilibrium
 from notchflex.statics import Load as Load
 from notchflex.statics import LoadPath as LoadPath
 from notchflex.statics import Path as Path
+from notchflex.statics import Settings as Settings
 from notchflex.statics import State as State
+from notchflex.statics import bodies_from_angles as bodies_from_angles
 from notchflex.statics import closing as closing
+from notchflex.statics import draw as draw
 from notchflex.statics import equal_stroke_angles as equal_stroke_angles
 from notchflex.statics import pull as pull
 from notchflex.statics import simulate as simulate
 from notchflex.statics import solve as solve
+from notchflex.statics import solve_each as solve_each
 from notchflex.statics import tip_from_angles as tip_from_angles
 
 __version__: str

@@ -6,10 +6,11 @@ Every module that needs JAX imports it from here.
 
 from functools import partial
 from types import ModuleType
-from typing import Any
+from typing import Any, cast
 
 import jax
 import numpy as np
+from numpy.typing import ArrayLike
 
 jax.config.update("jax_enable_x64", True)
 
@@ -29,4 +30,9 @@ def array_module(*values: Any) -> ModuleType:
     return jnp if any(isinstance(value, jax.Array) for value in values) else np
 
 
-__all__ = ["array_module", "jax", "jit", "jnp"]
+def constant(value: ArrayLike) -> jax.Array:
+    """A NumPy array of floats, typed as the JAX array that a compiled program makes of it."""
+    return cast("jax.Array", np.asarray(value, float))
+
+
+__all__ = ["array_module", "constant", "jax", "jit", "jnp"]

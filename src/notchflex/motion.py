@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module
+from notchflex._jax import array_module, constant
 
 # Coefficients of sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 as polynomials in a^2. With
 # sixteen terms the first one left out is below 1e-16 for angles up to 5 rad, more than an
@@ -57,12 +57,12 @@ class Motion(NamedTuple):
 
 def identity() -> Motion:
     """The motion that moves nothing."""
-    return Motion(np.eye(3), np.zeros(3))
+    return Motion(constant(np.eye(3)), constant(np.zeros(3)))
 
 
 def skew(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:
     """Matrix of the cross product: `skew(a) @ b = a x b`."""
-    return _CROSS @ vector
+    return constant(_CROSS) @ vector
 
 
 def unskew(matrix: Float[Array, "3 3"]) -> Float[Array, " 3"]:
@@ -88,7 +88,7 @@ def exponential(twist: Float[Array, " 6"]) -> Motion:
     first, second, third = _coefficients(angular @ angular)
     cross = skew(angular)
     cross_twice = cross @ cross
-    rotation = np.eye(3) + first * cross + second * cross_twice
+    rotation = constant(np.eye(3)) + first * cross + second * cross_twice
     return Motion(rotation, linear + second * (cross @ linear) + third * (cross_twice @ linear))
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import notchflex as nf
 from oracles import frames
-from oracles.wrist import A, Material
+from oracles.wrist import A
 from robots import of_frames
 
 EXACT = 1e-10  # rad, mm, N
@@ -32,7 +32,6 @@ UNEVEN = EQUAL.with_(
 )
 WRISTS = {
     "equal, frictionless": EQUAL,
-    "equal, linear": EQUAL.with_(material=Material(superelastic_modulus=None)),
     "uneven, frictionless": UNEVEN,
     "uneven, friction at either edge": UNEVEN.with_(mu=0.13),
     "uneven, friction ahead of a notch": UNEVEN.with_(mu=0.13, wrap="whole-before"),

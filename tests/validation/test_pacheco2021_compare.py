@@ -26,7 +26,6 @@ LINEAR = ("--set", "material.kind=linear", "--set", "material.elastic_modulus=75
 MODELS = {
     "full": ((), 0.33),
     "linear with friction": ((*LINEAR, "--set", "friction.coefficient=0.05"), 0.92),
-    "linear, no friction": ((*LINEAR, "--set", "friction.coefficient=0"), 0.90),
     "linear, frictionless": ((*LINEAR, "--set", "friction.kind=frictionless"), 0.90),
 }
 

@@ -9,7 +9,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import constant, jax, jnp
 from notchflex.flexure import (
     FlexureState,
     Rod,
@@ -94,8 +94,8 @@ def assemble(robot: Robot) -> Chain:
     """
     alone = [rod(notch, robot.tube) for notch in robot.notches]
     rods = jax.tree.map(lambda *leaves: np.stack(leaves), *alone)
-    body_length = np.array(
-        [robot.tube.base_length, *(notch.uncut_length for notch in robot.notches)], float
+    body_length = constant(
+        [robot.tube.base_length, *(notch.uncut_length for notch in robot.notches)]
     )
     lead = body_length[:-1, None] * np.array([0.0, 0.0, 1.0])
     rods = eqx.tree_at(lambda rods: rods.start_offset, rods, rods.start_offset + lead)
@@ -109,10 +109,10 @@ def assemble(robot: Robot) -> Chain:
         law=law,
         friction=friction_law(robot.friction),
         groups=route(tendons, rods, _free_poses(rods), body_length),
-        axial_stiffness=np.array([tendon.axial_stiffness for tendon in tendons], float),
-        free_length=np.array([tendon.free_length for tendon in tendons], float),
+        axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
+        free_length=constant([tendon.free_length for tendon in tendons]),
         body_length=body_length,
-        stiffness=stiffness,
+        stiffness=constant(stiffness),
         lip_stiffness=1.0 / np.sum(lip_slope**2 / stiffness, axis=-1),
     )
 
@@ -127,11 +127,11 @@ def flexure_states(
 
 def _each(rods: Rod) -> list[Rod]:
     """The flexures one by one: a robot is assembled once, and without compiling anything."""
-    return [jax.tree.map(lambda leaf: leaf[j], rods) for j in range(len(rods.length))]
+    return [jax.tree.map(lambda leaf, j=j: leaf[j], rods) for j in range(len(rods.length))]
 
 
 def _free_poses(rods: Rod) -> Motion:
-    poses = [relative_pose(rod, np.zeros(rod.modes)) for rod in _each(rods)]
+    poses = [relative_pose(rod, constant(np.zeros(rod.modes))) for rod in _each(rods)]
     return jax.tree.map(lambda *leaves: np.stack(leaves), *poses)
 
 

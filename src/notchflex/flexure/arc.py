@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from notchflex._jax import constant, jax
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
 from notchflex.material import FibreSection
@@ -38,14 +39,16 @@ def _(notch: ArcNotch, tube: Tube) -> Rod:
     neutral_axis = np.array([-1.0, 0.0, 0.0]) * left.centroid
     bending = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]) / notch.height
     straight = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    precurved = straight + np.radians(notch.precurvature_deg) * bending
+    one_interval = jax.tree.map(lambda value: constant([value]), section)
     return Rod(
-        start_rotation=turned,
-        start_offset=turned @ neutral_axis,
-        end_rotation=turned.T,
-        end_offset=-neutral_axis,
-        length=np.array([notch.height]),
-        reference_strain=(straight + np.radians(notch.precurvature_deg) * bending)[None],
-        basis=bending[None, :, None],
-        section=FibreSection(*(np.asarray(value)[None] for value in vars(section).values())),
-        lip=np.array([1.0, 0.0]) * (0.5 * tube.outer_diameter + left.centroid),
+        start_rotation=constant(turned),
+        start_offset=constant(turned @ neutral_axis),
+        end_rotation=constant(turned.T),
+        end_offset=constant(-neutral_axis),
+        length=constant([notch.height]),
+        reference_strain=constant(precurved[None]),
+        basis=constant(bending[None, :, None]),
+        section=one_interval,
+        lip=constant([0.5 * tube.outer_diameter + float(left.centroid), 0.0]),
     )

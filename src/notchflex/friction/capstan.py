@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._jax import constant
 from notchflex.friction.registry import FrictionLaw, friction_law
 from notchflex.robot import Capstan
 
@@ -36,6 +36,6 @@ class CapstanLaw(FrictionLaw):
 @friction_law.register
 def _(friction: Capstan) -> CapstanLaw:
     return CapstanLaw(
-        coefficient=np.asarray(friction.coefficient, float),
-        moved_to_exit=np.asarray(1.0 if friction.wrap == "whole-before" else 0.0),
+        coefficient=constant(friction.coefficient),
+        moved_to_exit=constant(1.0 if friction.wrap == "whole-before" else 0.0),
     )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._jax import constant
 from notchflex.material.registry import section_law
 from notchflex.material.section_law import FibreSection, Response, SectionLaw, elastic_stiffness
 from notchflex.robot import Linear
@@ -36,5 +36,5 @@ class LinearLaw(SectionLaw):
 
 @section_law.register
 def _(material: Linear) -> LinearLaw:
-    modulus = np.asarray(material.elastic_modulus, float)
+    modulus = constant(material.elastic_modulus)
     return LinearLaw(modulus, modulus / (2.0 * (1.0 + material.poisson_ratio)))

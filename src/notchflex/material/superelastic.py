@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import jnp
+from notchflex._jax import constant, jnp
 from notchflex.material.registry import section_law
 from notchflex.material.section_law import FibreSection, Response, SectionLaw, elastic_stiffness
 from notchflex.robot import Superelastic
 
-
-_NODES, _WEIGHTS = (0.5 * value for value in np.polynomial.legendre.leggauss(64))
-_NODES = _NODES + 0.5
+_POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
+_NODES, _WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
 
 
 class SuperelasticLaw(SectionLaw):
@@ -97,13 +96,13 @@ class SuperelasticLaw(SectionLaw):
 
 @section_law.register
 def _(material: Superelastic) -> SuperelasticLaw:
-    modulus = np.asarray(material.elastic_modulus, float)
+    modulus = constant(material.elastic_modulus)
     return SuperelasticLaw(
         elastic_modulus=modulus,
-        superelastic_modulus=np.asarray(material.superelastic_modulus, float),
-        transition_strain=np.asarray(material.transition_strain, float),
-        plastic_strain=np.asarray(material.plastic_strain, float),
-        plastic_modulus=np.asarray(material.plastic_modulus, float),
-        plastic_exponent=np.asarray(material.plastic_exponent, float),
+        superelastic_modulus=constant(material.superelastic_modulus),
+        transition_strain=constant(material.transition_strain),
+        plastic_strain=constant(material.plastic_strain),
+        plastic_modulus=constant(material.plastic_modulus),
+        plastic_exponent=constant(material.plastic_exponent),
         shear_modulus=modulus / (2.0 * (1.0 + material.poisson_ratio)),
     )

@@ -140,7 +140,7 @@ def _draw_points(
 def _draw_centre_lines(axes: Axes, comparison: Comparison) -> None:
     """Draw measured and computed centre lines at some points of the longest trial."""
     # Not at the head of the file: what draws paths alone needs no solver.
-    from notchflex.compare.shapes import bodies_from_angles
+    from notchflex.statics import bodies_from_angles
 
     measured, robot = comparison.measured, comparison.robot
     view = np.radians(robot.notches[0].direction_deg)

@@ -1,7 +1,11 @@
 """Statics: loads, balance, Newton's method, states with memory."""
 
 from notchflex.statics.closing import Closing, closing
-from notchflex.statics.kinematics import equal_stroke_angles, tip_from_angles
+from notchflex.statics.kinematics import (
+    bodies_from_angles,
+    equal_stroke_angles,
+    tip_from_angles,
+)
 from notchflex.statics.load import Load, LoadPath, draw, pull
 from notchflex.statics.newton import Settings
 from notchflex.statics.path import ConvergenceError, Equilibrium, Path
@@ -18,6 +22,7 @@ __all__ = [
     "SavedState",
     "Settings",
     "State",
+    "bodies_from_angles",
     "closing",
     "draw",
     "equal_stroke_angles",

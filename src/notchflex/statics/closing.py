@@ -84,9 +84,13 @@ def _moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
     """Lever of every tendon about the neutral axis of every notch in the free robot, mm."""
     arm = np.zeros((chain.flexures, chain.tendons))
     for group in chain.groups:
-        across = group.across[..., 0] if isinstance(group, WallArc) else (
-            np.einsum("nab,ntb->nta", chain.rods.end_rotation, group.entry)[..., 0]  # type: ignore[attr-defined]
-            + np.asarray(chain.rods.end_offset)[:, None, 0]
+        across = (
+            group.across[..., 0]
+            if isinstance(group, WallArc)
+            else (
+                np.einsum("nab,ntb->nta", chain.rods.end_rotation, group.entry)[..., 0]  # type: ignore[attr-defined]
+                + np.asarray(chain.rods.end_offset)[:, None, 0]
+            )
         )
         arm[:, list(group.numbers)] = np.asarray(group.present) * np.asarray(across)
     return arm
@@ -126,7 +130,9 @@ def _tensions(
             break
         high = np.where(short, 2.0 * high, high)
     root = elementwise.find_root(
-        pressed, (np.zeros_like(high), high), args=(notches.astype(float),),
+        pressed,
+        (np.zeros_like(high), high),
+        args=(notches.astype(float),),
         tolerances={"xrtol": 1e-13, "frtol": 0.0, "fatol": 0.0},
     )
     found[notches] = np.where(root.success, root.x, np.nan)

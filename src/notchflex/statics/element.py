@@ -168,16 +168,15 @@ def element_result(
     balance = flexure.internal - unknowns.lip_force * flexure.lip_slope
     for crossing in crossings:
         balance = balance + crossing.pull
-    wrench_behind = None
-    if flexure.pose is not None:
-        wrench = beyond.wrench
+    wrench = beyond.wrench
+    if wrench is not None and flexure.pose is not None and flexure.twist is not None:
         for crossing in crossings:
             if crossing.wrench is not None:
                 wrench = wrench + crossing.wrench
         balance = balance - flexure.twist.T @ wrench
-        wrench_behind = flexure.pose.wrench(wrench)
+        wrench = flexure.pose.wrench(wrench)
     behind = Beyond(
-        wrench=wrench_behind,
+        wrench=wrench,
         reaction=tuple(crossing.reaction for crossing in crossings),
         drawn=tuple(
             drawn + crossing.shortening

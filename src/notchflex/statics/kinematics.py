@@ -3,28 +3,67 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from notchflex._jax import jax, jit, jnp
 from notchflex.chain import Chain, assemble
 from notchflex.errors import InputError
 from notchflex.flexure import relative_pose
+from notchflex.motion import Motion
 from notchflex.robot import Robot
 from notchflex.statics.quantities import body_poses
 from notchflex.tendon.wall_arc import WallArc
 
 
+def bodies_from_angles(
+    robot: Robot, notch_angle: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Forward kinematics: where every body is when the notches have given angles.
+
+    Pacheco 2021, eq. 1-2.
+
+    Args:
+        robot: The robot, n notches.
+        notch_angle: Angle of every notch, base to tip, precurvature included, rad, (s, n).
+
+    Returns:
+        Origins (mm, (s, n + 1, 3)) and rotations ((s, n + 1, 3, 3)) of the bodies, base first,
+        in the frame of the base.
+
+    Raises:
+        InputError: As many angles as the robot has notches are needed, finite.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> position, _ = bodies_from_angles(load_robot("pacheco2021-a"), np.zeros((1, 5)))
+        >>> position[0, :, 2].tolist()
+        [0.0, 0.8, 2.8, 4.8, 6.8, 8.8]
+    """
+    angles = np.atleast_2d(np.asarray(notch_angle, float))
+    if angles.ndim != 2 or angles.shape[1] != robot.number_of_notches:
+        raise InputError(
+            f"{robot.name} has {robot.number_of_notches} notches; got angles of shape "
+            f"{np.shape(notch_angle)}, give one column per notch"
+        )
+    if not np.isfinite(angles).all():
+        raise InputError("a notch angle is not finite; give angles in rad")
+    position, rotation = _bodies(assemble(robot), angles)
+    return np.asarray(position), np.asarray(rotation)
+
+
 def tip_from_angles(
-    robot: Robot, notch_angle: Float[np.ndarray, "s n"]
-) -> tuple[Float[np.ndarray, "s 3"], Float[np.ndarray, "s 3 3"]]:
+    robot: Robot, notch_angle: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Forward kinematics: the tip that given notch angles lead to (Pacheco 2021, eq. 1-2).
 
     Args:
-        robot: The robot.
-        notch_angle: Angle of every notch, base to tip, precurvature included, rad.
+        robot: The robot, n notches.
+        notch_angle: Angle of every notch, base to tip, precurvature included, rad, (s, n).
 
     Returns:
-        Tip position on the tube axis (mm) and tip rotation, in the frame of the base.
+        Tip position on the tube axis (mm, (s, 3)) and tip rotation ((s, 3, 3)), in the frame
+        of the base.
 
     Raises:
         InputError: As many angles as the robot has notches are needed, finite.
@@ -35,45 +74,38 @@ def tip_from_angles(
         >>> position.tolist()
         [[0.0, 0.0, 10.0]]
     """
-    angles = np.atleast_2d(np.asarray(notch_angle, float))
-    if angles.ndim != 2 or angles.shape[1] != robot.number_of_notches:
-        raise InputError(
-            f"{robot.name} has {robot.number_of_notches} notches; got angles of shape "
-            f"{np.shape(notch_angle)}, give one column per notch"
-        )
-    if not np.isfinite(angles).all():
-        raise InputError("a notch angle is not finite; give angles in rad")
-    position, rotation = _tips(assemble(robot), angles)
-    return np.asarray(position), np.asarray(rotation)
+    position, rotation = bodies_from_angles(robot, notch_angle)
+    along = rotation[:, -1, :, 2] * robot.notches[-1].uncut_length
+    return position[:, -1] + along, rotation[:, -1]
 
 
 @jit
-def _tips(chain: Chain, angles: Float[np.ndarray, "s n"]) -> tuple[jax.Array, jax.Array]:
+def _bodies(chain: Chain, angles: Float[Array, "s n"]) -> tuple[Array, Array]:
     rods = chain.rods
-    # The first mode of a notch turns its distal body by its amplitude.
+    # The first mode of a notch turns its distal body by its amplitude, from the free notch on.
     free = jnp.sum(rods.length * rods.reference_strain[..., 1], axis=-1)
 
-    def tip(angle: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def shape(angle: Float[Array, " n"]) -> Motion:
         modes = jnp.zeros_like(chain.stiffness).at[:, 0].set(angle - free)
-        bodies = body_poses(jax.vmap(relative_pose)(rods, modes))
-        last = jax.tree.map(lambda leaf: leaf[-1], bodies)
-        return last.point(jnp.array([0.0, 0.0, 1.0]) * chain.body_length[-1]), last.rotation
+        return body_poses(jax.vmap(relative_pose)(rods, modes))
 
-    return jax.lax.map(tip, angles)
+    poses: Motion = jax.lax.map(shape, angles)
+    return poses.translation, poses.rotation
 
 
-def equal_stroke_angles(robot: Robot, stroke: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s n"]:
+def equal_stroke_angles(robot: Robot, stroke: NDArray[np.float64]) -> NDArray[np.float64]:
     """The kinematic model of Pacheco 2021, eq. 1-3: the stroke is shared equally by all notches.
 
-    Every notch bends by its share over its moment arm r_i + ybar, at most until it closes. No
-    force, material or friction enters; it is the paper's model (iii), for comparison.
+    Every notch bends by its share over its moment arm r_i + ybar, from its precurvature on and
+    at most until it closes. No force, material or friction enters; it is the paper's model
+    (iii), for comparison.
 
     Args:
         robot: A robot whose first tendon runs along the wall.
-        stroke: Tendon drawn out at the base, mm.
+        stroke: Tendon drawn out at the base, mm, (s,).
 
     Returns:
-        Angle of every notch, base to tip, rad.
+        Angle of every notch, base to tip, rad, (s, n).
 
     Raises:
         InputError: The first tendon does not run along the wall over every notch toward its bend.
@@ -103,4 +135,5 @@ def equal_stroke_angles(robot: Robot, stroke: Float[np.ndarray, " s"]) -> Float[
         )
     share = np.atleast_1d(np.asarray(stroke, float))[:, None] / chain.flexures
     closing = np.asarray(chain.rods.length.sum(-1) / chain.rods.lip[:, 0])
-    return np.clip(share / arm, 0.0, closing)
+    free = np.asarray((chain.rods.length * chain.rods.reference_strain[..., 1]).sum(-1))
+    return np.clip(free + share / arm, free, closing)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -64,8 +65,7 @@ class LoadPath:
             raise InputError("a tension or stroke is infinite; give finite numbers (N, mm)")
         if (tension < 0).any():
             raise InputError(
-                f"a tendon can only pull: got a tension of {np.nanmin(tension):g} N, "
-                "give 0 or more"
+                f"a tendon can only pull: got a tension of {np.nanmin(tension):g} N, give 0 or more"
             )
         if (~np.isnan(tension) & ~np.isnan(stroke)).any():
             raise InputError(
@@ -178,7 +178,7 @@ def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> Load
     return LoadPath(commanded, nothing) if what == "tension" else LoadPath(nothing, commanded)
 
 
-def load_path(loads: Load | LoadPath | Iterable[Load], tendons: int) -> LoadPath:
+def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     """Bring loads of any form to one path for a robot of so many tendons.
 
     Args:
@@ -208,9 +208,9 @@ def load_path(loads: Load | LoadPath | Iterable[Load], tendons: int) -> LoadPath
     )
 
 
-def _entries(value: float | Sequence[float | None] | None, tendons: int, what: str) -> np.ndarray:
+def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
     """One number per tendon, NaN where nothing is commanded."""
-    given = [value] if value is None or np.isscalar(value) else list(value)  # type: ignore[arg-type]
+    given: list[Any] = list(value) if isinstance(value, Sequence | np.ndarray) else [value]
     if len(given) > tendons:
         raise InputError(
             f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "

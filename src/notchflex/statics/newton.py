@@ -98,7 +98,6 @@ def newton(
     Returns:
         The result; a failure is told by `converged`, never raised.
     """
-
     # Rounding grows with the moments that must balance, so the tolerance does.
     height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
     turn_per_newton = height / jnp.min(chain.stiffness)
@@ -136,9 +135,7 @@ def newton(
             whole = jnp.minimum(_LARGEST_TURN / turn, _LARGEST_LOG_RATIO / log_ratio)
             return Point(step.unknowns, step.base_tension), jnp.minimum(1.0, whole)
 
-        step, part = jax.lax.cond(
-            taken & ~solved, again, lambda: (search.step, 0.5 * search.part)
-        )
+        step, part = jax.lax.cond(taken & ~solved, again, lambda: (search.step, 0.5 * search.part))
         return _Search(
             best=jax.tree.map(lambda old, new: jnp.where(taken, new, old), best, found),
             size=jnp.where(taken, size, search.size),

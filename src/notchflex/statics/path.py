@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, cast, overload
 
 import jax.tree_util as tree_util
 import numpy as np
+from jaxtyping import Array
 
+from notchflex._jax import constant
 from notchflex.chain import Chain
 from notchflex.motion import rotation_about
 from notchflex.robot import Robot
@@ -41,7 +43,7 @@ class Path:
         load: The loads.
         chain: The robot as arrays.
         run: What the solver returned, as arrays.
-        each_from_rest: Whether every state starts from the same one, rather than from its neighbour.
+        each_from_rest: Whether every state starts from the same one, not from its neighbour.
     """
 
     robot: Robot
@@ -110,7 +112,7 @@ class Path:
 
     @cached_property
     def _base(self) -> np.ndarray:
-        return np.asarray(rotation_about(self.load.base_rotation))
+        return np.asarray(rotation_about(constant(self.load.base_rotation)))
 
     @cached_property
     def body_position(self) -> np.ndarray:
@@ -343,7 +345,8 @@ class Equilibrium:
 def command(load: LoadPath) -> Command:
     """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
     by_stroke = ~np.isnan(load.stroke)
-    return Command(np.where(by_stroke, load.stroke, np.nan_to_num(load.tension)), by_stroke)
+    value = np.where(by_stroke, load.stroke, np.nan_to_num(load.tension))
+    return Command(constant(value), cast("Array", by_stroke))
 
 
 __all__ = ["ConvergenceError", "Equilibrium", "Path", "command"]

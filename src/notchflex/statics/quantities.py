@@ -66,15 +66,10 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
         + per_tendon(chain, at.result.behind.stretch) * compliance
     )
     log_ratio, bound = (
-        [
-            per_tendon(chain, tuple(leaf[..., edge] for leaf in grouped))
-            for edge in (0, 1)
-        ]
+        [per_tendon(chain, tuple(leaf[..., edge] for leaf in grouped)) for edge in (0, 1)]
         for grouped in (point.unknowns.log_ratio, at.result.bound)
     )
-    density = jax.vmap(jax.vmap(chain.law.energy))(
-        flexure.strain, chain.rods.section, chain.memory
-    )
+    density = jax.vmap(jax.vmap(chain.law.energy))(flexure.strain, chain.rods.section, chain.memory)
     in_tendons = gap_tension**2 * natural_gap + body_tension**2 * body_length
     stored = (
         jnp.sum(chain.rods.length * density)

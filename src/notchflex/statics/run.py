@@ -97,7 +97,9 @@ def _run(
     settings: Settings,
     each_from_start: Bool[Array, ""],
 ) -> Run:
-    def follow(state: tuple[Solved, Array], item: tuple[Command, Array]) -> tuple:
+    def follow(
+        state: tuple[Solved, Array], item: tuple[Command, Array]
+    ) -> tuple[tuple[Solved, Array], tuple[Advance, Array]]:
         last, alive = state
         command, own = item
         before = jax.tree.map(

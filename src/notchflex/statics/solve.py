@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import numpy as np
-
 from notchflex.chain import assemble
 from notchflex.robot import Robot
 from notchflex.statics.load import Load, LoadPath, load_path

@@ -75,12 +75,14 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
     from_here = jnp.where(command.by_stroke, last.stroke, last.point.base_tension)
 
     def attempt(solved: Solved, part: Array) -> NewtonResult:
-        value = jnp.where(part >= 1.0, command.value, from_here + part * (command.value - from_here))
+        value = jnp.where(
+            part >= 1.0, command.value, from_here + part * (command.value - from_here)
+        )
         tension = jnp.where(command.by_stroke, solved.point.base_tension, value)
         start = Point(solved.point.unknowns, tension)
         return newton(chain, Command(value, command.by_stroke), solved.memory, start, settings)
 
-    def going(state: tuple) -> Bool[Array, ""]:
+    def going(state: tuple[Advance, Array, Array]) -> Bool[Array, ""]:
         advanced, part, tries = state
         return (
             ~advanced.converged
@@ -88,7 +90,7 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
             & (tries < settings.max_load_steps)
         )
 
-    def follow(state: tuple) -> tuple:
+    def follow(state: tuple[Advance, Array, Array]) -> tuple[Advance, Array, Array]:
         advanced, part, tries = state
         aim = jnp.minimum(advanced.reached + part, 1.0)
         found = attempt(advanced.solved, aim)
@@ -114,5 +116,5 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
         converged=jnp.array(False),
         reached=jnp.zeros(()),
     )
-    advanced, _, _ = jax.lax.while_loop(going, follow, (start, jnp.ones(()), 0))
+    advanced, _, _ = jax.lax.while_loop(going, follow, (start, jnp.ones(()), jnp.zeros((), int)))
     return advanced

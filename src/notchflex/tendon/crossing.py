@@ -9,7 +9,7 @@ Both walks meet at a flexure in `TendonGroup.cross`.
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -60,7 +60,7 @@ class TendonGroup(eqx.Module):
         natural_gap: Length of its way across the gap in the free robot.
     """
 
-    acts_on_bodies: eqx.AbstractClassVar[bool]
+    acts_on_bodies: ClassVar[bool]
     numbers: eqx.AbstractVar[tuple[int, ...]]
     present: eqx.AbstractVar[Float[Array, "*n t"]]
     visits: eqx.AbstractVar[Float[Array, "*n t"]]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._jax import constant
 from notchflex.flexure import Rod, fibre_stretch
 from notchflex.motion import Motion
 from notchflex.robot import Tendon
@@ -43,7 +45,7 @@ def route(
 
 def _masks(
     numbers: tuple[int, ...], tendons: Sequence[Tendon], bodies: Float[Array, " bodies"]
-) -> dict:
+) -> dict[str, Any]:
     """Where each tendon is: flexures as rows, tendons as columns."""
     count = bodies.shape[0] - 1
     end = np.array([tendon.end_body or count for tendon in tendons])
@@ -62,8 +64,8 @@ def _on_tube(tendons: Sequence[Tendon]) -> Float[Array, "t 3"]:
     """Where the tendons cross a section of the tube, mm from its axis."""
     radius = np.array([tendon.radius for tendon in tendons], float)
     direction = np.deg2rad(np.array([tendon.direction_deg for tendon in tendons], float))
-    return np.stack(
-        [radius * np.cos(direction), radius * np.sin(direction), np.zeros_like(radius)], axis=-1
+    return constant(
+        np.stack([radius * np.cos(direction), radius * np.sin(direction), 0.0 * radius], axis=-1)
     )
 
 
@@ -104,11 +106,11 @@ def _lay_straight(
     return Straight(
         **_masks(numbers, tendons, body_length),
         natural_gap=np.linalg.norm(arrives - leaves, axis=-1),
-        entry=entry,
-        exit=entry + channel * body_length[1:, None, None],
-        channel=channel,
-        base_exit=entry + channel * body_length[0],
-        base_channel=channel,
+        entry=constant(entry),
+        exit=constant(entry + channel * body_length[1:, None, None]),
+        channel=constant(channel),
+        base_exit=constant(entry + channel * body_length[0]),
+        base_channel=constant(channel),
     )
 
 

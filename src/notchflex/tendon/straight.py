@@ -7,7 +7,7 @@ them; cutting beam and tendon in a gap shows that contact forces need not be sum
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -36,7 +36,7 @@ class Straight(TendonGroup):
         base_channel: Unit direction of its channel in the base.
     """
 
-    acts_on_bodies: ClassVar[bool] = True
+    acts_on_bodies = True
 
     numbers: tuple[int, ...] = eqx.field(static=True)
     present: Float[Array, "*n t"]

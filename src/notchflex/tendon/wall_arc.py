@@ -7,7 +7,7 @@ whichever way the notch faces.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -24,7 +24,7 @@ class WallArc(TendonGroup):
         across: Where the tendon crosses the rod's section, from the neutral axis, mm.
     """
 
-    acts_on_bodies: ClassVar[bool] = False
+    acts_on_bodies = False
 
     numbers: tuple[int, ...] = eqx.field(static=True)
     present: Float[Array, "*n t"]
@@ -59,7 +59,8 @@ class WallArc(TendonGroup):
         return Crossing(
             gap_tension=gap_tension,
             body_tension=body_tension,
-            shortening=-self.present * jnp.einsum("tc,ic,i->t", weights, flexure.strain, rod.length),
+            shortening=-self.present
+            * jnp.einsum("tc,ic,i->t", weights, flexure.strain, rod.length),
             exit_turning=half_turning,
             entry_turning=half_turning,
             pull=gap_tension @ slope,
