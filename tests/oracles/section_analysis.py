@@ -44,7 +44,7 @@ def _torsion(cut: str, ratio: float, depth: float, layers: float) -> tuple[float
     # With `layers` quadratic elements across the wall.
     from sectionproperties.analysis import Section
     from sectionproperties.pre import Geometry
-    from shapely import Polygon, affinity
+    from shapely import Polygon, affinity, set_precision
 
     thickness = 1 - ratio
     if cut == "off-axis":
@@ -58,6 +58,8 @@ def _torsion(cut: str, ratio: float, depth: float, layers: float) -> tuple[float
     size = min(thickness / layers, 0.1)
     corners = 2 * int(np.pi / size / 2)
     shape = (_disc(1, corners) - _disc(ratio, corners)) & kept
+    # Corners beside each other where the cut meets one would break the mesher.
+    shape = set_precision(shape, 1e-7)
     # Area 1 about the origin: the solver's tolerance is absolute.
     scale, centre = shape.area**-0.5, shape.centroid.y
     shape = affinity.translate(shape, yoff=-centre)
@@ -66,7 +68,10 @@ def _torsion(cut: str, ratio: float, depth: float, layers: float) -> tuple[float
     section = Section(geometry)
     section.calculate_geometric_properties()
     section.calculate_warping_properties()
-    return float(section.get_j() / scale**4), float(section.get_sc_t()[1] / scale + centre)
+    found = float(section.get_j() / scale**4), float(section.get_sc_t()[1] / scale + centre)
+    if not np.all(np.isfinite(found)):
+        raise RuntimeError("the analysis gave no number")
+    return found
 
 
 if __name__ == "__main__":

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import notchflex as nf
 from loads import strokes, tensions
-from robots import ready, specimen
+from oracles.wrist import SPECIMENS, WRISTS
+from robots import of_wrist, ready, specimen
 
 ANGLE = 1e-9  # rad
 # Base tension at which the last notch closes [N] (tests/reference/pacheco_closing.csv).
@@ -49,6 +51,30 @@ def test_stroke_given_on_the_way_back(wrap, margin):
     drawn = nf.simulate(robot, strokes(pulled.stroke))
     assert drawn.converged.all(), drawn.reason
     margin.within("angles", drawn.notch_angle - pulled.notch_angle, ANGLE, "rad")
+
+
+@pytest.mark.parametrize("part", [0.5, 0.8, 0.95, 0.99])
+@pytest.mark.parametrize("wrap", ["geometric", "whole-before"])
+@pytest.mark.parametrize("name", ["A", "A specimen", "B", "C"])
+def test_drawn_and_let_go_in_small_steps(name, wrap, part, margin):
+    """At the turn the tension jumps, while nothing moves: every contact turns round at once."""
+    wrist = (SPECIMENS[name[0]] if name.endswith("specimen") else WRISTS[name]).with_(wrap=wrap)
+    up = np.linspace(0.0, part * wrist.stroke(wrist.closing_angle), 31)
+    path = nf.simulate(of_wrist(wrist), strokes([*up, *up[::-1]]))
+    assert path.converged.all(), [reason for reason in path.reason if reason]
+    margin.within("stroke kept", path.stroke[:, 0] - [*up, *up[::-1]], 1e-9, "mm")
+
+    # The oracle knows tensions only: it is asked for the one that leads to the stroke.
+    def missing(tension: float, history: list[float], stroke: float) -> float:
+        return wrist.stroke(wrist.march([*history, tension])[-1].angle) - stroke
+
+    peak = brentq(missing, 0.0, 3.0, args=([], up[-1]), xtol=1e-15)
+    for step in (10, 25, 35, 50):
+        history = [] if step < 31 else [peak]
+        stroke = float(path.stroke[step, 0])
+        tension = brentq(missing, 0.0, peak, args=(history, stroke), xtol=1e-15)
+        angle = wrist.march([*history, tension])[-1].angle
+        margin.within("angles", path.notch_angle[step] - angle, ANGLE, "rad")
 
 
 @pytest.mark.parametrize("name", "ABC")

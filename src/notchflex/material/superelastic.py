@@ -79,7 +79,7 @@ class SuperelasticLaw(SectionLaw):
         """Resultants with the weak-axis moment taken from the outer fibre on the spine."""
         stress = self.stress(strain[1] * section.edge_spine)
         moment = section.second_moment_weak / section.edge_spine * stress
-        resultants = self.stiffness(section) @ strain
+        resultants = jnp.asarray(self.stiffness(section) @ strain)
         return Response(resultants.at[1].set(moment), memory)
 
     def energy(
@@ -87,7 +87,7 @@ class SuperelasticLaw(SectionLaw):
     ) -> Float[Array, ""]:
         """Area under the moment over the curvature, and the elastic rest."""
         del memory
-        others = (self.stiffness(section) @ strain).at[1].set(0.0)
+        others = jnp.asarray(self.stiffness(section) @ strain).at[1].set(0.0)
         density = self.energy_density(strain[1] * section.edge_spine)
         return 0.5 * others @ strain + (
             section.second_moment_weak / section.edge_spine**2 * density

@@ -7,7 +7,9 @@ after York 2015). Every depth opens the tube, even one that leaves part of the i
 
 from fractions import Fraction
 
-from notchflex._jax import jax, jnp
+import numpy as np
+
+from notchflex._jax import array_module, jax, jit
 from notchflex.section.angles import cancelling_sum, half_angle
 from notchflex.section.section import Section
 from notchflex.section.sector_torsion import sector_shear_centre, sector_torsion_constant
@@ -71,17 +73,19 @@ def annular_sector(
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
         0.125376 mm², 0.686533 mm
     """
-    outer, inner, depth = jnp.broadcast_arrays(outer_radius, inner_radius, depth)
-    # Compiled as a whole: called one by one its operations take seconds to get ready.
-    return _compiled(*(jnp.asarray(x, dtype=float) for x in (outer, inner, depth)))
+    xp = array_module(outer_radius, inner_radius, depth)
+    outer, inner, depth = xp.broadcast_arrays(outer_radius, inner_radius, depth)
+    properties = _properties if xp is np else _compiled
+    return properties(*(xp.asarray(x, dtype=float) for x in (outer, inner, depth)))
 
 
 def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
     """Compute all properties of arrays of one shape."""
+    xp = array_module(outer)
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     a = half_angle(outer, left, depth)
     # Sine and cosine from the lengths: exact to rounding also near a = π.
-    sine = jnp.sqrt(left * depth) / outer
+    sine = xp.sqrt(left * depth) / outer
     cosine = (depth - outer) / outer
 
     mean = 0.5 * (outer + inner)
@@ -100,7 +104,7 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     # axis. Both sums below are without cancellation: ȳ − r_i cos a, and r_o − ȳ.
     inner_edge = (wall / 2.0 + wall**2 / (12.0 * mean)) * sine / a + inner * _bow(a) / a
     outer_edge = centroid - outer * cosine
-    edge_near = jnp.where(cosine > 0.0, inner_edge, outer_edge)
+    edge_near = xp.where(cosine > 0.0, inner_edge, outer_edge)
     edge_spine = wall / 2.0 - wall**2 / (12.0 * mean) + radius_mean * _sag(a) / a
     return Section(
         area=area,
@@ -114,4 +118,4 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     )
 
 
-_compiled = jax.jit(_properties)
+_compiled = jit(_properties)

@@ -22,7 +22,7 @@ Goodier, Theory of Elasticity, §109); checked against `sectionproperties` in th
 
 import numpy as np
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import array_module, jax
 from notchflex.section.terms import beside
 
 _SUMMED = 24  # terms added one by one; even, so that odd and even terms pair up
@@ -62,13 +62,14 @@ def sector_torsion_constant(outer: jax.Array, inner: jax.Array, angle: jax.Array
     Returns:
         Torsion constant, mm⁴. At a = π that of the slit tube.
     """
+    xp = array_module(outer)
     n, parity, weight = (beside(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
     outer, inner, angle = outer[None], inner[None], angle[None]
-    length = jnp.log(outer / inner)
-    rate = n * jnp.pi / length
+    length = xp.log(outer / inner)
+    rate = n * xp.pi / length
     square = (inner**2 - parity * outer**2) ** 2 / (4.0 + rate**2) ** 2
-    terms = square * (angle - jnp.tanh(rate * angle) / rate)
-    return jnp.sum(16.0 * weight * terms / length, axis=0)
+    terms = square * (angle - xp.tanh(rate * angle) / rate)
+    return xp.sum(16.0 * weight * terms / length, axis=0)
 
 
 def sector_shear_centre(
@@ -87,13 +88,14 @@ def sector_shear_centre(
         Distance of the shear centre from the tube axis, toward the spine, mm. It lies outside
         the material, up to two mean radii from the axis.
     """
+    xp = array_module(outer)
     n, parity, weight = (beside(x, angle) for x in (_INDEX, _PARITY, _WEIGHT))
     outer_, inner_, angle_ = outer[None], inner[None], angle[None]
-    length = jnp.log(outer_ / inner_)
-    rate = n * jnp.pi / length
+    length = xp.log(outer_ / inner_)
+    rate = n * xp.pi / length
     radial = (inner_**2 - parity * outer_**2) * (inner_**3 - parity * outer_**3)
     radial = radial / ((4.0 + rate**2) * (9.0 + rate**2))
-    around = jnp.sin(angle_) - jnp.cos(angle_) * jnp.tanh(rate * angle_) / rate
+    around = xp.sin(angle_) - xp.cos(angle_) * xp.tanh(rate * angle_) / rate
     terms = 24.0 * weight / length * radial * around / (1.0 + rate**2)
-    even = (outer**2 - inner**2) * (outer**3 - inner**3) / (3.0 * jnp.log(outer / inner)) * bow
-    return (even + jnp.sum(terms, axis=0)) / strong
+    even = (outer**2 - inner**2) * (outer**3 - inner**3) / (3.0 * xp.log(outer / inner)) * bow
+    return (even + xp.sum(terms, axis=0)) / strong

@@ -7,7 +7,9 @@ at r_i: a closed tube with a flat, an open arc with bevelled ends, a solid segme
 
 from fractions import Fraction
 
-from notchflex._jax import jax, jnp
+import numpy as np
+
+from notchflex._jax import array_module, jax, jit
 from notchflex.section.angles import cancelling_sum, half_angle
 from notchflex.section.section import Section
 from notchflex.section.segment_torsion import segment_torsion
@@ -78,20 +80,22 @@ def annular_segment(
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
         0.111621 mm², 0.701661 mm
     """
-    outer, inner, depth = jnp.broadcast_arrays(outer_radius, inner_radius, depth)
-    # Compiled as a whole: called one by one its operations take seconds to get ready.
-    return _compiled(*(jnp.asarray(x, dtype=float) for x in (outer, inner, depth)))
+    xp = array_module(outer_radius, inner_radius, depth)
+    outer, inner, depth = xp.broadcast_arrays(outer_radius, inner_radius, depth)
+    properties = _properties if xp is np else _compiled
+    return properties(*(xp.asarray(x, dtype=float) for x in (outer, inner, depth)))
 
 
 def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
     """Compute all properties of arrays of one shape."""
+    xp = array_module(outer)
     left = 2.0 * outer - depth  # from the cut plane to the outer surface of the spine
     plane = depth - outer  # d
     alpha = half_angle(outer, left, depth)
     beta = half_angle(inner, inner - plane, inner + plane)
 
     # A bore that the plane does not reach lies this far above it.
-    lift = jnp.maximum(-(inner + plane), 0.0)
+    lift = xp.maximum(-(inner + plane), 0.0)
     bore_area = inner**2 * _area(beta)
     bore_first = inner**3 * _first(beta)
     bore_second = inner**4 * _second(beta) + lift * (2.0 * bore_first + lift * bore_area)
@@ -106,11 +110,11 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     # Half chords x_o, x_i give the first moment about the tube axis, ⅔(x_o³ − x_i³), without
     # cancellation for shallow cuts; where both are there, x_o² − x_i² = r_o² − r_i².
     outer_square = left * depth
-    chord_outer = jnp.sqrt(outer_square)
-    is_cut = jnp.abs(plane) < inner
+    chord_outer = xp.sqrt(outer_square)
+    is_cut = xp.abs(plane) < inner
     inner_square = (inner - plane) * (inner + plane)
-    chord_inner = jnp.where(is_cut, jnp.sqrt(jnp.where(is_cut, inner_square, 1.0)), 0.0)
-    gap_square = jnp.where(is_cut, (outer - inner) * (outer + inner), outer_square)
+    chord_inner = xp.where(is_cut, xp.sqrt(xp.where(is_cut, inner_square, 1.0)), 0.0)
+    gap_square = xp.where(is_cut, (outer - inner) * (outer + inner), outer_square)
     cubes = (
         gap_square
         * (outer_square + chord_outer * chord_inner + chord_inner**2)
@@ -131,4 +135,4 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     )
 
 
-_compiled = jax.jit(_properties)
+_compiled = jit(_properties)

@@ -4,7 +4,7 @@ They have the right form (Bredt's closed tube, the thin open arc, the flat solid
 factors which correct them, see `segment_torsion`, are smooth and of the order of one.
 """
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import array_module, jax
 from notchflex.section.angles import half_angle
 
 
@@ -26,18 +26,19 @@ def closed_estimate(
     Returns:
         Torsion constant, mm⁴, and shear centre, mm.
     """
+    xp = array_module(outer)
     mean, wall = 0.5 * (outer + inner), outer - inner
     height = outer - depth  # |d|, from the tube axis to the flat
-    tangent = jnp.sqrt(depth / (2.0 * outer - depth))  # tan(b / 2)
-    flat = 2.0 * jnp.arctan(tangent)
+    tangent = xp.sqrt(depth / (2.0 * outer - depth))  # tan(b / 2)
+    flat = 2.0 * xp.arctan(tangent)
     above, below = height + inner, height - inner
-    thin = 4.0 * height / jnp.sqrt(above * below) * jnp.arctan(jnp.sqrt(above / below) * tangent)
-    round_part = 2.0 * (jnp.pi - flat)
+    thin = 4.0 * height / xp.sqrt(above * below) * xp.arctan(xp.sqrt(above / below) * tangent)
+    round_part = 2.0 * (xp.pi - flat)
     flexibility = thin - flat + round_part * mean / wall
-    inside_outer = outer**2 * (jnp.pi - flat) + height * jnp.sqrt(depth * (2.0 * outer - depth))
-    enclosed = 0.5 * (inside_outer + jnp.pi * inner**2)
+    inside_outer = outer**2 * (xp.pi - flat) + height * xp.sqrt(depth * (2.0 * outer - depth))
+    enclosed = 0.5 * (inside_outer + xp.pi * inner**2)
     torsion = 4.0 * enclosed**2 / flexibility + round_part * mean * wall**3 / 3.0
-    added = 1.0 - 2.0 * jnp.pi * mean / wall / flexibility
+    added = 1.0 - 2.0 * xp.pi * mean / wall / flexibility
     return torsion, 2.0 * mean * added
 
 
@@ -55,9 +56,10 @@ def open_estimate(
     Returns:
         Torsion constant, mm⁴, and shear centre, mm.
     """
+    xp = array_module(outer)
     mean, wall = 0.5 * (outer + inner), outer - inner
     a = half_angle(mean, mean + outer - depth, mean - outer + depth)
-    sine, cosine = jnp.sin(a), jnp.cos(a)
+    sine, cosine = xp.sin(a), xp.cos(a)
     shear = 2.0 * mean * (sine - a * cosine) / (a - sine * cosine)
     return area * wall**2 / 3.0, shear
 

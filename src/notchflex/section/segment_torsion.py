@@ -13,7 +13,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import array_module, jax
 from notchflex.section.angles import half_angle
 from notchflex.section.segment_estimates import closed_estimate, open_estimate, solid_estimate
 from notchflex.section.terms import beside
@@ -42,10 +42,11 @@ def _read_table() -> dict[tuple[str, str], np.ndarray]:
 
 def _chebyshev(count: int, value: jax.Array, low: float, high: float) -> jax.Array:
     """Values (count, …) of the first Chebyshev polynomials, constant outside low … high."""
+    xp = array_module(value)
     # The ends are moved in by 1e-12, because the arccosine has no derivative there.
     x = (2.0 * value - low - high) / (high - low)
-    x = jnp.clip(x, -1.0 + 1e-12, 1.0 - 1e-12)
-    return jnp.cos(beside(np.arange(count, dtype=float), x) * jnp.arccos(x)[None])
+    x = xp.clip(x, -1.0 + 1e-12, 1.0 - 1e-12)
+    return xp.cos(beside(np.arange(count, dtype=float), x) * xp.arccos(x)[None])
 
 
 def chord_angle(shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array) -> jax.Array:
@@ -73,15 +74,16 @@ def _factors(
     shape: str, outer: jax.Array, inner: jax.Array, depth: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
     """Interpolate the factors on the torsion constant and on the shear centre."""
+    xp = array_module(outer)
     low, high = (float(np.sqrt(1.0 - ratio)) for ratio in reversed(RATIO_RANGE))
     table = _read_table()
     both = np.stack([table[shape, "torsion"], table[shape, "shear"]])
     _, rows, columns = both.shape
-    across = _chebyshev(rows, jnp.sqrt(1.0 - inner / outer), low, high)
+    across = _chebyshev(rows, xp.sqrt(1.0 - inner / outer), low, high)
     along = _chebyshev(
         columns, chord_angle(shape, outer, inner, depth), *map(float, CHORD_RANGE[shape])
     )
-    torsion, shear = jnp.einsum("kpq,p...,q...->k...", both, across, along)
+    torsion, shear = xp.einsum("kpq,p...,q...->k...", both, across, along)
     return torsion, shear
 
 
@@ -100,14 +102,15 @@ def segment_torsion(
         Torsion constant, mm⁴, and distance of the (Trefftz) shear centre from the tube axis,
         toward the spine, mm.
     """
+    xp = array_module(outer)
     wall, plane = outer - inner, depth - outer
     closed = (plane < -inner) & (depth < wall)  # both: they may differ by rounding
     solid = plane >= inner
     # All three are computed; outside its own range each one gets a depth in the middle of it,
     # so that no derivative becomes NaN.
-    shallow = jnp.where(closed, depth, 0.5 * wall)
-    through = jnp.where(closed | solid, outer, depth)
-    deep = jnp.where(solid, depth, outer + inner)
+    shallow = xp.where(closed, depth, 0.5 * wall)
+    through = xp.where(closed | solid, outer, depth)
+    deep = xp.where(solid, depth, outer + inner)
 
     estimates = {
         "closed": closed_estimate(outer, inner, shallow),
@@ -122,6 +125,6 @@ def segment_torsion(
         torsion[shape], shear[shape] = first * on_torsion, second * on_shear
 
     def choose(of: dict[str, jax.Array]) -> jax.Array:
-        return jnp.where(closed, of["closed"], jnp.where(solid, of["solid"], of["open"]))
+        return xp.where(closed, of["closed"], xp.where(solid, of["solid"], of["open"]))
 
     return choose(torsion), choose(shear)

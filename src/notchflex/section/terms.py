@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import array_module, jax
 
 
 def beside(constants: np.ndarray, like: jax.Array) -> jax.Array:
@@ -16,4 +16,5 @@ def beside(constants: np.ndarray, like: jax.Array) -> jax.Array:
         The constants, shape (terms, 1, …, 1) with as many ones as `like` has axes; explicit
         because silent broadcasting across ranks is an error in the tests.
     """
-    return jnp.asarray(constants).reshape((-1, *([1] * like.ndim)))
+    xp = array_module(like)
+    return xp.asarray(constants).reshape((-1, *([1] * like.ndim)))

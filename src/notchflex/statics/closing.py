@@ -12,14 +12,15 @@ from notchflex.chain import Chain, assemble
 from notchflex.robot import Robot
 from notchflex.statics.load import LoadPath
 from notchflex.statics.newton import Settings
-from notchflex.statics.path import Path, command
-from notchflex.statics.run import run
+from notchflex.statics.path import command
+from notchflex.statics.run import lips
 from notchflex.statics.stepping import at_rest
 from notchflex.tendon.wall_arc import WallArc
 
 # Where a tension of this many times the one that would close a linear notch does not close it,
 # it is said not to close.
 _BEYOND_LINEAR = 64.0
+_PRECISION = 1e-11  # relative, of the tension
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def closing(robot: Robot) -> Closing:
     longest = arm[np.arange(len(arm)), tendon]
     return Closing(
         angle=angle,
-        tension=_tensions(robot, chain, tendon, longest, angle - free),
+        tension=_tensions(chain, tendon, longest, angle - free),
         tendon=tendon + 1,
         outer_strain=elastic * spine,
         peak_strain=np.abs(elastic) * np.maximum(spine, near),
@@ -97,7 +98,6 @@ def _moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
 
 
 def _tensions(
-    robot: Robot,
     chain: Chain,
     tendon: np.ndarray,
     arm: Float[np.ndarray, " n"],
@@ -111,16 +111,16 @@ def _tensions(
     stiffness = np.asarray(chain.lip_stiffness)
     rest = at_rest(chain)
 
-    def pressed(tension: np.ndarray, notch: np.ndarray) -> np.ndarray:
-        notch = notch.astype(int)
-        value = np.full((len(notch), chain.tendons), np.nan)
-        value[np.arange(len(notch)), tendon[notch]] = tension
+    def pressed(tension: Float[np.ndarray, " m"], notch: Float[np.ndarray, " m"]) -> np.ndarray:
+        # Always as many rows as notches, whichever are still searched: one compiled program.
+        which = np.resize(notch.astype(int), chain.flexures)
+        rows = np.arange(chain.flexures)
+        value = np.full((chain.flexures, chain.tendons), np.nan)
+        value[rows, tendon[which]] = np.resize(tension, chain.flexures)
         load = LoadPath(value, np.full_like(value, np.nan))
-        came = run(chain, command(load), rest, Settings(), each_from_start=True)
-        path = Path(robot, load, chain, came, each_from_rest=True)
-        rows = np.arange(len(notch))
-        force, gap = path.contact_force[rows, notch], path.gap[rows, notch]
-        return np.where(path.converged, force / stiffness[notch] - gap, np.nan)
+        force, gap, converged = lips(chain, command(load), rest, Settings())
+        overlap = force[rows, which] / stiffness[which] - gap[rows, which]
+        return np.where(converged, overlap, np.nan)[: len(notch)]
 
     linear = np.asarray(chain.stiffness)[notches, 0] * travel[notches] / arm[notches]
     high = linear.copy()
@@ -133,7 +133,7 @@ def _tensions(
         pressed,
         (np.zeros_like(high), high),
         args=(notches.astype(float),),
-        tolerances={"xrtol": 1e-13, "frtol": 0.0, "fatol": 0.0},
+        tolerances={"xatol": 0.0, "xrtol": _PRECISION, "fatol": 0.0, "frtol": 0.0},
     )
     found[notches] = np.where(root.success, root.x, np.nan)
     return found

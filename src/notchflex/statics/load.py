@@ -210,7 +210,8 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
 
 def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
     """One number per tendon, NaN where nothing is commanded."""
-    given: list[Any] = list(value) if isinstance(value, Sequence | np.ndarray) else [value]
+    several = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    given: list[Any] = list(value) if several else [value]
     if len(given) > tendons:
         raise InputError(
             f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "
@@ -221,6 +222,8 @@ def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
         if entry is None:
             continue
         try:
+            if isinstance(entry, str | bytes | bool):
+                raise TypeError
             entries[i] = float(entry)
         except (TypeError, ValueError):
             raise InputError(f"{what} must be {_FORM}; got {entry!r}") from None

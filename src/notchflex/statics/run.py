@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jit, jnp
-from notchflex.chain import Chain
+from notchflex.chain import Chain, flexure_states
 from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
 from notchflex.statics.quantities import Quantities, quantities
@@ -78,6 +78,34 @@ def stability(chain: Chain, commands: Command, solved: Solved) -> tuple[np.ndarr
     count = len(commands.value)
     eigenvalue, sign = _stability(chain, _pad(commands), _pad(solved))
     return np.asarray(eigenvalue)[:count], np.asarray(sign)[:count]
+
+
+def lips(
+    chain: Chain, commands: Command, start: Solved, settings: Settings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Contact forces (N) and gaps (mm) of all notches, each load from the same state.
+
+    A small program beside `run`, for questions that are asked again and again: only whether the
+    notches are closed, and no other quantity.
+
+    Returns:
+        Contact forces and gaps, loads by notches, and which loads converged.
+    """
+    force, gap, converged = _lips(chain, commands, start, settings)
+    return np.asarray(force), np.asarray(gap), np.asarray(converged)
+
+
+@jit
+def _lips(
+    chain: Chain, commands: Command, start: Solved, settings: Settings
+) -> tuple[Array, Array, Array]:
+    def at_lips(command: Command) -> tuple[Array, Array, Array]:
+        came = advance(chain, command, start, settings)
+        unknowns = came.solved.point.unknowns
+        flexure = flexure_states(chain, unknowns.modes, with_pose=False)
+        return unknowns.lip_force, flexure.lip_gap, came.converged
+
+    return jax.lax.map(at_lips, commands)
 
 
 def _pad(tree: Any) -> Any:

@@ -1,0 +1,132 @@
+"""What the solver promises beside numbers: reasons, states, stability, no recompilation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.statics import run as run_module
+
+
+@pytest.fixture
+def wrist() -> nf.Robot:
+    return nf.load_robot("pacheco2021-a")
+
+
+def test_failure_is_data_with_the_last_good_state(wrist: nf.Robot) -> None:
+    load = nf.draw(3.0, 4.2, steps=3)
+    path = nf.simulate(wrist, load)
+    assert path.converged.tolist() == [True, True, False]
+    assert "every notch closed" in path.reason[2]
+    assert path.stroke[2, 0] == pytest.approx(3.70598716, abs=1e-4)
+    assert np.isfinite(path.tip_position).all()
+    with pytest.raises(nf.ConvergenceError, match="step 3 of 3: every notch closed"):
+        path.raise_if_failed()
+
+
+def test_after_a_failure_nothing_is_tried(wrist: nf.Robot) -> None:
+    path = nf.simulate(wrist, [nf.Load(stroke=4.2), nf.Load(tension=1.0)])
+    assert "not tried, because step 1" in path.reason[1]
+    assert path.iterations[1] == 0
+
+
+def test_an_elastic_tendon_can_be_drawn_on_when_all_is_closed(wrist: nf.Robot) -> None:
+    robot = wrist.with_value("tendon.axial_stiffness", 500.0)
+    state = nf.solve(robot, nf.Load(stroke=4.5)).raise_if_failed()
+    assert state.closed.all()
+    assert state.stroke[0] == pytest.approx(4.5, abs=1e-12)
+    spans = np.array([0.0, *np.tile([0.8, 1.2], 5)])
+    tension = np.append(state.span_tension[0], state.span_tension[0, -1])
+    stretch = (tension * spans).sum() / 500.0
+    assert stretch == pytest.approx(4.5 - 3.705987158, abs=1e-8)
+
+
+def test_a_slack_tendon_does_not_push(wrist: nf.Robot) -> None:
+    path = nf.simulate(wrist, nf.LoadPath([[np.nan]] * 3, [[-1.0], [0.5], [-0.2]]))
+    np.testing.assert_allclose(path.tension[[0, 2]], 0.0, atol=1e-12)
+    assert path.tension[1, 0] > 0.2
+    np.testing.assert_allclose(path.total_angle[[0, 2]], 0.0, atol=1e-9)
+
+
+def test_state_is_saved_and_continued_from(wrist: nf.Robot, tmp_path: Path) -> None:
+    whole = nf.simulate(wrist, nf.pull(0.0, 2.5, steps=11).release())
+    half = nf.simulate(wrist, nf.pull(0.0, 2.5, steps=11))
+    half.state.save(tmp_path / "state.json")
+    back = nf.LoadPath(whole.load.tension[11:], whole.load.stroke[11:])
+    for state in (half.state, nf.State.load(tmp_path / "state.json")):
+        rest = nf.simulate(wrist, back, from_state=state)
+        np.testing.assert_allclose(rest.notch_angle, whole.notch_angle[11:], atol=1e-10)
+        np.testing.assert_allclose(
+            rest.dissipation[-1], whole.dissipation[-1] - whole.dissipation[10], atol=1e-10
+        )
+
+
+def test_a_state_of_another_robot_is_refused(wrist: nf.Robot, tmp_path: Path) -> None:
+    state = nf.solve(wrist, nf.Load(tension=1.0)).state
+    other = nf.load_robot("pacheco2021-c")
+    with pytest.raises(nf.InputError, match="other notches"):
+        nf.solve(other, nf.Load(tension=1.0), from_state=state)
+    state.save(tmp_path / "state.json")
+    with pytest.raises(nf.InputError, match="other notches"):
+        nf.solve(other, nf.Load(tension=1.0), from_state=nf.State.load(tmp_path / "state.json"))
+    with pytest.raises(nf.InputError, match="no state file"):
+        nf.State.load(tmp_path / "none.json")
+    (tmp_path / "text.json").write_text("no state")
+    with pytest.raises(nf.InputError, match="cannot be read"):
+        nf.State.load(tmp_path / "text.json")
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        (nf.Load, "must be a notchflex.Load"),
+        (nf.Load(tension=(1.0, 2.0)), "2 entries, but the robot has 1"),
+        (nf.Load(tension="1"), "a number"),
+        (nf.Load(tension=float("nan")), "finite"),
+        (nf.Load(tension=-1.0), "can only pull"),
+        (nf.Load(tension=1.0, stroke=1.0), "both given"),
+        (nf.Load(tension=1.0, base_rotation=(0.0, 1.0)), "three finite numbers"),
+    ],
+)
+def test_loads_that_are_none(wrist: nf.Robot, load: object, message: str) -> None:
+    with pytest.raises(nf.InputError, match=message):
+        nf.simulate(wrist, [load])  # type: ignore[list-item]
+
+
+def test_solve_each_is_solve_of_each(wrist: nf.Robot) -> None:
+    tensions = [2.0, 0.3, 1.1]
+    each = nf.solve_each(wrist, [nf.Load(tension=value) for value in tensions])
+    alone = [nf.solve(wrist, nf.Load(tension=value)) for value in tensions]
+    np.testing.assert_allclose(each.notch_angle, [state.notch_angle for state in alone], atol=1e-11)
+
+
+def test_wrists_under_tension_are_stable(wrist: nf.Robot) -> None:
+    path = nf.simulate(wrist, nf.pull(0.0, 3.0, steps=13).release())
+    assert path.stable.all()
+    # One notch alone: the stiffness is E I / h on the linear branch.
+    one = wrist.replace(
+        notch=(wrist.notches[0],), tendon=(nf.Tendon(0.70),), friction=nf.Frictionless()
+    )
+    state = nf.solve(one, nf.Load(tension=0.5))
+    assert state.smallest_eigenvalue == pytest.approx(10000.0 * 5.816412685e-4 / 0.8, rel=1e-9)
+
+
+def test_a_new_load_or_robot_of_the_same_shape_compiles_nothing(wrist: nf.Robot) -> None:
+    nf.simulate(wrist, nf.pull(0.0, 1.0, steps=5))
+    compiled = run_module._run._cache_size()
+    nf.simulate(wrist, nf.pull(0.0, 2.0, steps=17).release())
+    nf.simulate(nf.load_robot("pacheco2021-b-specimen"), nf.draw(0.0, 1.0, steps=40))
+    nf.simulate(wrist.with_value("notch[2].depth", 1.3), nf.pull(0.0, 2.0, steps=3))
+    assert run_module._run._cache_size() == compiled
+
+
+def test_huge_and_tiny_loads(wrist: nf.Robot) -> None:
+    path = nf.solve_each(wrist, [nf.Load(tension=value) for value in (1e-9, 1e-3, 1e3, 1e6)])
+    assert path.converged.all()
+    arm, lip = 1.3865332868, 1.4965332868
+    moment = path.span_tension[:, 0, 1::2] * arm - path.contact_force * lip
+    error = np.abs(path.notch_moment - moment) / path.tension
+    assert error.max() < 1e-9  # the levers above have ten digits
