@@ -14,6 +14,8 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 def pytest_configure(config: pytest.Config) -> None:
     """Set JAX up by its environment variables: it need not be imported, and subprocesses follow."""
     os.environ["JAX_ENABLE_X64"] = "1"
+    # A shape that does not fit must not be stretched in silence.
+    os.environ["JAX_NUMPY_RANK_PROMOTION"] = "raise"
     # Compiled code is kept beside pytest's own cache, for the other process of `-n 2` and later.
     if config.cache is not None:
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))

@@ -38,7 +38,7 @@ def compare(cut, cases, margin):
     # Not where less than 2 % of the wall is left under the flat: see the docstring.
     left = [1 - 2 * fraction / (1 - ratio) for ratio, fraction in cases]
     if cut == "off-axis":
-        cases = [case for case, rest in zip(cases, left, strict=True) if not 0 <= rest < 0.02]
+        cases = [case for case, rest in zip(cases, left, strict=True) if not -1e-6 <= rest < 0.02]
     wanted = torsions([(cut, ratio, 2 * fraction) for ratio, fraction in cases])
     errors = []
     for (ratio, fraction), (constant, centre) in zip(cases, wanted, strict=True):

@@ -1,5 +1,5 @@
 """The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
 
-from notchflex.chain.chain import Chain, assemble, flexure_states
+from notchflex.chain.chain import Chain, assemble, flexure_states, prepared
 
-__all__ = ["Chain", "assemble", "flexure_states"]
+__all__ = ["Chain", "assemble", "flexure_states", "prepared"]

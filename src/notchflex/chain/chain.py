@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import equinox as eqx
@@ -76,6 +76,15 @@ class Chain(eqx.Module):
     def memory_stiffness(self) -> Float[Array, " t"]:
         """Axial stiffness that the memory of the contacts uses, always finite, N."""
         return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS)
+
+
+@lru_cache(maxsize=64)
+def prepared(robot: Robot) -> Chain:
+    """The chain of a robot, kept where compiled programs take it from without copying.
+
+    The last robots asked for are remembered: a control loop solves the same one again and again.
+    """
+    return jax.device_put(assemble(robot))
 
 
 def assemble(robot: Robot) -> Chain:

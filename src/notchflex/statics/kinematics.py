@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from notchflex._jax import jax, jit, jnp
-from notchflex.chain import Chain, assemble
+from notchflex.chain import Chain, assemble, prepared
 from notchflex.errors import InputError
 from notchflex.flexure import relative_pose
 from notchflex.motion import Motion
@@ -48,7 +48,7 @@ def bodies_from_angles(
         )
     if not np.isfinite(angles).all():
         raise InputError("a notch angle is not finite; give angles in rad")
-    position, rotation = _bodies(assemble(robot), angles)
+    position, rotation = _bodies(prepared(robot), angles)
     return np.asarray(position), np.asarray(rotation)
 
 

@@ -252,7 +252,7 @@ class Path:
         tension = ", ".join(f"{value:.4g}" for value in np.asarray(state.tension)[step])
         drawn = ", ".join(f"{value:.4g}" for value in np.asarray(state.stroke)[step])
         last = f"the last good state has tension {tension} N and stroke {drawn} mm"
-        opening = np.sum(self.chain.rods.length, axis=-1)
+        opening = np.asarray(self.chain.rods.length).sum(axis=-1)
         all_closed = (self.gap[step] < _NEARLY_CLOSED * opening).all()
         if all_closed and not np.isnan(self.load.stroke[step]).all():
             return (

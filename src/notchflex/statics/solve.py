@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from notchflex.chain import assemble
+from notchflex.chain import prepared
 from notchflex.robot import Robot
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import Settings
@@ -41,7 +41,7 @@ def simulate(
         >>> bool(path.total_angle[3] == path.total_angle[2] > path.total_angle[1])
         True
     """
-    chain = assemble(robot)
+    chain = prepared(robot)
     load = load_path(loads, robot.number_of_tendons)
     start = fitted(from_state, chain)
     came = run(chain, command(load), start, settings or Settings(), each_from_start=False)
@@ -99,7 +99,7 @@ def solve_each(
         >>> solve_each(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=3)).converged.all()
         np.True_
     """
-    chain = assemble(robot)
+    chain = prepared(robot)
     load = load_path(loads, robot.number_of_tendons)
     rest = fitted(None, chain)
     came = run(chain, command(load), rest, settings or Settings(), each_from_start=True)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import constant, jax, jnp
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
 from notchflex.statics.element import Memory, Unknowns
@@ -47,13 +48,13 @@ class Advance(NamedTuple):
 
 def at_rest(chain: Chain) -> Solved:
     """The free robot with slack tendons that have not yet slid."""
-    none = tuple(jnp.zeros((*group.present.shape, 2)) for group in chain.groups)
+    none = tuple(constant(np.zeros((*group.present.shape, 2))) for group in chain.groups)
     unknowns = Unknowns(
-        modes=jnp.zeros_like(chain.stiffness),
-        lip_force=jnp.zeros(chain.flexures),
+        modes=constant(np.zeros(chain.stiffness.shape)),
+        lip_force=constant(np.zeros(chain.flexures)),
         log_ratio=none,
     )
-    slack = jnp.zeros(chain.tendons)
+    slack = constant(np.zeros(chain.tendons))
     return Solved(Point(unknowns, slack), Memory(none, none), slack)
 
 
