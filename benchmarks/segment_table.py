@@ -41,6 +41,7 @@ def arc(radius, right):
     """Points from −right to right, moved outward so that the area is that of the circle."""
     angle = np.r_[-right[:0:-1], right]
     half = 0.5 * np.gradient(angle)
+    half[[0, -1]] = 0.0  # the ends of the cut stay where they are
     return radius * (1.0 + half[:, None] ** 2 / 3.0) * np.c_[np.sin(angle), np.cos(angle)]
 
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from notchflex._jax import array_module, jax, jit
+from notchflex._jax import array_module, jax
 from notchflex.section.angles import cancelling_sum, half_angle
 from notchflex.section.section import Section
 from notchflex.section.sector_torsion import sector_shear_centre, sector_torsion_constant
@@ -118,4 +118,4 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     )
 
 
-_compiled = jit(_properties)
+_compiled = jax.jit(_properties)

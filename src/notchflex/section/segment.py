@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from notchflex._jax import array_module, jax, jit
+from notchflex._jax import array_module, jax
 from notchflex.section.angles import cancelling_sum, half_angle
 from notchflex.section.section import Section
 from notchflex.section.segment_torsion import segment_torsion
@@ -135,4 +135,4 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     )
 
 
-_compiled = jit(_properties)
+_compiled = jax.jit(_properties)
