@@ -5,6 +5,8 @@ import os
 import pytest
 from hypothesis import settings
 
+from margins import margin, pytest_terminal_summary  # noqa: F401
+
 # JAX compiles within a test, which no deadline should time; CI draws the same examples each time.
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
@@ -17,7 +19,8 @@ def pytest_configure(config: pytest.Config) -> None:
     # A shape that does not fit must not be stretched in silence.
     os.environ["JAX_NUMPY_RANK_PROMOTION"] = "raise"
     # Compiled code is kept beside pytest's own cache, for the other process of `-n 2` and later.
-    if config.cache is not None:
-        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
+    cache = getattr(config, "cache", None)
+    if cache is not None:
+        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache.mkdir("jax")))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")

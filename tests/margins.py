@@ -20,8 +20,8 @@ class Margin:
         """Assert that the largest |error| is at most `allowed`; an absent number fails."""
         values = np.abs(np.asarray(error, dtype=float))
         worst = float(np.max(values)) if values.size else float("nan")
-        self.note(f"{what}: {worst:.2e} of {allowed:.0e} {unit}".rstrip())
-        assert worst <= allowed, f"{what}: worst {worst:.3e} {unit}, allowed {allowed:.0e}"
+        self.note(f"{what}: {worst:.2e} of {allowed:g} {unit}".rstrip())
+        assert worst <= allowed, f"{what}: worst {worst:.3e} {unit}, allowed {allowed:g}"
         return worst
 
     def note(self, text: str) -> None:

@@ -17,7 +17,7 @@ FOLDER = Path(nf.__file__).parent
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
     "Linear", "Superelastic", "Frictionless", "Capstan", "Load", "LoadPath", "pull", "solve",
-    "simulate", "Equilibrium", "Path", "State", "tip_from_angles", "equal_stroke_angles", "closing",
+    "simulate", "Equilibrium", "Path", "State", "tip_from_angles", "equal_stroke", "closing",
     "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError",
 ]
 # fmt: on

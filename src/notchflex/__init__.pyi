@@ -22,11 +22,12 @@ from notchflex.statics import Load as Load
 from notchflex.statics import LoadPath as LoadPath
 from notchflex.statics import Path as Path
 from notchflex.statics import Settings as Settings
+from notchflex.statics import SharedStroke as SharedStroke
 from notchflex.statics import State as State
 from notchflex.statics import bodies_from_angles as bodies_from_angles
 from notchflex.statics import closing as closing
 from notchflex.statics import draw as draw
-from notchflex.statics import equal_stroke_angles as equal_stroke_angles
+from notchflex.statics import equal_stroke as equal_stroke
 from notchflex.statics import pull as pull
 from notchflex.statics import simulate as simulate
 from notchflex.statics import solve as solve

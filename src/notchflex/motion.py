@@ -15,9 +15,10 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import array_module, constant
 
-# Coefficients of sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 as polynomials in a^2. With
-# sixteen terms the first one left out is below 1e-16 for angles up to 5 rad, more than an
-# interval of a flexure ever turns; no branch at zero, so every derivative is smooth.
+# Coefficients of sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 as polynomials in a^2, used for
+# angles up to two radians: with sixteen terms the first one left out is below 1e-27 there. The
+# closed forms, used above, would lose digits near zero, and have no derivative at it.
+_SERIES_BELOW = 4.0  # of the squared angle
 _TERMS = 16
 _SERIES = np.array(
     [[(-1.0) ** k / factorial(2 * k + start) for k in range(_TERMS)] for start in (1, 2, 3)]
@@ -73,12 +74,18 @@ def unskew(matrix: Float[Array, "3 3"]) -> Float[Array, " 3"]:
 def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
     """sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 for a squared angle."""
     xp = array_module(squared)
-    square = squared * squared
-    low = xp.stack([xp.ones_like(squared), squared, square, squared * square])
+    small = squared < _SERIES_BELOW
+    near = xp.where(small, squared, 0.0)
+    square = near * near
+    low = xp.stack([xp.ones_like(near), near, square, near * square])
     fourth = square * square
     eighth = fourth * fourth
-    high = xp.stack([xp.ones_like(squared), fourth, eighth, fourth * eighth])
-    first, second, third = _SERIES @ (high[:, None] * low[None]).ravel()
+    high = xp.stack([xp.ones_like(near), fourth, eighth, fourth * eighth])
+    series = _SERIES @ (high[:, None] * low[None]).ravel()
+    angle = xp.sqrt(xp.where(small, _SERIES_BELOW, squared))
+    sine, versine = xp.sin(angle), 2.0 * xp.sin(0.5 * angle) ** 2
+    far = (sine / angle, versine / angle**2, (angle - sine) / angle**3)
+    first, second, third = (xp.where(small, series[i], far[i]) for i in range(3))
     return first, second, third
 
 

@@ -78,7 +78,7 @@ def test_kinematic_model(name, margin):
     rows = [row for row in rows if row["wrist"] == name]
     assert len(rows) == 21
     robot = ready(name)
-    angle = nf.equal_stroke_angles(robot, np.array(numbers(rows, "tendon_displacement_mm")))
+    angle = nf.equal_stroke(robot, np.array(numbers(rows, "tendon_displacement_mm"))).notch_angle
     margin.within("notch angles", angle - np.radians(notch_columns(rows)), 1e-8, "rad")
     tip, _ = nf.tip_from_angles(robot, angle)
     place = np.column_stack([numbers(rows, "tip_x_mm"), numbers(rows, "tip_z_mm")])

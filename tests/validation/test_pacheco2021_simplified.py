@@ -42,7 +42,7 @@ def test_model_of_forces(name, model, margin):
 def test_constant_curvature_under_the_stroke_of_the_full_model(name, margin):
     robot, rows = ready(name), table(name, 3)
     path = nf.simulate(robot, tensions(rows[:, 1]))
-    angle = nf.equal_stroke_angles(robot, path.stroke[:, 0])
+    angle = nf.equal_stroke(robot, path.stroke[:, 0]).notch_angle
     margin.within("notch angles", angle - np.radians(rows[:, 3 : 3 + angle.shape[1]]), ANGLE, "rad")
     tip, _ = nf.tip_from_angles(robot, angle)
     margin.within("tip", tip[:, [0, 2]] - rows[:, 9:11], LENGTH, "mm")

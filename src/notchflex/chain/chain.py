@@ -24,9 +24,10 @@ from notchflex.motion import Motion
 from notchflex.robot import Robot
 from notchflex.tendon import TendonGroup, route
 
-# Tendon stiffness that only tells apart how much has slid over two stuck contacts of one rigid
-# piece, between which an inextensible tendon would leave the tension open, N.
-MEMORY_STIFFNESS = 1e6
+# Axial stiffness of a tendon that only tells apart how much has slid over two stuck contacts of
+# one rigid piece, between which an inextensible tendon would leave the tension open: so many
+# times the force that would close a notch by its own stiffness (1e6 N for wrist A).
+MEMORY_STIFFNESS = 4e5
 
 
 class Chain(eqx.Module):
@@ -40,7 +41,8 @@ class Chain(eqx.Module):
         friction: The friction between tendons and tube.
         groups: The tendons, by the way they run.
         axial_stiffness: Axial stiffness of each tendon, infinite where inextensible, N.
-        free_length: Length of each tendon between its actuator and the base, mm.
+        free_length: Length of each tendon before its first contact, from its actuator on and
+            through the base, mm.
         body_length: Axial length of each body, mm.
         stiffness: Stiffness of each mode in the free robot, N mm; the scale of residuals.
         lip_stiffness: Stiffness of each notch at its lips in the free robot, N/mm.
@@ -75,7 +77,8 @@ class Chain(eqx.Module):
     @property
     def memory_stiffness(self) -> Float[Array, " t"]:
         """Axial stiffness that the memory of the contacts uses, always finite, N."""
-        return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS)
+        closing = jnp.mean(self.lip_stiffness * jnp.sum(self.rods.length, axis=-1))
+        return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS * closing)
 
 
 @lru_cache(maxsize=64)
@@ -119,7 +122,7 @@ def assemble(robot: Robot) -> Chain:
         friction=friction_law(robot.friction),
         groups=route(tendons, rods, _free_poses(rods), body_length),
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
-        free_length=constant([tendon.free_length for tendon in tendons]),
+        free_length=constant([robot.tube.base_length + tendon.free_length for tendon in tendons]),
         body_length=body_length,
         stiffness=constant(stiffness),
         lip_stiffness=1.0 / np.sum(lip_slope**2 / stiffness, axis=-1),

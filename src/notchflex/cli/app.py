@@ -6,7 +6,6 @@ them, and only those that compute import JAX.
 
 from __future__ import annotations
 
-import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -16,6 +15,7 @@ from cyclopts import App, CycloptsError
 from notchflex import __version__
 from notchflex.cli import terminal
 from notchflex.errors import InputError
+from notchflex.results.streams import let_go
 
 DONE = 0
 NOT_CONVERGED = 1
@@ -111,7 +111,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        return build()(tokens) or DONE
+        code = build()(tokens) or DONE
+        sys.stdout.flush()
+        return code
     except InputError as problem:
         terminal.error(str(problem))
     except CycloptsError as problem:
@@ -121,16 +123,20 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         terminal.error("interrupted; nothing more is written.")
         return INTERRUPTED
-    except BrokenPipeError:
-        # Whoever read our output has gone (`notchflex robots | head`). Python would complain once
-        # more when it flushes standard output at exit, so give it somewhere to flush to.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # whoever read our output has gone
+        let_go(sys.stdout)
         return DONE
+    except OSError as problem:
+        if problem.filename is not None:  # only a write to a stream has no name
+            raise
+        let_go(sys.stdout)
+        terminal.error(f"standard output cannot be written: {problem.strerror or problem}.")
     return BAD_INPUT
 
 
 def main() -> None:
     """Run the command line and end the process with its exit code."""
+    terminal.prepare_streams()
     try:
         code = run()
     except Exception:

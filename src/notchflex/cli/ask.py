@@ -82,6 +82,10 @@ class Interview:
         try:
             # A pipe needs no prompt, and what is printed would only be noise in a log.
             return input(f"{question.text}{shown}: " if self.person else "").strip()
+        except UnicodeDecodeError:
+            raise InputError(
+                f"{question.text}: the answer is no text in {sys.stdin.encoding}."
+            ) from None
         except EOFError:
             if question.default is not None:
                 return ""
@@ -127,7 +131,7 @@ def reading(
     """
     try:
         value = _evaluate(ast.parse(text.replace("−", "-"), mode="eval").body)
-    except (ValueError, SyntaxError, ZeroDivisionError, RecursionError, MemoryError):
+    except (ValueError, SyntaxError, ZeroDivisionError, OverflowError, RecursionError, MemoryError):
         got = repr(text) if text else "nothing"
         raise InputError(f"got {got}; give a number such as 1.62, or a sum: 1.62-0.22.") from None
     bounds = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -97,7 +99,7 @@ def new(
     Every number may be a sum, such as `1.62-0.22` for a depth measured as what is left.
     """
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
-    if path.exists() or path.is_symlink():
+    if os.path.lexists(path):
         raise InputError(f"{path} is already there; choose another name, or remove it first.")
     check_output(str(path), "NAME")
     interview = Interview(
@@ -128,7 +130,7 @@ def new(
     if path.exists():
         raise InputError(f"{path} appeared while you answered; choose another name.")
     write_text(path, text)
-    print(f"Wrote {path}. Look at it with: notchflex show {path}")
+    print(f"Wrote {path}. Look at it with: notchflex show {shlex.quote(str(path))}")
 
 
 def interviewed(interview: Interview, name: str) -> Robot:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -75,4 +76,4 @@ def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
 def robot_files(name: str) -> list[Path]:
     """Return the file that a robot is read from, if it is one: outputs must not replace it."""
     path = Path(name)
-    return [path] if path.suffix and path.exists() else []
+    return [path] if path.suffix and os.path.exists(path) else []

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
 
+from notchflex.results.streams import write_document
 from notchflex.robot import json_schema
 
 
 def schema() -> None:
     """Print the JSON Schema of robot files."""
-    sys.stdout.write(json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n")
+    write_document(json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n")

@@ -18,13 +18,16 @@ MOST_STEPS = 1_000_000
 FORM = "values or start:stop:count ranges joined by commas, such as 2 or 0,1,2.5 or 0:3:31,3:0:31"
 
 
-def parse_spec(text: str, option: str, *, negative: bool = True) -> list[float]:
+def parse_spec(
+    text: str, option: str, *, negative: bool = True, shown: str | None = None
+) -> list[float]:
     """Return the numbers that a SPEC stands for.
 
     Args:
         text: For example `0:3:31,3:0:31`.
         option: The option it came from, for the message.
         negative: Whether negative numbers are allowed.
+        shown: What messages quote, where the SPEC is only a part of what was given.
 
     Returns:
         The values, in the order given; at least one.
@@ -37,14 +40,15 @@ def parse_spec(text: str, option: str, *, negative: bool = True) -> list[float]:
         [0.0, 1.0, 1.5, 2.0]
     """
     values: list[float] = []
+    given = (text if shown is None else shown) or "''"
     for part in text.split(","):
-        values.extend(_part(part.strip(), text, option))
+        values.extend(_part(part.strip(), given, option))
         if len(values) > MOST_STEPS:
-            raise InputError(f"{option} {text}: this is more than {MOST_STEPS:,} steps.")
+            raise InputError(f"{option} {given}: this is more than {MOST_STEPS:,} steps.")
     for value in values:
         if value < 0 and not negative:
             raise InputError(
-                f"{option} {text}: got {value:g} N; a tendon only pulls, so give 0 N or more."
+                f"{option} {given}: got {value:g} N; a tendon only pulls, so give 0 N or more."
             )
     return values
 
@@ -114,7 +118,7 @@ def load_columns(
                     f"{option} {text}: tendon {index + 1} already has {commanded[index]}; "
                     "give each tendon one tension or one stroke."
                 )
-            values = parse_spec(spec, option, negative=option == "--stroke")
+            values = parse_spec(spec, option, negative=option == "--stroke", shown=text)
             commanded[index] = f"{option} {text}"
             columns[option, index] = (commanded[index], values)
     if not columns:

@@ -2,18 +2,51 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import os
 import shutil
 import sys
+import unicodedata
 from collections.abc import Generator
 from typing import TYPE_CHECKING, TextIO
+
+from notchflex.results.streams import let_go
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 NARROW = 80
 """Columns of a terminal that every table fits; also the width when writing into a pipe."""
+
+
+_PLAIN = {"–": "-", "—": "-", "−": "-", "…": ".", "·": "."}
+
+
+def prepare_streams() -> None:
+    """Make the standard streams of this process fit to be used, whatever they are.
+
+    A stream that the caller closed (`>&-`) goes nowhere. Where an encoding lacks a character, one
+    that is near stands in for it: `mm4` for `mm⁴`, and `?` where none is near.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+    codecs.register_error("notchflex-plain", _plainer)
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="notchflex-plain")
+
+
+def _plainer(problem: UnicodeError) -> tuple[str, int]:
+    if not isinstance(problem, UnicodeEncodeError):
+        raise problem
+    letters = []
+    for letter in problem.object[problem.start : problem.end]:
+        near = _PLAIN.get(letter) or unicodedata.normalize("NFKD", letter)
+        letters.append(near.encode("ascii", "ignore").decode() or "?")
+    return "".join(letters), problem.end
 
 
 def output() -> Console:
@@ -55,15 +88,25 @@ def _say(head: str, style: str, text: str) -> None:
     from rich.text import Text
 
     # soft_wrap: a terminal wraps long lines itself, and a log keeps one line a message.
-    messages().print(Text.assemble((head, style), " ", text), soft_wrap=True)
+    with contextlib.suppress(OSError):  # a full disk under a log: nobody can be told
+        messages().print(Text.assemble((head, style), " ", text), soft_wrap=True)
+        return
+    let_go(sys.stderr)
 
 
 def _console(stream: TextIO) -> Console:
     from rich.console import Console
 
+    class ForgivingConsole(Console):
+        """A console whose reader may go away: what was begun goes on, with its exit code."""
+
+        def on_broken_pipe(self) -> None:  # rich would end the process with code 1
+            del self._buffer[:]
+            let_go(stream)
+
     terminal = stream.isatty()
     width = shutil.get_terminal_size((NARROW, 24)).columns if terminal else NARROW
-    return Console(
+    return ForgivingConsole(
         file=stream,
         width=width,
         highlight=False,

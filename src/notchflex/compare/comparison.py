@@ -32,6 +32,8 @@ class Comparison:
         measured_tip: Forward kinematics of the measured notch angles [mm], (P, 3).
         converged: Whether the equilibrium was found, (P,).
         reason: Why not, P texts, "" where it was.
+        stroke_lost: Stroke that closed notches could not take in the kinematic model [mm], (P,);
+            None for a model with forces.
     """
 
     robot: Robot
@@ -45,6 +47,7 @@ class Comparison:
     measured_tip: NDArray[np.float64]
     converged: NDArray[np.bool_]
     reason: tuple[str, ...]
+    stroke_lost: NDArray[np.float64] | None = None
 
     @property
     def points(self) -> int:
@@ -134,7 +137,8 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
         )
     given = ~np.isnan(comparison.measured.stroke[:, 0])
     stroke = np.where(given, comparison.measured.stroke[:, 0], comparison.stroke[:, 0])
-    angles = np.asarray(nf.equal_stroke_angles(robot, stroke))
+    shared = nf.equal_stroke(robot, stroke)
+    angles = shared.notch_angle
     tip, _ = nf.tip_from_angles(robot, angles)
     # A stroke past the last closing has no equilibrium, but here it is the closed shape.
     solved = comparison.converged | given
@@ -145,6 +149,7 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
         total_angle=angles.sum(axis=1),
         tip=np.asarray(tip),
         converged=solved,
+        stroke_lost=shared.stroke_lost,
         reason=tuple(
             "" if good else why for good, why in zip(solved, comparison.reason, strict=True)
         ),

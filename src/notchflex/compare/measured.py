@@ -20,6 +20,8 @@ from notchflex.robot import Robot
 NOTCH_COLUMN = re.compile(QUANTITIES["notch_angle"].header(notch=r"(\d+)"))
 TOTAL_COLUMN = QUANTITIES["total_angle"].header()
 TRIAL_COLUMN = "trial"
+LARGEST = 1e6
+"""Nothing that was measured (N, mm, deg) is larger; a slip of the keyboard is."""
 
 
 @dataclass(frozen=True)
@@ -149,9 +151,11 @@ def _read_table(path: Path) -> tuple[list[str], list[int], list[list[str]]]:
     if not table:
         raise InputError(f"{path} is empty; it needs a header and at least one row of numbers.")
     (_, header), *body = table
-    if len(header) == 1 and ";" in header[0]:
+    separators = {";": "semicolons", "\t": "tabs"}
+    found = [word for mark, word in separators.items() if mark in header[0]]
+    if len(header) == 1 and found:
         raise InputError(
-            f"{path}: the columns are separated by semicolons; save it with commas between the "
+            f"{path}: the columns are separated by {found[0]}; save it with commas between the "
             "columns and points in the numbers."
         )
     for column in header:
@@ -223,4 +227,6 @@ def _number(text: str, column: str, line: int, name: str) -> float:
         raise InputError(f"{name}, line {line}: {column} is {got}; give a number.") from None
     if not math.isfinite(value):
         raise InputError(f"{name}, line {line}: {column} is {text}; give a finite number.")
+    if abs(value) > LARGEST:
+        raise InputError(f"{name}, line {line}: {column} is {text}; give at most {LARGEST:g}.")
     return value

@@ -59,7 +59,11 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
 
 
 def errors_document(comparison: Comparison) -> dict[str, Any]:
-    """Return the errors of a comparison: `rmse_deg`, `tip_rmse_mm` and the number of `points`."""
+    """Return the errors of a comparison: `rmse_deg`, `tip_rmse_mm` and the number of `points`.
+
+    For the kinematic model also `stroke_lost_mm`, what closed notches could not take, by point.
+    """
+    lost = {} if comparison.stroke_lost is None else {"stroke_lost_mm": comparison.stroke_lost}
     return {
         "rmse_deg": {
             "notches": comparison.rmse_notches * DEGREES,
@@ -67,6 +71,7 @@ def errors_document(comparison: Comparison) -> dict[str, Any]:
         },
         "tip_rmse_mm": comparison.tip_rmse,
         "points": comparison.points,
+        **lost,
     }
 
 

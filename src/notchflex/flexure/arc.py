@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from notchflex._jax import constant, jax
+from notchflex.errors import InputError
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
 from notchflex.material import FibreSection
@@ -25,6 +26,12 @@ def _(notch: ArcNotch, tube: Tube) -> Rod:
     left = SECTION_OF_CUT[notch.cut](
         0.5 * tube.outer_diameter, 0.5 * tube.inner_diameter, notch.depth
     )
+    closing = notch.height / (0.5 * tube.outer_diameter + left.centroid)
+    if np.radians(notch.precurvature_deg) >= closing:
+        raise InputError(
+            f"a notch is precurved by {notch.precurvature_deg:g} deg, but it closes at "
+            f"{np.degrees(closing):.2f} deg; give a precurvature_deg below that"
+        )
     section = FibreSection(
         area=left.area,
         second_moment_weak=left.second_moment_weak,

@@ -10,12 +10,12 @@ import contextlib
 import importlib.util
 import os
 import stat
-import sys
 import tempfile
 from collections.abc import Generator, Iterable
 from pathlib import Path
 
 from notchflex.errors import InputError
+from notchflex.results.streams import write_document
 
 STANDARD_OUTPUT = "-"
 PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
@@ -107,7 +107,9 @@ def check_distinct(outputs: dict[str, str | None]) -> None:
     for option, target in outputs.items():
         if target is None:
             continue
-        name = target if target == STANDARD_OUTPUT else os.path.realpath(target)
+        # What holds a null character names no file: `check_output` tells that.
+        plain = target == STANDARD_OUTPUT or "\0" in target
+        name = target if plain else os.path.realpath(target)
         if name in seen:
             where = "standard output" if target == STANDARD_OUTPUT else target
             raise InputError(
@@ -135,7 +137,11 @@ def replacing(target: str | Path) -> Generator[Path]:
     """
     destination = Path(os.path.realpath(target))
     if not _replaceable(destination):
-        yield destination
+        try:
+            yield destination
+        except OSError as problem:
+            words = problem.strerror or problem
+            raise InputError(f"{target} cannot be written: {words}.") from None
         return
     try:
         handle, name = tempfile.mkstemp(
@@ -166,11 +172,10 @@ def write_text(target: str | Path, text: str) -> None:
         InputError: The file cannot be written.
     """
     if str(target) == STANDARD_OUTPUT:
-        sys.stdout.write(text)
-        sys.stdout.flush()
+        write_document(text)
         return
     with replacing(target) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_text(text, encoding="utf-8", errors="replace", newline="\n")
 
 
 def _replaceable(path: Path) -> bool:

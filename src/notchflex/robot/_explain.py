@@ -28,7 +28,12 @@ def sentences(error: ValidationError, cls: type, repeats: Sequence[int] = ()) ->
         repeats: `repeat` of every `[[notch]]` table, so that notches are counted as in the robot.
     """
     said: list[str] = []
-    for record in error.errors(include_url=False):
+    records = error.errors(include_url=False)
+    wrong = [record["loc"] for record in records]
+    for record in records:
+        loc = record["loc"]
+        if record["type"] == "too_short" and any(loc == one[: len(loc)] != one for one in wrong):
+            continue  # pydantic counts only the good items of a list; what is wrong is said
         for one in _sentences_of(cast("dict[str, Any]", record), cls, repeats):
             if one not in said:
                 said.append(one)

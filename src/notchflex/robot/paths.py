@@ -101,7 +101,7 @@ def _value(text: str) -> object:
     for read in (int, float, lambda one: tomllib.loads(f"x = {one}")["x"]):
         try:
             return read(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
     return text
 
@@ -114,6 +114,10 @@ def _parse(path: str) -> _Target:
     section, index, key = match["section"], match["index"], match["key"]
     if section == "name" and index is None and key is None:
         return _Target(path, "name", None, "")
+    if section not in _SECTIONS and key is None:
+        owners = [f"`{one}.{section}`" for one in _SECTIONS if section in _keys_of(one)]
+        meant = f" (did you mean {' or '.join(owners)}?)" if owners else ""
+        raise InputError(f"`{path}` is not the name of a value{meant}; {_EXAMPLES}.")
     if section not in _SECTIONS:
         allowed = ["name", *_SECTIONS]
         raise InputError(
@@ -202,6 +206,13 @@ def defaults_of(section: str, table: Mapping[str, Any]) -> dict[str, Any]:
         for name, field in keys.items()
         if name != "kind" and not field.is_required()
     }
+
+
+def _keys_of(section: str) -> set[str]:
+    """Return the keys that any kind of a part has."""
+    base = _SECTIONS[section]
+    classes = kinds_of(base).values() if issubclass(base, Notch | Material | Friction) else [base]
+    return {key for one in classes for key in fields_of(one)}
 
 
 def _class_of(section: str, table: Mapping[str, Any]) -> type:

@@ -85,7 +85,8 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
     names = _ready_names()
     if not is_path and text in names:
         return READY / f"{text}.toml"
-    if is_path or path.is_file():
+    # os.path: False, and no error, for a name that can be no file's
+    if is_path or os.path.exists(path):
         if path.suffix == ".toml" and path.stem in names and not path.exists():
             raise RobotFileError(
                 f"{path}: there is no such file; the ready robot is called `{path.stem}`, "
@@ -131,5 +132,7 @@ def _parse(text: str, shown: str) -> dict[str, Any]:
             f"{shown}, line {line}{at}: this is not TOML ({what[:1].lower()}{what[1:]}); "
             "write one `key = value` a line, text in quotes."
         ) from None
+    except ValueError as error:  # a whole number of thousands of digits
+        raise RobotFileError(f"{shown} holds a number that cannot be read: {error}.") from None
     except RecursionError:
         raise RobotFileError(f"{shown} is nested too deeply for a robot file.") from None

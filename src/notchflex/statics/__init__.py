@@ -2,8 +2,9 @@
 
 from notchflex.statics.closing import Closing, closing
 from notchflex.statics.kinematics import (
+    SharedStroke,
     bodies_from_angles,
-    equal_stroke_angles,
+    equal_stroke,
     tip_from_angles,
 )
 from notchflex.statics.load import Load, LoadPath, draw, pull
@@ -21,11 +22,12 @@ __all__ = [
     "Path",
     "SavedState",
     "Settings",
+    "SharedStroke",
     "State",
     "bodies_from_angles",
     "closing",
     "draw",
-    "equal_stroke_angles",
+    "equal_stroke",
     "pull",
     "simulate",
     "solve",

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from notchflex._jax import jnp
+from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
+from notchflex.flexure import fibre_stretch
 from notchflex.statics.element import Beyond
 from notchflex.statics.walk import per_tendon
+from notchflex.tendon.wall_arc import WallArc
 
 
 class Command(NamedTuple):
@@ -28,6 +31,28 @@ def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Beyond) -> Floa
     """Tendon drawn out at the base since the free robot (mm), with the file's stiffness."""
     stretch = per_tendon(chain, base.stretch) + base_tension * chain.free_length
     return per_tendon(chain, base.drawn) + stretch / chain.axial_stiffness
+
+
+def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
+    """Stroke at which every notch is closed (mm), infinite where that is not known beforehand.
+
+    Where one bending mode closes a notch, a tendon on the wall shortens by the notch's travel
+    times its lever.
+    """
+    reach = np.full(chain.tendons, np.inf)
+    rods = jax.tree.map(np.asarray, chain.rods)
+    if rods.modes != 1:
+        return reach
+    to_lip = np.einsum("nc,nic,ni->n", fibre_stretch(rods.lip), rods.reference_strain, rods.length)
+    lip_slope = np.einsum("nc,nicm,ni->n", fibre_stretch(rods.lip), rods.basis, rods.length)
+    travel = -to_lip / lip_slope
+    for group in chain.groups:
+        if isinstance(group, WallArc):
+            weights = fibre_stretch(np.asarray(group.across))
+            slope = np.einsum("ntc,nicm,ni->nt", weights, rods.basis, rods.length)
+            loss = np.asarray(group.present) * np.maximum(-slope * travel[:, None], 0.0)
+            reach[list(group.numbers)] = loss.sum(axis=0)
+    return reach
 
 
 def stroke_scale(chain: Chain) -> Float[Array, ""]:

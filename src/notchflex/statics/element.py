@@ -19,10 +19,11 @@ from notchflex.friction import FrictionLaw
 from notchflex.material import SectionLaw
 from notchflex.tendon import Crossing, TendonGroup
 
-# The memory law x = clip(x_prev + ...): `RATE` (1/mm) is how strongly slip drives the logarithm
-# while Newton searches, and drops out at the solution; `STICTION` (1/mm) only keeps the equation
-# regular where a slack tendon makes the tension ratio meaningless.
-RATE = 10.0
+# The memory law x = clip(x + rate (slip - (x - x_prev) / stiction)). The rate is how strongly slip
+# drives the logarithm while Newton searches, and drops out at the solution; the stiction only
+# keeps the equation regular where a slack tendon makes the tension ratio meaningless. Both are
+# per slip in heights of the notch, so that a robot of another size is solved alike.
+RATE = 8.0
 STICTION = 1e15
 
 
@@ -191,6 +192,7 @@ def element_result(
             )
         ),
     )
+    height = jnp.sum(element.rod.length)
     slid, bound, friction_residual = [], [], []
     for number, (group, crossing) in enumerate(zip(element.groups, crossings, strict=True)):
         stiffness = common.memory_stiffness[number]
@@ -205,18 +207,17 @@ def element_result(
         holds = jnp.stack([group.visits, group.visits * (1.0 - group.ends)], axis=-1)
         limit = holds * jnp.stack([exit_bound, entry_bound], axis=-1)
         log_ratio, before = unknowns.log_ratio[number], memory.log_ratio[number]
-        moved = over_both - memory.slid[number] - (log_ratio - before) / STICTION
+        moved = (over_both - memory.slid[number]) / height - (log_ratio - before) / STICTION
         slid.append(over_both)
         bound.append(limit)
         friction_residual.append(log_ratio - between(log_ratio + RATE * moved, limit))
     # Signorini's condition, lip_force >= 0, gap >= 0, product 0, as one equation.
     pressed = unknowns.lip_force - element.lip_stiffness * flexure.lip_gap
-    natural_gap = jnp.maximum(jnp.sum(element.rod.length), 1e-300)
     return ElementResult(
         residual=Unknowns(
             modes=balance / element.stiffness,
             lip_force=(unknowns.lip_force - jnp.where(pressed > 0.0, pressed, 0.0))
-            / (element.lip_stiffness * natural_gap),
+            / (element.lip_stiffness * height),
             log_ratio=tuple(friction_residual),
         ),
         behind=behind,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
@@ -93,29 +95,45 @@ def _bodies(chain: Chain, angles: Float[Array, "s n"]) -> tuple[Array, Array]:
     return poses.translation, poses.rotation
 
 
-def equal_stroke_angles(robot: Robot, stroke: NDArray[np.float64]) -> NDArray[np.float64]:
+class SharedStroke(NamedTuple):
+    """What the kinematic model makes of strokes.
+
+    Attributes:
+        notch_angle: Angle of every notch, base to tip, rad, (s, n).
+        stroke_lost: Part of the stroke that closed notches could not take, mm, (s,).
+    """
+
+    notch_angle: NDArray[np.float64]
+    stroke_lost: NDArray[np.float64]
+
+
+def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
     """The kinematic model of Pacheco 2021, eq. 1-3: the stroke is shared equally by all notches.
 
     Every notch bends by its share over its moment arm r_i + ybar, from its precurvature on and
-    at most until it closes. No force, material or friction enters; it is the paper's model
-    (iii), for comparison.
+    at most until it closes; what it then can't take of its share is lost, and told. No force,
+    material or friction enters; it is the paper's model (iii), for comparison.
 
     Args:
         robot: A robot whose first tendon runs along the wall.
         stroke: Tendon drawn out at the base, mm, (s,).
 
     Returns:
-        Angle of every notch, base to tip, rad, (s, n).
+        Notch angles and lost stroke; there is always an answer.
 
     Raises:
-        InputError: The first tendon does not run along the wall over every notch toward its bend.
+        InputError: The first tendon does not run along the wall over every notch toward its
+            bend, or a stroke is not finite.
 
     Example:
         >>> from notchflex import load_robot
-        >>> angle = equal_stroke_angles(load_robot("pacheco2021-a"), np.array([0.25]))
-        >>> print(f"{np.degrees(angle[0, 0]):.8f}")
-        2.06615233
+        >>> shared = equal_stroke(load_robot("pacheco2021-a"), np.array([0.25, 4.0]))
+        >>> print(f"{np.degrees(shared.notch_angle[0, 0]):.8f} deg, {shared.stroke_lost[1]:.3f} mm")
+        2.06615233 deg, 0.294 mm
     """
+    drawn = np.atleast_1d(np.asarray(stroke, float))
+    if not np.isfinite(drawn).all():
+        raise InputError("a stroke is not finite; give strokes in mm")
     chain = assemble(robot)
     first = next(
         (g for g in chain.groups if isinstance(g, WallArc) and 0 in g.numbers),
@@ -133,7 +151,11 @@ def equal_stroke_angles(robot: Robot, stroke: NDArray[np.float64]) -> NDArray[np
             "the kinematic model needs a first tendon that crosses every notch on the side to "
             f"which it bends; that of {robot.name} does not"
         )
-    share = np.atleast_1d(np.asarray(stroke, float))[:, None] / chain.flexures
+    share = drawn[:, None] / chain.flexures
     closing = np.asarray(chain.rods.length.sum(-1) / chain.rods.lip[:, 0])
     free = np.asarray((chain.rods.length * chain.rods.reference_strain[..., 1]).sum(-1))
-    return np.clip(free + share / arm, free, closing)
+    angle = np.clip(free + share / arm, free, closing)
+    lost = np.maximum(share - arm * (angle - free), 0.0)
+    # Rounding of a share that is taken whole is no loss.
+    lost = np.where(angle < closing, 0.0, lost)
+    return SharedStroke(angle, lost.sum(axis=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -51,9 +52,9 @@ class LoadPath:
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        tension = np.atleast_2d(np.asarray(self.tension, float))
-        stroke = np.atleast_2d(np.asarray(self.stroke, float))
-        base_rotation = np.asarray(self.base_rotation, float)
+        tension = np.atleast_2d(_table(self.tension, "tension"))
+        stroke = np.atleast_2d(_table(self.stroke, "stroke"))
+        base_rotation = _rotation(self.base_rotation)
         if tension.shape != stroke.shape or tension.ndim != 2:
             raise InputError(
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
@@ -70,11 +71,6 @@ class LoadPath:
         if (~np.isnan(tension) & ~np.isnan(stroke)).any():
             raise InputError(
                 "tension and stroke are both given for one tendon in one step; give one of them"
-            )
-        if base_rotation.shape != (3,) or not np.isfinite(base_rotation).all():
-            raise InputError(
-                f"base_rotation needs three finite numbers (rotation vector, rad); "
-                f"got {self.base_rotation!r}"
             )
         object.__setattr__(self, "tension", tension)
         object.__setattr__(self, "stroke", stroke)
@@ -98,10 +94,24 @@ class LoadPath:
         )
 
     def then(self, following: LoadPath) -> LoadPath:
-        """This path and another after it."""
+        """This path and another after it; a tendon that only one of them names is slack else.
+
+        Raises:
+            InputError: What follows is no path.
+
+        Example:
+            >>> pull(0.0, 1.0, steps=2).then(pull(1.0, 1.0, steps=1, tendon=2)).tension.tolist()
+            [[0.0, nan], [1.0, nan], [nan, 1.0]]
+        """
+        if not isinstance(following, LoadPath):
+            raise InputError(
+                f"a load path goes on with another notchflex.LoadPath; got {_shown(following)}"
+            )
+        count = max(self.tension.shape[1], following.tension.shape[1])
+        first, second = self.for_tendons(count), following.for_tendons(count)
         return LoadPath(
-            np.concatenate([self.tension, following.tension]),
-            np.concatenate([self.stroke, following.stroke]),
+            np.concatenate([first.tension, second.tension]),
+            np.concatenate([first.stroke, second.stroke]),
             self.base_rotation,
         )
 
@@ -166,14 +176,17 @@ def draw(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> Load
 
 
 def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> LoadPath:
+    steps, tendon = _whole(steps, "steps"), _whole(tendon, "tendon")
     if steps < 1:
         raise InputError(f"a range needs at least one step; got {steps}")
     if tendon < 1:
         raise InputError(f"tendons are counted from 1; got {tendon}")
+    first, last = _number(start, f"the first {what}"), _number(stop, f"the last {what}")
     commanded = np.full((steps, tendon), np.nan)
-    commanded[:, tendon - 1] = np.linspace(start, stop, steps)
+    with np.errstate(over="ignore", invalid="ignore"):
+        commanded[:, tendon - 1] = np.linspace(first, last, steps)
     if not np.isfinite(commanded[:, tendon - 1]).all():
-        raise InputError(f"a {what} range needs finite ends; got {start:g} and {stop:g}")
+        raise InputError(f"a {what} range needs finite ends; got {first:g} and {last:g}")
     nothing = np.full_like(commanded, np.nan)
     return LoadPath(commanded, nothing) if what == "tension" else LoadPath(nothing, commanded)
 
@@ -193,24 +206,31 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     """
     if isinstance(loads, LoadPath):
         return loads.for_tendons(tendons)
+    if not isinstance(loads, Load | Iterable):
+        raise InputError(
+            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {_shown(loads)}"
+        )
     every = [loads] if isinstance(loads, Load) else list(loads)
     if not every:
         raise InputError("there are no loads; give at least one")
     for load in every:
         if not isinstance(load, Load):
             raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
-    if any(tuple(load.base_rotation) != tuple(every[0].base_rotation) for load in every):
+    rotation = _rotation(every[0].base_rotation)
+    if any((_rotation(load.base_rotation) != rotation).any() for load in every):
         raise InputError("base_rotation must be the same for all loads of a path")
     return LoadPath(
         np.stack([_entries(load.tension, tendons, "tension") for load in every]),
         np.stack([_entries(load.stroke, tendons, "stroke") for load in every]),
-        np.asarray(every[0].base_rotation, float),
+        rotation,
     )
 
 
 def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
     """One number per tendon, NaN where nothing is commanded."""
-    several = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    if hasattr(value, "__array__"):
+        value = np.asarray(value).tolist()
+    several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     given: list[Any] = list(value) if several else [value]
     if len(given) > tendons:
         raise InputError(
@@ -221,12 +241,59 @@ def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
     for i, entry in enumerate(given):
         if entry is None:
             continue
-        try:
-            if isinstance(entry, str | bytes | bool):
-                raise TypeError
-            entries[i] = float(entry)
-        except (TypeError, ValueError):
-            raise InputError(f"{what} must be {_FORM}; got {entry!r}") from None
+        entries[i] = _number(entry, what, _FORM)
         if not np.isfinite(entries[i]):
-            raise InputError(f"{what} must be finite; got {entry!r}")
+            raise InputError(f"{what} must be finite; got {_shown(entry)}")
     return entries
+
+
+def _number(value: Any, what: str, form: str = "a number") -> float:
+    """A number, which text and truth values are not."""
+    try:
+        if isinstance(value, str | bytes | bytearray | bool | np.bool_):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{what} must be {form}; got {_shown(value)}") from None
+
+
+def _whole(value: Any, what: str) -> int:
+    try:
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
+        return operator.index(value)
+    except TypeError:
+        raise InputError(f"{what} must be a whole number; got {_shown(value)}") from None
+
+
+def _table(value: Any, what: str) -> np.ndarray:
+    """Numbers, steps by tendons; None within them is NaN."""
+    try:
+        if value is None or np.asarray(value).dtype.kind not in "iufO":
+            raise TypeError
+        return np.asarray(value, float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(
+            f"{what} of a load path must be numbers, steps by tendons; got {_shown(value)}"
+        ) from None
+
+
+def _rotation(value: Any) -> np.ndarray:
+    try:
+        rotation = np.asarray(value, float)
+    except (TypeError, ValueError, OverflowError):
+        rotation = np.empty(0)
+    if rotation.shape != (3,) or not np.isfinite(rotation).all():
+        raise InputError(
+            f"base_rotation needs three finite numbers (rotation vector, rad); got {_shown(value)}"
+        )
+    return rotation
+
+
+def _shown(value: Any) -> str:
+    """A value as Python writes it, cut short."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # a whole number of thousands of digits
+        text = f"a huge {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -63,7 +63,7 @@ class _Search(NamedTuple):
     """State of the search: the best point, and the part of a step that is tried from it."""
 
     best: NewtonResult
-    size: Float[Array, ""]
+    allowed: Float[Array, ""]
     step: Point
     part: Float[Array, ""]
     tries: Int[Array, ""]
@@ -75,9 +75,13 @@ class _Search(NamedTuple):
 _LARGEST_TURN = 0.5
 _LARGEST_LOG_RATIO = 1.0
 _TRIES = 7
+# The first steps are taken whole, whatever they do to the imbalance: where a tendon turns round,
+# all its contacts must leave their bound at once, and the way there is not downhill.
+_UNLIMITED = 8
 # A state whose imbalance has stopped falling at this multiple of the tolerance is as good as
 # rounding allows.
 _ROUNDING = 100.0
+_LARGEST_GROWTH = 1e4
 
 
 def newton(
@@ -98,11 +102,12 @@ def newton(
     Returns:
         The result; a failure is told by `converged`, never raised.
     """
-    # Rounding grows with the moments that must balance, so the tolerance does.
+    # Rounding grows with the moments that must balance, so the tolerance does, within reason.
     height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
     turn_per_newton = height / jnp.min(chain.stiffness)
     largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
-    tolerance = settings.tolerance * (1.0 + largest_tension * turn_per_newton)
+    growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
+    tolerance = settings.tolerance * growth
 
     def searching(search: _Search) -> Bool[Array, ""]:
         return ~search.over & (search.best.iterations <= settings.max_iterations)
@@ -114,8 +119,9 @@ def newton(
         demand = command_residual(chain, command, point.base_tension, at.base)
         residual = ravel_pytree((at.result.residual, demand))[0]
         largest, size = jnp.max(jnp.abs(residual)), jnp.linalg.norm(residual)
-        better = size <= (1.0 - 1e-4 * search.part) * search.size
-        at_rounding = (best.residual < _ROUNDING * tolerance) & ~better
+        unlimited = (best.iterations < _UNLIMITED) & (best.residual >= _ROUNDING * tolerance)
+        better = (size <= search.allowed) | (unlimited & jnp.isfinite(size))
+        at_rounding = (best.residual < _ROUNDING * tolerance) & (largest >= best.residual)
         taken = better | (jnp.isfinite(size) & (search.tries >= _TRIES) & ~at_rounding)
         solved = taken & (largest < tolerance)
         found = NewtonResult(
@@ -138,7 +144,7 @@ def newton(
         step, part = jax.lax.cond(taken & ~solved, again, lambda: (search.step, 0.5 * search.part))
         return _Search(
             best=jax.tree.map(lambda old, new: jnp.where(taken, new, old), best, found),
-            size=jnp.where(taken, size, search.size),
+            allowed=jnp.where(taken, (1.0 - 1e-4) * size, search.allowed),
             step=step,
             part=part,
             tries=jnp.where(taken, 0, search.tries + 1),
@@ -155,7 +161,7 @@ def newton(
     )
     search = _Search(
         best=nowhere,
-        size=jnp.array(jnp.inf),
+        allowed=jnp.array(jnp.inf),
         step=jax.tree.map(jnp.zeros_like, start),
         part=jnp.ones(()),
         tries=jnp.zeros((), int),

@@ -14,7 +14,7 @@ from notchflex._jax import constant
 from notchflex.chain import Chain
 from notchflex.motion import rotation_about
 from notchflex.robot import Robot
-from notchflex.statics.actuation import Command
+from notchflex.statics.actuation import Command, drawn_when_closed
 from notchflex.statics.load import LoadPath
 from notchflex.statics.run import Run, stability
 from notchflex.statics.state import State
@@ -254,7 +254,7 @@ class Path:
         last = f"the last good state has tension {tension} N and stroke {drawn} mm"
         opening = np.asarray(self.chain.rods.length).sum(axis=-1)
         all_closed = (self.gap[step] < _NEARLY_CLOSED * opening).all()
-        if all_closed and not np.isnan(self.load.stroke[step]).all():
+        if (all_closed or self._past_closing(step)) and not np.isnan(self.load.stroke[step]).all():
             return (
                 "every notch closed: the robot can't shorten the tendon further, so this stroke "
                 f"fixes no tension; {last}; command a smaller stroke, or a tension, or give the "
@@ -267,6 +267,12 @@ class Path:
             "robot has no equilibrium there"
         )
 
+    def _past_closing(self, step: int) -> bool:
+        """Whether a stroke of a step is more than an inextensible tendon can lose."""
+        reach = drawn_when_closed(self.chain)
+        inextensible = np.isinf(np.asarray(self.chain.axial_stiffness))
+        return bool((inextensible & (self.load.stroke[step] >= reach)).any())
+
     @cached_property
     def _stability(self) -> tuple[np.ndarray, np.ndarray]:
         value, sign = stability(self.chain, command(self.load), self.run.solved)
@@ -274,7 +280,10 @@ class Path:
 
     @property
     def smallest_eigenvalue(self) -> np.ndarray:
-        """Smallest eigenvalue of the stiffness with sticking contacts held, N mm/rad, (s,)."""
+        """Eigenvalue of the stiffness, tendons held where they stick, with the least real part.
+
+        In N mm/rad for arc notches, (s,).
+        """
         return self._stability[0]
 
     @property

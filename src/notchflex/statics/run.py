@@ -17,7 +17,7 @@ from notchflex.chain import Chain, flexure_states
 from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
 from notchflex.statics.quantities import Quantities, quantities
-from notchflex.statics.stability import smallest_eigenvalue
+from notchflex.statics.stability import held_stiffness
 from notchflex.statics.stepping import Advance, Solved, advance
 
 
@@ -46,7 +46,7 @@ class Run(NamedTuple):
 
 
 # Numbers of loads that programs are compiled for: a solve, a usual path, and longer ones.
-_SIZES = (1, 64, 512, 4096)
+_SIZES = (1, 128, 4096)
 
 
 def run(
@@ -74,10 +74,14 @@ def run(
 
 
 def stability(chain: Chain, commands: Command, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest eigenvalue of the stiffness and sign of the determinant, state by state."""
+    """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
     count = len(commands.value)
-    eigenvalue, sign = _stability(chain, _pad(commands), _pad(solved))
-    return np.asarray(eigenvalue)[:count], np.asarray(sign)[:count]
+    stiffness, sign = _stability(chain, _pad(commands), _pad(solved))
+    held = np.asarray(stiffness)[:count]
+    whole = np.isfinite(held).all(axis=(1, 2))
+    eigenvalue = np.full(count, np.nan)
+    eigenvalue[whole] = np.linalg.eigvals(held[whole]).real.min(axis=-1)
+    return eigenvalue, np.asarray(sign)[:count]
 
 
 def lips(
@@ -160,7 +164,7 @@ def _run(
 
 @jit
 def _stability(chain: Chain, commands: Command, solved: Solved) -> tuple[Array, Array]:
-    return jax.lax.map(lambda item: smallest_eigenvalue(chain, *item), (commands, solved))
+    return jax.lax.map(lambda item: held_stiffness(chain, *item), (commands, solved))
 
 
 def _not_tried(last: Solved) -> Advance:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from notchflex.chain import prepared
+from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import Settings
@@ -43,6 +44,11 @@ def simulate(
     """
     chain = prepared(robot)
     load = load_path(loads, robot.number_of_tendons)
+    if from_state is not None and from_state.robot != robot.name:
+        raise InputError(
+            f"the state belongs to robot {from_state.robot!r}, this one is {robot.name!r}; "
+            "continue from a state of the same robot"
+        )
     start = fitted(from_state, chain)
     came = run(chain, command(load), start, settings or Settings(), each_from_start=False)
     return Path(robot, load, chain, came)

@@ -7,28 +7,29 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
-from notchflex.statics.actuation import Command, command_residual
+from notchflex.statics.actuation import Command, command_residual, stroke_scale
 from notchflex.statics.element import Memory, at_bound
 from notchflex.statics.newton import Point
 from notchflex.statics.stepping import Solved
 from notchflex.statics.walk import evaluate
 
-# Closed lips are held by springs this much stiffer than the notches, so that a contact only
-# stiffens; without it the contact force would be a multiplier and the stiffness not defined.
-_CONTACT_STIFFNESS = 1e3
-
-
+# Closed lips and tendons drawn by stroke are held by springs this much stiffer than the notches:
+# they only stiffen; without it their forces would be multipliers and the stiffness not defined.
+_HOLDING_STIFFNESS = 1e3
 # A contact on its bound goes on sliding: it is taken as having slid by so much (mm).
 _SLIP = 1e-3
 
 
-def smallest_eigenvalue(
+def held_stiffness(
     chain: Chain, command: Command, solved: Solved
-) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """Smallest eigenvalue of the symmetric part of the stiffness, and a determinant's sign.
+) -> tuple[Float[Array, "modes modes"], Float[Array, ""]]:
+    """Stiffness of the whole robot against its modes, and the sign of a determinant.
 
-    Tensions, contact forces and base tensions are eliminated first: a contact that sticks holds
-    its tendon, one that slides keeps its tension ratio (the stiffness is not symmetric then).
+    Tension ratios, contact forces and base tensions are eliminated first: a contact that sticks
+    holds its tendon, one that slides keeps its tension ratio at the bound, which moves with the
+    shape. The stiffness is not symmetric then, so it is its eigenvalues that tell stability: its
+    symmetric part has negative ones in states that nothing makes snap (a stuck contact adds the
+    product of two different vectors).
 
     Args:
         chain: The chain.
@@ -37,8 +38,8 @@ def smallest_eigenvalue(
         solved: The equilibrium.
 
     Returns:
-        The eigenvalue, N mm per unit of mode squared (N mm/rad for arc notches), and the sign
-        of the determinant of the whole system.
+        The stiffness, N mm per unit of mode squared (N mm/rad for arc notches), and the sign of
+        the determinant of the whole system.
     """
     point = solved.point
     modes = point.unknowns.modes.size
@@ -62,12 +63,15 @@ def smallest_eigenvalue(
 
     matrix = jax.jacfwd(imbalance)(flat)
     natural_gap = chain.rods.length.sum(-1)
-    give = 1.0 / (_CONTACT_STIFFNESS * chain.lip_stiffness * natural_gap)
+    give = 1.0 / (_HOLDING_STIFFNESS * chain.lip_stiffness * natural_gap)
     lips = jnp.arange(modes, modes + chain.flexures)
     matrix = matrix.at[lips, lips].add(give)
+    drawn = len(flat) - chain.tendons + jnp.arange(chain.tendons)
+    soft = command.by_stroke / (_HOLDING_STIFFNESS * stroke_scale(chain))
+    matrix = matrix.at[drawn, drawn].add(soft)
     others = matrix[modes:, modes:]
     stiffness = matrix[:modes, :modes] - matrix[:modes, modes:] @ jnp.linalg.solve(
         others, matrix[modes:, :modes]
     )
     sign, _ = jnp.linalg.slogdet(matrix)
-    return jnp.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0], sign
+    return stiffness, sign

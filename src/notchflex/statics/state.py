@@ -34,11 +34,19 @@ class State:
 
         Args:
             path: Where to; an existing file is replaced.
+
+        Raises:
+            InputError: The file cannot be written.
         """
         leaves, _ = tree_util.tree_flatten_with_path(self.solved)
         arrays = {tree_util.keystr(key): np.asarray(leaf).tolist() for key, leaf in leaves}
         content = {"format": _FORMAT, "robot": self.robot, "arrays": arrays}
-        FilePath(path).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        text = json.dumps(content, indent=1) + "\n"
+        try:
+            FilePath(path).write_text(text, encoding="utf-8")
+        except (OSError, ValueError) as error:  # ValueError: a null character in the name
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"the state cannot be written to {path}: {reason}") from None
 
     @classmethod
     def load(cls, path: str | FilePath) -> SavedState:
@@ -51,19 +59,25 @@ class State:
             The state.
 
         Raises:
-            InputError: The file is missing or is no state.
+            InputError: The file is missing, is no state or is damaged.
         """
+        if not str(path).strip():
+            raise InputError("the name of the state file is empty; give that of a saved state")
         try:
             content = json.loads(FilePath(path).read_text(encoding="utf-8"))
         except FileNotFoundError:
             raise InputError(f"there is no state file {path}") from None
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        except (OSError, ValueError, RecursionError) as error:
+            reason = getattr(error, "strerror", None) or error
             raise InputError(
-                f"{path} cannot be read as a state: {error}; give a file written by --save-state"
+                f"{path} cannot be read as a state: {reason}; give a file written by --save-state"
             ) from None
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise InputError(f"{path} is no notchflex state; give a file written by --save-state")
-        return SavedState(str(content.get("robot")), content.get("arrays"), str(path))
+        robot, arrays = content.get("robot"), content.get("arrays")
+        if not isinstance(robot, str) or not isinstance(arrays, dict):
+            raise _damaged(path, "the name of its robot or its numbers are missing")
+        return SavedState(robot, arrays, str(path))
 
 
 @dataclass(frozen=True)
@@ -78,23 +92,31 @@ class SavedState:
         """The state for a chain.
 
         Raises:
-            InputError: It belongs to a robot of another make.
+            InputError: It is damaged, or belongs to a robot of another make.
         """
         leaves, structure = tree_util.tree_flatten_with_path(at_rest(chain))
         read = []
         for key, leaf in leaves:
             name = tree_util.keystr(key)
+            if name not in self.arrays:
+                raise _damaged(self.source, f"{name} is missing")
             try:
                 array = np.asarray(self.arrays[name], float)
-            except (KeyError, TypeError, ValueError):
-                array = np.array(np.nan)
-            if array.shape != leaf.shape or not np.isfinite(array).all():
+            except (TypeError, ValueError, OverflowError):
+                raise _damaged(self.source, f"{name} is no table of numbers") from None
+            if not np.isfinite(array).all():
+                raise _damaged(self.source, f"{name} holds what is no finite number")
+            if array.shape != leaf.shape:
                 raise InputError(
                     f"{self.source} holds a state of robot {self.robot!r} with other notches or "
                     "tendons than this robot; continue from a state of the same robot"
                 )
             read.append(array)
         return tree_util.tree_unflatten(structure, read)
+
+
+def _damaged(source: str | FilePath, what: str) -> InputError:
+    return InputError(f"the state file {source} is damaged: {what}; save the state again")
 
 
 def fitted(state: State | SavedState | None, chain: Chain) -> Solved:

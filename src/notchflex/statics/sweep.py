@@ -33,6 +33,8 @@ from notchflex.statics.element import (
 )
 from notchflex.statics.walk import Evaluation, leave_base
 
+_HELD = 1e-9
+
 
 class Blocks(NamedTuple):
     """Derivatives of one element (names as in the head of this file)."""
@@ -169,7 +171,10 @@ def linear_step(
         return command_residual(chain, command, tension, beyond_of(flat))
 
     by_tension, by_base = jax.jacfwd(demand, argnums=(0, 1))(base_tension, flat_base)
-    border = by_tension + by_base @ matrix @ leave
+    # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; the
+    # small entry keeps such a step finite.
+    held = _HELD * jnp.diag(command.by_stroke.astype(float))
+    border = by_tension + by_base @ matrix @ leave + held
     imbalance = demand(base_tension, flat_base) + by_base @ constant
     tension_step, border_sign = _solve(border, -imbalance[:, None])
 
