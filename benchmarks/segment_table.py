@@ -7,7 +7,7 @@ Torsion constant and (Trefftz) shear centre of the annular segment of outer radi
 nodes of the coordinates that `notchflex.section.segment_torsion` interpolates over, by warping
 analysis with quadratic triangles, three across the wall and smaller where it tapers. Divided by
 the estimates of `segment_estimates` and fitted by least squares. FILE keeps the values of the
-analysis, so that a second run only fits.
+analysis: a second run only fits, or goes on where the mesher crashed.
 """
 
 import sys
@@ -21,7 +21,7 @@ from sectionproperties.pre import Geometry
 from shapely import Polygon, affinity
 
 TABLE = Path(__file__).parents[1] / "src/notchflex/section/segment_table.csv"
-LAYERS = 3  # elements across the wall; halving them changes J by less than 5e-4
+LAYERS = 3  # elements across the wall
 COARSEST = 0.1  # size of an element over the outer radius
 NODES = {"closed": (9, 16), "open": (9, 20), "solid": (1, 12)}  # ratios, chord angles
 ORDERS = {"closed": (7, 11), "open": (8, 16), "solid": (0, 8)}  # highest of the polynomials

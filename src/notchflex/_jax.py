@@ -17,8 +17,9 @@ jax.config.update("jax_enable_x64", True)
 import jax.numpy as jnp  # noqa: E402
 
 # The chain is many small steps one after the other. XLA's newer fusion on the CPU compiles them
-# in 7 s rather than 4 s and computes shared parts again and again (numbers of jax 0.10.1).
-jit = partial(jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": False})
+# in 7 s rather than 4 s (jax 0.10.1); later versions have no other.
+_OPTIONS = {"xla_cpu_use_fusion_emitters": False} if jax.__version_info__ < (0, 11) else None
+jit = partial(jax.jit, compiler_options=_OPTIONS)
 
 
 def array_module(*values: Any) -> ModuleType:

@@ -107,6 +107,8 @@ def test_robot_files(folder, refused, old, new, words):
         (["simulate", "mine.toml", "--tension", "0:3:0"], "a range of 0 steps"),
         (["simulate", "mine.toml", "--tension", "-1"], "only pulls"),
         (["simulate", "mine.toml", "--tension", "nan"], "finite"),
+        (["simulate", "mine.toml", "--tension", "1="], "--tension 1=: a number is missing"),
+        (["simulate", "mine.toml", "--tension", ""], "--tension '': a number is missing"),
         (["simulate", "mine.toml", "--tension", "2=1"], "no tendon 2"),
         (["simulate", "mine.toml", "--stroke", "inf"], "finite"),
         (["simulate", "mine.toml", "--tension", "1", "--stroke", "1"], "already has"),
@@ -118,6 +120,14 @@ def test_robot_files(folder, refused, old, new, words):
         ([*SIMULATE, "--set", "notch.depth"], "notch.depth"),
         ([*SIMULATE, "--from-state", "none.json"], "none.json"),
         ([*SIMULATE, "--from-state", "data.csv"], "state"),
+        ([*SIMULATE, "--from-state", ""], "empty"),
+        ([*SIMULATE, "--from-state", "folder"], "cannot be read as a state: Is a directory"),
+        (["show", "folder"], "is a folder"),
+        (["show", "a" * 300], "neither a ready robot"),
+        (["show", "a" * 300 + ".toml"], "cannot be read"),
+        (["new", "a" * 300], "cannot be written"),
+        (["new", "null\0"], "null character"),
+        (["show", "mine.toml", "--set", "depth=1"], "did you mean `notch.depth`?"),
         (["show", "mine.toml", "--set", "notch.depth=2"], "less than"),
         (["compare", "mine.toml", "none.csv"], "no such file"),
         (["compare", "mine.toml", "mine.toml"], "column"),
@@ -142,6 +152,8 @@ def test_arguments(refused, arguments, words):
         ("--plot", "-", "standard output"),
         ("--plot", "missing/out.png", "does not exist"),
         ("--save-state", "missing/state.json", "does not exist"),
+        ("--json", "null\0.json", "null character"),
+        ("--plot", "null\0.png", "null character"),
     ],
 )
 def test_outputs_are_checked_before_anything_is_computed(
@@ -165,6 +177,20 @@ def test_missing_matplotlib_is_told_before_computing(refused, monkeypatch):
 def test_measured_data_are_not_replaced(refused):
     said = refused("compare", "mine.toml", "data.csv", "--csv", "data.csv")
     assert "would replace" in said
+
+
+def test_a_notch_that_is_wrong_is_told_in_one_sentence(refused):
+    said = refused("show", "mine.toml", "--set", "notch.depth=-1")
+    assert "`notch` is a list" not in said
+
+
+def test_files_that_break_their_readers(folder, refused):
+    (folder / "deep.json").write_text("[" * 100_000)
+    (folder / "huge.json").write_text("1" * 5_000)
+    for name in ("deep.json", "huge.json"):
+        assert f"{name} cannot be read" in refused(*SIMULATE, "--from-state", name)
+    (folder / "mine.toml").write_text(ROBOT.replace("1.62", "1" * 5_000))
+    assert "mine.toml holds a number that cannot be read" in refused(*SIMULATE)
 
 
 def test_good_file_is_good(folder):

@@ -92,6 +92,8 @@ def test_spreadsheet_habits_are_taken(read):
         (f"{HEADER}\n1,2,3\n", "line 2: 3 entries for 6 columns"),
         (f"{HEADER},notch_5_deg\n1,1,2,3,4,5,5\n", "notch_5_deg is there more than once"),
         (HEADER.replace(",", ";") + "\n1;1;2;3;4;5\n", "semicolons"),
+        (HEADER.replace(",", "\t") + "\n1\t1\t2\t3\t4\t5\n", "tabs"),
+        (f"{HEADER}\n1,1,2,1e308,4,5\n", "notch_3_deg is 1e308; give at most 1e\\+06"),
         (b"\x89PNG\r\n\x1a\n\xff\xfe", "no text in UTF-8"),
     ],
 )

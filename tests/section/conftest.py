@@ -1,4 +1,4 @@
-"""What the validation tests share."""
+"""What the section tests share."""
 
 from margins import margin
 

@@ -90,3 +90,13 @@ def test_arrays_of_any_shape(cut):
         assert one.shape == (2, 3)
         assert one.dtype == jnp.float64
         np.testing.assert_allclose(one, other, rtol=1e-13)
+
+
+@pytest.mark.parametrize("cut", SECTIONS)
+def test_numbers_and_traced_numbers_agree(cut):
+    # Plain numbers are worked out by NumPy, traced ones by JAX.
+    depth = np.r_[np.linspace(0.01, 1.61, 33), 0.81, 0.11, 1.51]
+    plain = SECTIONS[cut](0.81, 0.70, depth)
+    traced = jax.jit(SECTIONS[cut])(0.81, 0.70, depth)
+    for one, other in zip(plain, traced, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-11)

@@ -116,7 +116,8 @@ def _parse(path: str) -> _Target:
         return _Target(path, "name", None, "")
     if section not in _SECTIONS and key is None:
         owners = [f"`{one}.{section}`" for one in _SECTIONS if section in _keys_of(one)]
-        meant = f" (did you mean {' or '.join(owners)}?)" if owners else ""
+        near = nearest(section, ["name", *_SECTIONS])
+        meant = f" (did you mean {' or '.join(owners)}?)" if owners else near
         raise InputError(f"`{path}` is not the name of a value{meant}; {_EXAMPLES}.")
     if section not in _SECTIONS:
         allowed = ["name", *_SECTIONS]

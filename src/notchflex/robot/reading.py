@@ -86,7 +86,7 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
     if not is_path and text in names:
         return READY / f"{text}.toml"
     # os.path: False, and no error, for a name that can be no file's
-    if is_path or os.path.exists(path):
+    if is_path or os.path.exists(text):
         if path.suffix == ".toml" and path.stem in names and not path.exists():
             raise RobotFileError(
                 f"{path}: there is no such file; the ready robot is called `{path.stem}`, "

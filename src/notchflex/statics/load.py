@@ -94,7 +94,7 @@ class LoadPath:
         )
 
     def then(self, following: LoadPath) -> LoadPath:
-        """This path and another after it; a tendon that only one of them names is slack else.
+        """This path and another after it; a tendon that one of them does not name is slack in it.
 
         Raises:
             InputError: What follows is no path.
@@ -103,7 +103,7 @@ class LoadPath:
             >>> pull(0.0, 1.0, steps=2).then(pull(1.0, 1.0, steps=1, tendon=2)).tension.tolist()
             [[0.0, nan], [1.0, nan], [nan, 1.0]]
         """
-        if not isinstance(following, LoadPath):
+        if not isinstance(following, LoadPath):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError(
                 f"a load path goes on with another notchflex.LoadPath; got {_shown(following)}"
             )
@@ -206,11 +206,12 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     """
     if isinstance(loads, LoadPath):
         return loads.for_tendons(tendons)
-    if not isinstance(loads, Load | Iterable):
+    try:
+        every = [loads] if isinstance(loads, Load) else list(loads)
+    except TypeError:
         raise InputError(
             f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {_shown(loads)}"
-        )
-    every = [loads] if isinstance(loads, Load) else list(loads)
+        ) from None
     if not every:
         raise InputError("there are no loads; give at least one")
     for load in every:
