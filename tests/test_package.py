@@ -18,7 +18,8 @@ NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
     "Linear", "Superelastic", "Frictionless", "Capstan", "Load", "LoadPath", "pull", "solve",
     "simulate", "Equilibrium", "Path", "State", "tip_from_angles", "equal_stroke", "closing",
-    "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError",
+    "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError", "draw",
+    "solve_each", "bodies_from_angles", "SharedStroke", "Closing", "ConvergenceError", "Settings",
 ]
 # fmt: on
 

@@ -123,3 +123,14 @@ def test_links_are_followed(tmp_path):
 def test_devices_are_written_directly():
     write_text(os.devnull, "gone")
     assert not os.path.isfile(os.devnull)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
+def test_pipes_are_written_directly():
+    reading, writing = os.pipe()
+    write_text(f"/dev/fd/{writing}", "through")
+    os.close(writing)
+    assert os.read(reading, 100) == b"through"
+    os.close(reading)
+    with pytest.raises(InputError, match="cannot be written: No space left"):
+        write_text("/dev/full", "x")

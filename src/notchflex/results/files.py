@@ -135,14 +135,14 @@ def replacing(target: str | Path) -> Generator[Path]:
     Raises:
         InputError: The file cannot be written.
     """
-    destination = Path(os.path.realpath(target))
-    if not _replaceable(destination):
+    if not _replaceable(Path(target)):  # not its real path: /dev/stdout may be a link to no name
         try:
-            yield destination
+            yield Path(target)
         except OSError as problem:
             words = problem.strerror or problem
             raise InputError(f"{target} cannot be written: {words}.") from None
         return
+    destination = Path(os.path.realpath(target))
     try:
         handle, name = tempfile.mkstemp(
             dir=destination.parent, prefix=f".{destination.stem}-", suffix=destination.suffix

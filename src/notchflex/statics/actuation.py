@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import constant, jax, jnp
 from notchflex.chain import Chain
 from notchflex.flexure import fibre_stretch
 from notchflex.statics.element import Beyond
@@ -48,7 +48,7 @@ def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
     travel = -to_lip / lip_slope
     for group in chain.groups:
         if isinstance(group, WallArc):
-            weights = fibre_stretch(np.asarray(group.across))
+            weights = fibre_stretch(constant(group.across))
             slope = np.einsum("ntc,nicm,ni->nt", weights, rods.basis, rods.length)
             loss = np.asarray(group.present) * np.maximum(-slope * travel[:, None], 0.0)
             reach[list(group.numbers)] = loss.sum(axis=0)

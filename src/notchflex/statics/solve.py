@@ -76,10 +76,11 @@ def solve(
         InputError: A load that is none, or a state of another robot.
 
     Example:
+        >>> from math import degrees
         >>> from notchflex import Load, load_robot
         >>> state = solve(load_robot("pacheco2021-a"), Load(tension=2.0))
-        >>> print(f"{np.degrees(state.total_angle):.2f} deg")
-        147.40 deg
+        >>> print(f"{degrees(state.total_angle):.2f} deg")
+        150.08 deg
     """
     return simulate(robot, load, from_state=from_state, settings=settings)[0]
 
@@ -102,8 +103,9 @@ def solve_each(
 
     Example:
         >>> from notchflex import load_robot, pull
-        >>> solve_each(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=3)).converged.all()
-        np.True_
+        >>> path = solve_each(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=3))
+        >>> path.converged.tolist()
+        [True, True, True]
     """
     chain = prepared(robot)
     load = load_path(loads, robot.number_of_tendons)
