@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rich.table import Table
 
+from notchflex._ready import list_robots
 from notchflex.cli import terminal
-from notchflex.robot import list_robots
 
 
 def robots() -> None:

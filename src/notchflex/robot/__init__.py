@@ -3,6 +3,7 @@
 Robot files are TOML in mm, N, MPa and degrees.  Nothing here imports JAX.
 """
 
+from notchflex._ready import list_robots
 from notchflex.robot.friction_capstan import Capstan
 from notchflex.robot.friction_frictionless import Frictionless
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
@@ -10,7 +11,7 @@ from notchflex.robot.material_linear import Linear
 from notchflex.robot.material_superelastic import Superelastic
 from notchflex.robot.notch_arc import ArcNotch
 from notchflex.robot.paths import Changed, parse_assignment, set_values
-from notchflex.robot.reading import list_robots, load_robot, robot_from_text
+from notchflex.robot.reading import load_robot, robot_from_text
 from notchflex.robot.robot import Robot, from_table, to_table
 from notchflex.robot.schema import json_schema
 from notchflex.robot.tendon import Tendon

@@ -6,11 +6,10 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from notchflex._ready import READY, ready_names
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot._explain import nearest
 from notchflex.robot.robot import Robot, from_table, remember_source
-
-READY = Path(__file__).parent / "ready"
 
 
 def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
@@ -44,26 +43,6 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
     return remember_source(robot, text)
 
 
-def list_robots() -> dict[str, str]:
-    """List the ready robots.
-
-    Returns:
-        The title of every ready robot by the name that `load_robot` takes, sorted by name.
-
-    Example:
-        >>> list_robots()["pacheco2021-a"]
-        'Pacheco 2021, wrist A'
-    """
-    return {
-        name: str(tomllib.loads((READY / f"{name}.toml").read_text(encoding="utf-8"))["name"])
-        for name in _ready_names()
-    }
-
-
-def _ready_names() -> list[str]:
-    return sorted(path.stem for path in READY.glob("*.toml"))
-
-
 def robot_from_text(text: str, shown: str = "robot file") -> Robot:
     """Make a robot from the text of a robot file.
 
@@ -82,7 +61,7 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
     text = os.fspath(name_or_path)
     path = Path(text)
     is_path = not isinstance(name_or_path, str) or path.suffix == ".toml" or len(path.parts) > 1
-    names = _ready_names()
+    names = ready_names()
     if not is_path and text in names:
         return READY / f"{text}.toml"
     # os.path: False, and no error, for a name that can be no file's

@@ -219,7 +219,12 @@ class Path:
 
     @cached_property
     def dissipation(self) -> np.ndarray:
-        """Work that every contact turned to heat since the start, N mm, (s, t, 2n - 1)."""
+        """Work that every contact turned to heat since the start, N mm, (s, t, 2n - 1).
+
+        Taken by the trapezoid rule from step to step, as is the work of the tendons, so the two
+        balance with the stored energy as the steps get small. Over a few coarse steps across a
+        turn it is rough, and may even fall.
+        """
         return self._accumulated("span_tension", "contact_slid")
 
     @property
