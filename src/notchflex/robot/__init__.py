@@ -3,6 +3,8 @@
 Robot files are TOML in mm, N, MPa and degrees.  Nothing here imports JAX.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from notchflex._ready import list_robots
 from notchflex.robot.friction_capstan import Capstan
 from notchflex.robot.friction_frictionless import Frictionless
@@ -16,7 +18,9 @@ from notchflex.robot.robot import Robot, from_table, to_table
 from notchflex.robot.schema import json_schema
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
-from notchflex.robot.writing import robot_text, save_robot
+
+if TYPE_CHECKING:
+    from notchflex.robot.writing import robot_text, save_robot
 
 __all__ = [
     "ArcNotch",
@@ -43,3 +47,12 @@ __all__ = [
     "set_values",
     "to_table",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the writing of robot files, and what it needs to keep comments, on first use."""
+    if name not in {"robot_text", "save_robot"}:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from notchflex.robot import writing
+
+    return getattr(writing, name)
