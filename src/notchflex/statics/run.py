@@ -80,7 +80,7 @@ def stability(chain: Chain, commands: Command, solved: Solved) -> tuple[np.ndarr
     held = np.asarray(stiffness)[:count]
     whole = np.isfinite(held).all(axis=(1, 2))
     eigenvalue = np.full(count, np.nan)
-    eigenvalue[whole] = np.linalg.eigvals(held[whole]).real.min(axis=-1)
+    eigenvalue[whole] = np.real(np.linalg.eigvals(held[whole])).min(axis=-1)
     return eigenvalue, np.asarray(sign)[:count]
 
 
