@@ -1,8 +1,12 @@
 """The cross-section that a cut leaves of a tube, as the numbers a rod needs."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
-from notchflex._jax import jax
+import numpy as np
+from jax.typing import ArrayLike
+
+from notchflex._jax import array_module, jax
 
 
 class Section(NamedTuple):
@@ -38,3 +42,27 @@ class Section(NamedTuple):
     shear_centre: jax.Array
     edge_near: jax.Array
     edge_spine: jax.Array
+
+
+def plain_or_compiled(
+    properties: Callable[[jax.Array, jax.Array, jax.Array], Section],
+) -> Callable[[ArrayLike, ArrayLike, ArrayLike], Section]:
+    """Let a formula for arrays of one shape take radii and depth in any form.
+
+    Args:
+        properties: Section of outer radius, inner radius and depth, written with `array_module`.
+
+    Returns:
+        The same for numbers and arrays that broadcast: by NumPy where they are plain, compiled
+        by JAX where one is an array of JAX or traced.
+    """
+    compiled = jax.jit(properties)
+
+    def section(outer: ArrayLike, inner: ArrayLike, depth: ArrayLike) -> Section:
+        xp = array_module(outer, inner, depth)
+        chosen = properties if xp is np else compiled
+        return chosen(
+            *(xp.asarray(value, dtype=float) for value in xp.broadcast_arrays(outer, inner, depth))
+        )
+
+    return section

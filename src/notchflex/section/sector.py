@@ -7,11 +7,9 @@ after York 2015). Every depth opens the tube, even one that leaves part of the i
 
 from fractions import Fraction
 
-import numpy as np
-
 from notchflex._jax import array_module, jax
 from notchflex.section.angles import cancelling_sum, half_angle
-from notchflex.section.section import Section
+from notchflex.section.section import Section, plain_or_compiled
 from notchflex.section.sector_torsion import sector_shear_centre, sector_torsion_constant
 
 # a − sin a cos a
@@ -73,10 +71,7 @@ def annular_sector(
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
         0.125376 mm², 0.686533 mm
     """
-    xp = array_module(outer_radius, inner_radius, depth)
-    outer, inner, depth = xp.broadcast_arrays(outer_radius, inner_radius, depth)
-    properties = _properties if xp is np else _compiled
-    return properties(*(xp.asarray(x, dtype=float) for x in (outer, inner, depth)))
+    return _section(outer_radius, inner_radius, depth)
 
 
 def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
@@ -118,4 +113,4 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     )
 
 
-_compiled = jax.jit(_properties)
+_section = plain_or_compiled(_properties)

@@ -7,11 +7,9 @@ at r_i: a closed tube with a flat, an open arc with bevelled ends, a solid segme
 
 from fractions import Fraction
 
-import numpy as np
-
 from notchflex._jax import array_module, jax
 from notchflex.section.angles import cancelling_sum, half_angle
-from notchflex.section.section import Section
+from notchflex.section.section import Section, plain_or_compiled
 from notchflex.section.segment_torsion import segment_torsion
 
 # Moments of a segment of the unit circle beyond the chord at height cos α, w measured from the
@@ -80,10 +78,7 @@ def annular_segment(
         >>> print(f"{section.area:.6f} mm², {section.centroid:.6f} mm")
         0.111621 mm², 0.701661 mm
     """
-    xp = array_module(outer_radius, inner_radius, depth)
-    outer, inner, depth = xp.broadcast_arrays(outer_radius, inner_radius, depth)
-    properties = _properties if xp is np else _compiled
-    return properties(*(xp.asarray(x, dtype=float) for x in (outer, inner, depth)))
+    return _section(outer_radius, inner_radius, depth)
 
 
 def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section:
@@ -135,4 +130,4 @@ def _properties(outer: jax.Array, inner: jax.Array, depth: jax.Array) -> Section
     )
 
 
-_compiled = jax.jit(_properties)
+_section = plain_or_compiled(_properties)

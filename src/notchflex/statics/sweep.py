@@ -55,12 +55,10 @@ class Step(NamedTuple):
     Attributes:
         unknowns: Change of the unknowns.
         base_tension: Change of the base tensions, N.
-        sign: Sign of the determinant of the whole system.
     """
 
     unknowns: Unknowns
     base_tension: Float[Array, " t"]
-    sign: Float[Array, ""]
 
 
 def element_blocks(chain: Chain, unknowns: Unknowns, memory: Memory, at: Evaluation) -> Blocks:
@@ -137,7 +135,7 @@ def linear_step(
     start, _ = ravel_pytree(leave_base(chain, base_tension))
 
     def eliminate(tail: Any, item: Any) -> tuple[Any, Any]:
-        matrix, constant, sign = tail
+        matrix, constant = tail
         block, imbalance = item
         seen = block.beyond @ matrix
         right = jnp.concatenate(
@@ -147,7 +145,7 @@ def linear_step(
             ],
             axis=1,
         )
-        solution, own_sign = _solve(block.unknown + seen @ block.on_by_unknown, right)
+        solution = _solve(block.unknown + seen @ block.on_by_unknown, right)
         fixed, gain = solution[:, 0], solution[:, 1:]
         back = block.back_by_beyond @ matrix
         by_unknown = block.back_by_unknown + back @ block.on_by_unknown
@@ -155,12 +153,11 @@ def linear_step(
         tail = (
             by_carried + by_unknown @ gain,
             block.back_by_beyond @ constant + by_unknown @ fixed,
-            sign * own_sign,
         )
         return tail, (fixed, gain)
 
-    tip = (jnp.zeros((len(nothing), len(start))), jnp.zeros_like(nothing), jnp.ones(()))
-    (matrix, constant, sign), (fixed, gain) = jax.lax.scan(
+    tip = (jnp.zeros((len(nothing), len(start))), jnp.zeros_like(nothing))
+    (matrix, constant), (fixed, gain) = jax.lax.scan(
         eliminate, tip, (blocks, residual), reverse=True
     )
 
@@ -176,7 +173,7 @@ def linear_step(
     held = _HELD * jnp.diag(command.by_stroke.astype(float))
     border = by_tension + by_base @ matrix @ leave + held
     imbalance = demand(base_tension, flat_base) + by_base @ constant
-    tension_step, border_sign = _solve(border, -imbalance[:, None])
+    tension_step = _solve(border, -imbalance[:, None])
 
     def substitute(carried: Array, item: Any) -> tuple[Array, Array]:
         block, own_fixed, own_gain = item
@@ -185,12 +182,10 @@ def linear_step(
 
     _, steps = jax.lax.scan(substitute, leave @ tension_step[:, 0], (blocks, fixed, gain))
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
-    return Step(jax.vmap(unknowns_of)(steps), tension_step[:, 0], sign * border_sign)
+    return Step(jax.vmap(unknowns_of)(steps), tension_step[:, 0])
 
 
-def _solve(matrix: Float[Array, "u u"], right: Float[Array, "u r"]) -> tuple[Array, Array]:
-    """Solution of a small system, and the sign of its determinant."""
+def _solve(matrix: Float[Array, "u u"], right: Float[Array, "u r"]) -> Float[Array, "u r"]:
+    """Solution of a small system."""
     factors, pivots, _ = jax.lax.linalg.lu(matrix)
-    swaps = jnp.sum(pivots != jnp.arange(len(pivots)))
-    sign = jnp.prod(jnp.sign(jnp.diagonal(factors))) * jnp.where(swaps % 2 == 0, 1.0, -1.0)
-    return jax.scipy.linalg.lu_solve((factors, pivots), right), sign
+    return jax.scipy.linalg.lu_solve((factors, pivots), right)
