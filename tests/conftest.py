@@ -18,6 +18,11 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["JAX_ENABLE_X64"] = "1"
     # A shape that does not fit must not be stretched in silence.
     os.environ["JAX_NUMPY_RANK_PROMOTION"] = "raise"
+    # Most of the time goes into compiling programs that are run a few times. Unoptimised code is
+    # compiled in a third of the time; that the optimised code of users finds the same numbers is
+    # a test of its own (tests/statics/test_as_users_run_it.py).
+    flags = os.environ.get("XLA_FLAGS", "")
+    os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_optimization_level=0".strip()
     # Compiled code is kept beside pytest's own cache, for the other process of `-n 2` and later.
     cache = getattr(config, "cache", None)
     if cache is not None:

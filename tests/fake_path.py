@@ -6,11 +6,13 @@ right shapes and sizes.
 """
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from notchflex import load_robot
+from notchflex.statics.external import NOTHING
 
 CENTROID = 0.6865  # mm, of the section of wrist A
 CLOSING = np.radians(30.63)
@@ -51,6 +53,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
     columns = {
         "tension": tension[:, None],
         "stroke": (angle * (0.7 + CENTROID)).sum(axis=1)[:, None],
+        "load": SimpleNamespace(external=(NOTHING,) * count),
         "commanded_tension": tension[:, None],
         "commanded_stroke": np.full((count, 1), np.nan),
         "notch_angle": angle,

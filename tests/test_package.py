@@ -20,6 +20,9 @@ NAMES = [
     "simulate", "Equilibrium", "Path", "State", "tip_from_angles", "equal_stroke", "closing",
     "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError", "draw",
     "solve_each", "bodies_from_angles", "SharedStroke", "Closing", "ConvergenceError", "Settings",
+    "BodyForce",
+    "StripNotch", "ULink", "Corner",
+    "Elastica", "elastica", "modulus_from_single_notch",
 ]
 # fmt: on
 

@@ -16,12 +16,15 @@ _HOME = {
         (
             "ArcNotch",
             "Capstan",
+            "Corner",
             "Frictionless",
             "Linear",
             "Robot",
+            "StripNotch",
             "Superelastic",
             "Tendon",
             "Tube",
+            "ULink",
             "json_schema",
             "list_robots",
             "load_robot",
@@ -30,8 +33,10 @@ _HOME = {
         "notchflex.robot",
     ),
     **dict.fromkeys(("Section", "annular_sector", "annular_segment"), "notchflex.section"),
+    **dict.fromkeys(("Elastica", "elastica", "modulus_from_single_notch"), "notchflex.flexure"),
     **dict.fromkeys(
         (
+            "BodyForce",
             "Closing",
             "ConvergenceError",
             "Equilibrium",

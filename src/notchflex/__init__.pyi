@@ -1,13 +1,19 @@
 from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
+from notchflex.flexure import Elastica as Elastica
+from notchflex.flexure import elastica as elastica
+from notchflex.flexure import modulus_from_single_notch as modulus_from_single_notch
 from notchflex.robot import ArcNotch as ArcNotch
 from notchflex.robot import Capstan as Capstan
+from notchflex.robot import Corner as Corner
 from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
 from notchflex.robot import Robot as Robot
+from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic
 from notchflex.robot import Tendon as Tendon
 from notchflex.robot import Tube as Tube
+from notchflex.robot import ULink as ULink
 from notchflex.robot import json_schema as json_schema
 from notchflex.robot import list_robots as list_robots
 from notchflex.robot import load_robot as load_robot
@@ -15,6 +21,7 @@ from notchflex.robot import save_robot as save_robot
 from notchflex.section import Section as Section
 from notchflex.section import annular_sector as annular_sector
 from notchflex.section import annular_segment as annular_segment
+from notchflex.statics import BodyForce as BodyForce
 from notchflex.statics import Closing as Closing
 from notchflex.statics import ConvergenceError as ConvergenceError
 from notchflex.statics import Equilibrium as Equilibrium

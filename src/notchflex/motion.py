@@ -55,6 +55,13 @@ class Motion(NamedTuple):
         moment = self.rotation @ inside[:3] + skew(self.translation) @ force
         return array_module(inside).concatenate([moment, force])
 
+    def wrenches(self, inside: Float[Array, "k 6"]) -> Float[Array, "k 6"]:
+        """Several wrenches about the inner origin, about and along the outer frame."""
+        xp = array_module(inside)
+        force = inside[:, 3:] @ self.rotation.T
+        moment = inside[:, :3] @ self.rotation.T + force @ skew(self.translation).T
+        return xp.concatenate([moment, force], axis=-1)
+
 
 def identity() -> Motion:
     """The motion that moves nothing."""
@@ -97,6 +104,20 @@ def exponential(twist: Float[Array, " 6"]) -> Motion:
     cross_twice = cross @ cross
     rotation = constant(np.eye(3)) + first * cross + second * cross_twice
     return Motion(rotation, linear + second * (cross @ linear) + third * (cross_twice @ linear))
+
+
+def bracket(first: Float[Array, " 6"], second: Float[Array, " 6"]) -> Float[Array, " 6"]:
+    """Lie bracket of two twists: how far following one and then the other depends on the order."""
+    xp = array_module(first, second)
+    turn, other = skew(first[:3]), skew(second[:3])
+    return xp.concatenate([turn @ second[:3], turn @ second[3:] - other @ first[3:]])
+
+
+def adjoint(motion: Motion) -> Float[Array, "6 6"]:
+    """Matrix that takes a twist of the inner frame to the outer one."""
+    xp = array_module(motion.rotation)
+    moved = skew(motion.translation) @ motion.rotation
+    return xp.block([[motion.rotation, xp.zeros((3, 3))], [moved, motion.rotation]])
 
 
 def rotation_about(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:

@@ -8,6 +8,7 @@ import pytest
 
 from fake_path import fake_path
 from notchflex.results.json import json_text, path_document, write_json
+from notchflex.statics.external import NOTHING, BodyForce, ExternalLoad
 
 
 def test_document_is_strict_json_and_holds_every_step():
@@ -35,6 +36,34 @@ def test_step_holds_lists_per_tendon_and_degrees():
     assert set(step["contacts"][0][0]) == {"log_ratio", "slid_mm", "state"}
     assert step["closed"] == [bool(closed) for closed in path.closed[2]]
     assert type(step["iterations"]) is int
+
+
+def test_loads_from_outside_are_told_of_every_step_where_there_are_any():
+    path = fake_path(2)
+    side = BodyForce(2, (0.1, 0.0, 0.0), point=(0.8, 0.0, 0.0))
+    one = ExternalLoad(tip_force=(0.0, 0.0, -0.2), tip_mass=5.0, body_forces=[side])
+    path.columns["load"].external = (NOTHING, one, NOTHING, NOTHING)
+    document = json.loads(json_text(path_document(path)))
+    nothing, told = (step["load"] for step in document["steps"][:2])
+    assert told["tension_N"] == [3.0]
+    assert told["tip_force_N"] == [0.0, 0.0, -0.2]
+    assert told["tip_mass_g"] == 5.0
+    assert told["gravity_m_s2"] is None
+    assert told["body_forces"] == [
+        {
+            "body": 2,
+            "force_N": [0.1, 0.0, 0.0],
+            "moment_Nmm": [0.0, 0.0, 0.0],
+            "point_mm": [0.8, 0.0, 0.0],
+            "following": False,
+        }
+    ]
+    assert nothing.keys() == told.keys()
+    assert nothing["tip_force_N"] == [0.0, 0.0, 0.0]
+    units = document["units"]
+    assert {key.partition(".")[2] for key in units if key.startswith("load.")} >= {
+        key for key in told if key not in ("following", "body_forces")
+    }
 
 
 def test_spans_end_where_the_tendon_ends():

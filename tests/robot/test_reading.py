@@ -115,9 +115,10 @@ OUTSIDE = [
     (('"on-axis"', '"onaxis"'), ["`notch[1].cut`", '"on-axis"', '"off-axis"', "did you mean"]),
     (('kind = "capstan"', 'kind = "capstn"'), ["`friction.kind`", "did you mean `capstan`"]),
     (('kind = "superelastic"', 'kind = "x"'), ["`material.kind`", '"linear", "superelastic"']),
-    (('kind = "arc"', 'kind = "v"'), ["`notch[1].kind`", '"arc"']),
+    (('kind = "arc"', 'kind = "v"'), ["`notch[1].kind`", '"arc", "strip", "u-link"']),
     (("coefficient = 0.13", 'coefficient = 0.1\nwrap = "x"'), ["`friction.wrap`", "whole-before"]),
     (("radius = 0.70", 'radius = 0.70\npath = "arc"'), ["`tendon[1].path`", '"wall-arc"']),
+    (("radius = 0.70", 'radius = 0.70\npath = "straight-ded"'), ["mean `straight-dead`?"]),
     # unknown keys
     (("depth = 1.4", "dept = 1.4"), ["`notch[1].dept`", "did you mean `depth`?", "Allowed: kind"]),
     (("radius = 0.70", "radius = 0.70\ncolour = 1"), ["`tendon[1].colour`", "Allowed: radius"]),
@@ -126,7 +127,10 @@ OUTSIDE = [
     # missing keys
     (('cut = "on-axis"\n', ""), ["`notch[1].cut` is missing", "annular sector", "annular segment"]),
     (("elastic_modulus = 10000\n", ""), ["`material.elastic_modulus` is missing", "[MPa]"]),
-    (('kind = "capstan"\n', ""), ["`friction.kind` is missing", '"capstan", "frictionless"']),
+    (
+        ('kind = "capstan"\n', ""),
+        ["`friction.kind` is missing", '"capstan", "corner", "frictionless"'],
+    ),
     (("[[tendon]]\nradius = 0.70\n", ""), ["`tendon` is missing", "[[tendon]]"]),
     (("[[tendon]]", "[tendon]"), ["`tendon`", "a table", "[[tendon]]"]),
     (("[[tendon]]\nradius = 0.70\n", "[tendon]\n"), ["`tendon`", "[[tendon]]"]),

@@ -10,12 +10,15 @@ from notchflex.robot.reading import READY
 from shared_data import measured, numbers
 
 NAMES = [
+    "gao2017",
+    "liu2022",
     "pacheco2021-a",
     "pacheco2021-a-specimen",
     "pacheco2021-b",
     "pacheco2021-b-specimen",
     "pacheco2021-c",
     "pacheco2021-c-specimen",
+    "two-axis-wrist",
     "york2015",
 ]
 
@@ -92,6 +95,56 @@ def test_york():
     assert robot.tendon[0].radius == robot.tube.inner_radius
     assert robot.material.elastic_modulus == 40e3
     assert robot.friction.coefficient == 0.2
+
+
+def test_liu():
+    robot = nf.load_robot("liu2022")
+    assert (robot.tube.outer_diameter, robot.tube.inner_diameter) == (10.0, 6.0)  # Table 2
+    (row,) = robot.notch
+    assert (row.strip_thickness, row.height, row.depth, row.repeat) == (1.5, 3.5, 6.9, 7)
+    # the file says what the defaults are
+    bare = nf.StripNotch(height=3.5, strip_thickness=1.5, depth=6.9)
+    assert row.strip_length == bare.strip_length_in(robot.tube) == 8.0
+    assert row.wall_width == bare.wall_width_in(robot.tube) == 4.0
+    assert row.deflection == "large"
+    assert [(one.radius, one.direction_deg) for one in robot.tendon] == [(4.0, 0.0), (4.0, 180.0)]
+    assert {one.path for one in robot.tendon} == {"straight"}
+    assert (robot.material.kind, robot.material.elastic_modulus) == ("linear", 1000.406)
+    assert robot.friction == nf.Corner(0.2)
+
+
+def test_gao():
+    robot = nf.load_robot("gao2017")
+    assert robot.number_of_notches == 27
+    assert robot.notch[0].slots == 28
+    assert robot.notches[0].proximal_slot == robot.notches[26].proximal_slot == "away"
+    assert (robot.material.elastic_modulus, robot.friction) == (22e3, nf.Corner(0.66))
+    assert robot.tube.base_length == robot.notch[0].uncut_length
+
+
+@pytest.mark.parametrize("name", ["gao2017", "liu2022"])
+def test_what_is_estimated_is_marked(name: str):
+    # dimensions that no paper prints: physics of the file's head
+    known = {
+        "gao2017": {"elastic_modulus", "coefficient", "repeat"},
+        "liu2022": {"outer_diameter", "inner_diameter", "height", "strip_thickness", "depth"}
+        | {"strip_length", "repeat", "radius", "elastic_modulus"},
+    }[name]
+    words = {"name", "kind", "path", "turning", "deflection", "proximal_slot"}
+    words |= {"direction_deg", "precurvature_deg", "end_body", "axial_stiffness", "free_length"}
+    for line in (READY / f"{name}.toml").read_text().splitlines():
+        key = line.partition("=")[0].strip()
+        if "=" in line.partition("#")[0] and key not in words:
+            assert ("estimate" in line.partition("#")[2]) == (key not in known), line
+
+
+def test_two_axis_wrist():
+    robot = nf.load_robot("two-axis-wrist")
+    sides = [0.0, 90.0, 180.0, 270.0]
+    assert [notch.direction_deg for notch in robot.notches] == sides * 2
+    assert [tendon.direction_deg for tendon in robot.tendon] == sides
+    assert {tendon.path for tendon in robot.tendon} == {"wall-arc"}
+    assert "(example)" in robot.name
 
 
 @pytest.mark.parametrize("name", NAMES)

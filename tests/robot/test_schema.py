@@ -25,6 +25,13 @@ def test_what_a_file_must_hold():
     assert arc["properties"]["depth"]["exclusiveMinimum"] == 0
     assert arc["properties"]["depth"]["unit"] == "mm"
     assert arc["properties"]["repeat"]["minimum"] == 1
+    strip = schema["$defs"]["StripNotch"]
+    assert strip["required"] == ["kind", "height", "strip_thickness", "depth"]
+    assert "default" not in strip["properties"]["strip_length"]
+    assert strip["properties"]["strip_length"]["exclusiveMinimum"] == 0
+    link = schema["$defs"]["ULink"]
+    assert link["properties"]["proximal_slot"]["enum"] == ["away", "toward"]
+    assert link["properties"]["uncut_length"]["default"] == 0.0
     assert "default" not in schema["$defs"]["Tendon"]["properties"]["axial_stiffness"]
     assert schema["properties"]["notch"]["minItems"] == 1
 
@@ -45,4 +52,5 @@ def test_every_kind_is_in_it(base: type):
     for kind, cls in kinds_of(base).items():
         assert defs[cls.__name__]["properties"]["kind"]["const"] == kind
         # found by its file, which is named after it
-        import_module(f"notchflex.robot.{base.__name__.lower()}_{kind}")
+        file = f"{base.__name__.lower()}_{kind}".replace("-", "_")
+        import_module(f"notchflex.robot.{file}")

@@ -180,6 +180,16 @@ notches = st.builds(
     precurvature_deg=st.floats(-30, 0),
     repeat=st.integers(1, 9),
 )
+strips = st.builds(
+    nf.StripNotch,
+    height=lengths,
+    strip_thickness=lengths,
+    depth=st.floats(1.001, 1.999),
+    strip_length=st.none() | lengths,
+    wall_width=st.none() | lengths,
+    deflection=st.sampled_from(["large", "small"]),
+    repeat=st.integers(1, 9),
+)
 tendons = st.builds(
     nf.Tendon,
     radius=st.floats(1e-3, 1.0),
@@ -199,8 +209,45 @@ robots = st.builds(
     notch=st.lists(notches, min_size=1, max_size=4).map(tuple),
     tendon=st.lists(tendons, min_size=1, max_size=3).map(tuple),
     material=materials,
-    friction=st.builds(nf.Frictionless) | st.builds(nf.Capstan, st.floats(0, 2)),
+    friction=st.builds(nf.Frictionless)
+    | st.builds(nf.Capstan, st.floats(0, 2))
+    | st.builds(nf.Corner, st.floats(0, 2), turning=st.sampled_from(["slope", "chord"])),
 )
+rows = st.builds(
+    nf.ULink,
+    slot_radius=st.just(0.1),  # neighbours share it
+    strip_thickness=st.floats(0.1, 0.5),
+    strip_length=st.floats(0.1, 0.8),
+    proximal_slot=st.sampled_from(["away", "toward"]),
+    uncut_length=st.floats(0, 1e3),
+    repeat=st.integers(1, 9),
+)
+straight = st.builds(
+    nf.Tendon,
+    radius=st.floats(0.5, 1.0),
+    direction_deg=st.sampled_from([0.0, 180.0, 340.0]),
+    path=st.sampled_from(["straight", "straight-dead", "straight-follower"]),
+)
+strip_robots = st.builds(
+    nf.Robot,
+    name=st.just("strips and links"),
+    tube=st.builds(nf.Tube, st.just(2.0), st.floats(0.1, 1.9)),
+    notch=st.tuples(strips, notches, rows) | st.tuples(rows, strips),
+    tendon=st.lists(straight, min_size=1, max_size=3).map(tuple),
+    material=materials,
+    friction=st.builds(nf.Corner, st.floats(0, 2)),
+)
+robots |= strip_robots
+
+
+@given(robot=strip_robots, data=st.data())
+def test_any_notch_of_any_row_is_split_off(robot: nf.Robot, data: st.DataObject):
+    number = data.draw(st.integers(1, robot.number_of_notches))
+    key = "strip_length" if robot.notches[number - 1].kind == "u-link" else "height"
+    new = robot.with_value(f"notch[{number}].{key}", 0.35)
+    differ = [i for i, (a, b) in enumerate(zip(robot.notches, new.notches, strict=True)) if a != b]
+    assert differ in ([], [number - 1])
+    assert robot_from_text(robot_text(new, robot_text(robot))) == new
 
 
 @given(robot=robots, other=robots)

@@ -20,7 +20,7 @@ def chain():
 @pytest.fixture
 def file(tmp_path, chain):
     path = tmp_path / "state.json"
-    State("wrist", at_rest(chain)).save(path)
+    State("wrist", at_rest(chain), "tendons", loaded=False, refinement=0).save(path)
     return path
 
 
@@ -32,7 +32,7 @@ def test_a_saved_state_is_read_back(file, chain):
 @pytest.mark.parametrize("name", ["missing/state.json", ".", "null\0"])
 def test_states_that_cannot_be_written(tmp_path, chain, name):
     with pytest.raises(InputError, match="the state cannot be written to"):
-        State("wrist", at_rest(chain)).save(tmp_path / name)
+        State("wrist", at_rest(chain), "tendons", loaded=False, refinement=0).save(tmp_path / name)
 
 
 @pytest.mark.parametrize("wrong", ["drop", "nan", "text", "huge", "null"])

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, cast
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from notchflex._jax import constant, jax, jnp
+from notchflex.chain.mass import body_masses
+from notchflex.contact import LipGroup, lay_lips
 from notchflex.flexure import (
     FlexureState,
     Rod,
@@ -17,17 +19,20 @@ from notchflex.flexure import (
     flexure_state,
     relative_pose,
     rod,
+    stack,
+    with_level,
 )
 from notchflex.friction import FrictionLaw, friction_law
 from notchflex.material import SectionLaw, section_law
-from notchflex.motion import Motion
+from notchflex.motion import Motion, rotation_about
 from notchflex.robot import Robot
-from notchflex.tendon import TendonGroup, route
+from notchflex.tendon import Ground, TendonGroup, route
 
 # Axial stiffness of a tendon that only tells apart how much has slid over two stuck contacts of
 # one rigid piece, between which an inextensible tendon would leave the tension open: so many
 # times the force that would close a notch by its own stiffness (1e6 N for wrist A).
 MEMORY_STIFFNESS = 4e5
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 class Chain(eqx.Module):
@@ -36,16 +41,26 @@ class Chain(eqx.Module):
     Attributes:
         rods: The flexures, each from the frame of body j - 1 to that of body j. A body's frame
             lies on the tube axis at its proximal face.
-        memory: Memory of the material at every interval of every flexure.
+        memory: Memory of the material at every node of every flexure.
         law: The material.
         friction: The friction between tendons and tube.
         groups: The tendons, by the way they run.
+        lips: The lips that close notches, by their kind.
         axial_stiffness: Axial stiffness of each tendon, infinite where inextensible, N.
         free_length: Length of each tendon before its first contact, from its actuator on and
             through the base, mm.
-        body_length: Axial length of each body, mm.
+        body_length: Length of each body on the tube axis, mm.
+        body_mass: Mass of each body, g; 0 where the material has no density.
+        body_centre: Its centre, in its frame, mm.
         stiffness: Stiffness of each mode in the free robot, N mm; the scale of residuals.
         lip_stiffness: Stiffness of each notch at its lips in the free robot, N/mm.
+        notch_frame: Rotation from the frame of every notch, turned by its direction, to the tube.
+        tendon_place: Where each tendon enters the base, mm.
+        contacts: For every tendon, at which edges of which gaps it meets the wall: indices into
+            (flexure, edge) flattened, -1 to fill up.
+        level: For which loads the flexures have modes enough.
+        loaded: Whether loads other than the tendons' act.
+        refinement: How many more modes the flexures have than for usual loads.
     """
 
     rods: Rod
@@ -53,11 +68,20 @@ class Chain(eqx.Module):
     law: SectionLaw
     friction: FrictionLaw
     groups: tuple[TendonGroup, ...]
+    lips: tuple[LipGroup, ...]
     axial_stiffness: Float[Array, " t"]
     free_length: Float[Array, " t"]
     body_length: Float[Array, " bodies"]
+    body_mass: Float[Array, " bodies"]
+    body_centre: Float[Array, "bodies 3"]
     stiffness: Float[Array, "n modes"]
     lip_stiffness: Float[Array, " n"]
+    notch_frame: Float[Array, "n 3 3"]
+    tendon_place: Float[Array, "t 3"]
+    contacts: Int[Array, "t edges"]
+    level: str = eqx.field(static=True)
+    loaded: bool = eqx.field(static=True)
+    refinement: int = eqx.field(static=True)
 
     @property
     def flexures(self) -> int:
@@ -72,7 +96,8 @@ class Chain(eqx.Module):
     @property
     def forces_on_bodies(self) -> bool:
         """Whether any force acts on a body, so that poses enter the balance."""
-        return any(group.acts_on_bodies for group in self.groups)
+        parts = (*self.groups, *self.lips)
+        return self.loaded or any(part.acts_on_bodies for part in parts)
 
     @property
     def memory_stiffness(self) -> Float[Array, " t"]:
@@ -82,19 +107,27 @@ class Chain(eqx.Module):
 
 
 @lru_cache(maxsize=64)
-def prepared(robot: Robot) -> Chain:
+def prepared(
+    robot: Robot, level: str = "tendons", *, loaded: bool = False, refinement: int = 0
+) -> Chain:
     """The chain of a robot, kept where compiled programs take it from without copying.
 
     The last robots asked for are remembered: a control loop solves the same one again and again.
     """
-    return jax.device_put(assemble(robot))
+    return jax.device_put(assemble(robot, level, loaded=loaded, refinement=refinement))
 
 
-def assemble(robot: Robot) -> Chain:
+def assemble(
+    robot: Robot, level: str = "tendons", *, loaded: bool = False, refinement: int = 0
+) -> Chain:
     """Turn the description of a robot into the arrays of its chain.
 
     Args:
         robot: The description.
+        level: For which loads: "tendons" alone, loads in the "plane" of bending, or in "space".
+            More modes of the flexures are kept the more is asked for.
+        loaded: Whether loads other than the tendons' act.
+        refinement: How many times more modes than the flexures need for usual loads.
 
     Returns:
         Its chain.
@@ -104,28 +137,50 @@ def assemble(robot: Robot) -> Chain:
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    alone = [rod(notch, robot.tube) for notch in robot.notches]
-    rods = jax.tree.map(lambda *leaves: np.stack(leaves), *alone)
+    notches = robot.notches
+    unlike = {
+        notch: with_level(rod(notch, robot.tube, refinement), level)
+        for notch in dict.fromkeys(notches)
+    }
+    rods = stack([unlike[notch] for notch in notches])
+    following = [*notches[1:], None]
     body_length = constant(
-        [robot.tube.base_length, *(notch.uncut_length for notch in robot.notches)]
+        [
+            robot.tube.base_length,
+            *(one.spacing(behind) for one, behind in zip(notches, following, strict=True)),
+        ]
     )
-    lead = body_length[:-1, None] * np.array([0.0, 0.0, 1.0])
+    lead = body_length[:-1, None] * _UP
     rods = eqx.tree_at(lambda rods: rods.start_offset, rods, rods.start_offset + lead)
+    body_mass, body_centre = body_masses(robot, rods)
     law = section_law(robot.material)
     stiffness = _mode_stiffness(rods, law)
-    lip_slope = np.einsum("nc,nicm,ni->nm", fibre_stretch(rods.lip), rods.basis, rods.length)
     tendons = robot.tendon
+    chord = getattr(robot.friction, "turning", None) == "chord"
+    ground = Ground(notches, rods, _free_poses(rods), body_length, turns_with_chord=chord)
+    laid = route(tendons, ground)
     return Chain(
         rods=rods,
         memory=(),
         law=law,
         friction=friction_law(robot.friction),
-        groups=route(tendons, rods, _free_poses(rods), body_length),
+        groups=laid.groups,
+        lips=lay_lips(notches, robot.tube, rods, body_length),
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
-        free_length=constant([robot.tube.base_length + tendon.free_length for tendon in tendons]),
+        free_length=constant(laid.base_length + [tendon.free_length for tendon in tendons]),
         body_length=body_length,
+        body_mass=constant(body_mass),
+        body_centre=constant(body_centre),
         stiffness=constant(stiffness),
-        lip_stiffness=1.0 / np.sum(lip_slope**2 / stiffness, axis=-1),
+        lip_stiffness=constant(_lip_stiffness(rods, stiffness, robot.tube.outer_radius)),
+        notch_frame=constant(
+            [rotation_about(_UP * np.radians(notch.direction_deg)) for notch in notches]
+        ),
+        tendon_place=laid.place,
+        contacts=_contacts(laid.groups, len(tendons)),
+        level=level,
+        loaded=loaded,
+        refinement=refinement,
     )
 
 
@@ -148,7 +203,7 @@ def _free_poses(rods: Rod) -> Motion:
 
 
 def _mode_stiffness(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes"]:
-    """Diagonal of every flexure's stiffness in the free robot."""
+    """Diagonal of every flexure's stiffness in the free robot; 1 for modes that fill up."""
     stiffness = []
     for rod_of_one in _each(rods):
         sections = [
@@ -158,4 +213,33 @@ def _mode_stiffness(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes"]:
         of_section = np.stack([law.stiffness(section) for section in sections])
         basis = rod_of_one.basis
         stiffness.append(np.einsum("i,iam,iab,ibm->m", rod_of_one.length, basis, of_section, basis))
-    return np.stack(stiffness)
+    return np.stack(stiffness) + rods.idle
+
+
+def _lip_stiffness(
+    rods: Rod, stiffness: Float[np.ndarray, "n modes"], outer_radius: float
+) -> Float[np.ndarray, " n"]:
+    """How hard a notch alone is to close at its lips, N/mm: the scale of contact forces.
+
+    Lips opposite a spine move with their fibre; where edges meet, by their distance from the
+    tube axis times the turn of the distal body.
+    """
+    fibre = np.einsum("nc,nicm,ni->nm", fibre_stretch(rods.lip), rods.basis, rods.length)
+    turn = np.einsum(
+        "nab,nibm,ni->nam", rods.start_rotation, rods.followed_basis[:, :, :3], rods.length
+    )
+    edge = outer_radius * np.linalg.norm(turn[:, :2], axis=1)
+    slope = np.where(rods.lip_closes[:, None] > 0.0, fibre, edge)
+    return 1.0 / np.sum(slope**2 * (1.0 - rods.idle) / stiffness, axis=-1)
+
+
+def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:
+    """Where every tendon meets the wall, base to tip: twice as many edges as bodies visited."""
+    met: list[np.ndarray] = [np.zeros(0, int)] * tendons
+    for group in groups:
+        for column, number in enumerate(group.numbers):
+            flexures = np.flatnonzero(np.asarray(group.visits)[:, column])
+            met[number] = (2 * flexures[:, None] + np.arange(2)).ravel()
+    most = max(len(edges) for edges in met)
+    filled = [np.pad(edges, (0, most - len(edges)), constant_values=-1) for edges in met]
+    return cast("Array", np.stack(filled))

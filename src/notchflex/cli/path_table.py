@@ -9,7 +9,9 @@ import numpy as np
 from rich.table import Table
 
 from notchflex.cli import terminal
+from notchflex.cli.load_words import load_sentences
 from notchflex.results.quantities import AXES, QUANTITIES
+from notchflex.results.spans import holds
 
 if TYPE_CHECKING:
     from notchflex.statics import Path
@@ -36,6 +38,8 @@ def print_path(path: Path) -> None:
     """Print the steps of a path with units: not all rows of a long one, what fits of a wide one."""
     console = terminal.output()
     console.print(path.robot.name, style="bold", soft_wrap=True)
+    for sentence in load_sentences(path.load.external):
+        console.print(sentence, soft_wrap=True)
     rows = telling_rows(path)
     columns, left_out = _fitting(_groups(path, rows), terminal.NARROW)
     table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
@@ -134,6 +138,9 @@ def _groups(path: Path, rows: list[int]) -> list[Group]:
                     column.cells[place] = _rounded(float(command[row]), ".3f")
         commanded = np.isfinite([path.commanded_tension, path.commanded_stroke])[..., tendon].any()
         groups.append(Group(f"tendon {tendon + 1}", 1 if commanded else 5, [tension, stroke]))
+    if holds(path, QUANTITIES["total_chord_angle"]):
+        chord = numbers("total_chord_angle", "chords", path.total_chord_angle, ".2f")
+        groups.append(Group("total chord angle", 2, [chord]))
     groups.append(Group("notch angles", 4, [_notch(path, j, rows) for j in _notches(path)]))
     groups.append(
         Group("total angle", 2, [numbers("total_angle", "total", path.total_angle, ".2f")])

@@ -8,6 +8,17 @@ import numpy as np
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.loads import (
+    BodyForces,
+    Following,
+    Gravity,
+    TipForce,
+    TipMass,
+    TipMoment,
+    TipPoint,
+    parse_loads,
+    put_on,
+)
 from notchflex.cli.options import (
     OUTPUT,
     CsvFile,
@@ -65,6 +76,20 @@ def simulate(
             help="Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`.",
         ),
     ] = None,
+    tip_force: TipForce = None,
+    tip_moment: TipMoment = None,
+    tip_point: TipPoint = None,
+    body_force: BodyForces = (),
+    tip_mass: TipMass = None,
+    gravity: Gravity = None,
+    following: Following = False,
+    refinement: Annotated[
+        int,
+        Parameter(
+            help="0 to 3: more strain modes in every notch. A result that stays the same can be "
+            "trusted.",
+        ),
+    ] = 0,
     settings: Settings = (),
     from_state: Annotated[
         str | None,
@@ -92,7 +117,19 @@ def simulate(
     if plot is not None:
         check_picture(plot, "--plot", inputs=inputs)
     chosen = chosen_robot(robot, settings)
-    tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
+    loads = parse_loads(
+        tip_force=tip_force,
+        tip_moment=tip_moment,
+        tip_point=tip_point,
+        body_force=body_force,
+        tip_mass=tip_mass,
+        gravity=gravity,
+        following=following,
+    )
+    if loads and not tension and not stroke:  # the tendons hang slack, in one step
+        tensions = strokes = np.full((1, chosen.number_of_tendons), np.nan)
+    else:
+        tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
     turn = np.zeros(3)
     if base_rotation is not None:
         turn = np.radians(parse_vector(base_rotation, "--base-rotation", "angles in deg"))
@@ -103,10 +140,9 @@ def simulate(
 
         use_compile_cache()
         start = None if from_state is None else statics.State.load(from_state)
+        pulled = statics.LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
         path = statics.simulate(
-            chosen,
-            statics.LoadPath(tension=tensions, stroke=strokes, base_rotation=turn),
-            from_state=start,
+            chosen, put_on(pulled, loads), from_state=start, refinement=refinement
         )
     _write(path, json=json, csv=csv, plot=plot, save_state=save_state)
     if STANDARD_OUTPUT not in (json, csv):

@@ -1,10 +1,27 @@
 """Flexures: one notch becomes a short rod with a few strain modes."""
 
 from notchflex._packages import import_all
+from notchflex.flexure.build import LEVELS, stack, with_level
+from notchflex.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
-from notchflex.flexure.state import FlexureState, fibre_stretch, flexure_state, relative_pose
+from notchflex.flexure.shape import relative_pose, rod_end
+from notchflex.flexure.state import FlexureState, fibre_stretch, flexure_state
 
 import_all(__name__, __path__)
 
-__all__ = ["FlexureState", "Rod", "fibre_stretch", "flexure_state", "relative_pose", "rod"]
+__all__ = [
+    "LEVELS",
+    "Elastica",
+    "FlexureState",
+    "Rod",
+    "elastica",
+    "fibre_stretch",
+    "flexure_state",
+    "modulus_from_single_notch",
+    "relative_pose",
+    "rod",
+    "rod_end",
+    "stack",
+    "with_level",
+]

@@ -4,14 +4,20 @@ Pacheco 2021, eq. 1-3. The rod runs along the neutral axis, ybar from the tube a
 spine, and keeps its length h there. Under a tendon alone its moment is the same all along, so
 one constant bending mode is exact; its amplitude is the elastic angle. Nothing else is put in:
 s = h - ybar theta at the tube axis (eq. 3) and the closing angle h / (r_o + ybar) follow.
+
+Under other loads the moment changes along the notch, and there may be a sideways moment and a
+torque: a linear part of the bending, both for the strong axis, and torsion about the shear centre.
+Shear and stretch, which a short arc hardly gives, are left out.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from notchflex._jax import constant, jax
 from notchflex.errors import InputError
+from notchflex.flexure.build import gauss_nodes
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
 from notchflex.material import FibreSection
@@ -22,7 +28,7 @@ SECTION_OF_CUT = {"on-axis": annular_sector, "off-axis": annular_segment}
 
 
 @rod.register
-def _(notch: ArcNotch, tube: Tube) -> Rod:
+def _(notch: ArcNotch, tube: Tube, refinement: int = 0) -> Rod:
     left = SECTION_OF_CUT[notch.cut](
         0.5 * tube.outer_diameter, 0.5 * tube.inner_diameter, notch.depth
     )
@@ -44,18 +50,45 @@ def _(notch: ArcNotch, tube: Tube) -> Rod:
     cosine, sine = np.cos(np.radians(notch.direction_deg)), np.sin(np.radians(notch.direction_deg))
     turned = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     neutral_axis = np.array([-1.0, 0.0, 0.0]) * left.centroid
-    bending = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]) / notch.height
+    place, length = gauss_nodes(np.linspace(0.0, notch.height, 3 + refinement))
+    basis = _modes(2.0 * place / notch.height - 1.0, float(section.shear_centre), refinement)
+    basis = basis / notch.height
     straight = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    precurved = straight + np.radians(notch.precurvature_deg) * bending
-    one_interval = jax.tree.map(lambda value: constant([value]), section)
+    reference = straight + np.radians(notch.precurvature_deg) * basis[..., 0]
+    # The followed curve is a point: under a tendon alone the strain is the same all along, and
+    # then its exponential is exact.
     return Rod(
         start_rotation=constant(turned),
         start_offset=constant(turned @ neutral_axis),
+        curve_rotation=constant(np.eye(3)),
+        curve_offset=constant(np.zeros(3)),
         end_rotation=constant(turned.T),
         end_offset=constant(-neutral_axis),
-        length=constant([notch.height]),
-        reference_strain=constant(precurved[None]),
-        basis=constant(bending[None, :, None]),
-        section=one_interval,
+        length=constant(length),
+        reference_strain=constant(reference),
+        basis=constant(basis),
+        followed_reference=constant(reference),
+        followed_basis=constant(basis),
+        node_rotation=constant(np.broadcast_to(np.eye(3), (len(place), 3, 3))),
+        node_offset=constant(np.zeros((len(place), 3))),
+        section=jax.tree.map(lambda value: constant(np.full(len(place), value)), section),
         lip=constant([0.5 * tube.outer_diameter + float(left.centroid), 0.0]),
+        lip_closes=constant(1.0),
+        small=constant(0.0),
+        chord=constant(0.0),
+        idle=constant(np.zeros(basis.shape[-1])),
+        levels=(1, 2 + refinement, basis.shape[-1]),
+        nodes_per_interval=3,
     )
+
+
+def _modes(part: np.ndarray, shear_centre: float, refinement: int) -> np.ndarray:
+    """Strain per mode, times the notch's height, at places from -1 to 1: (nodes, 6, modes)."""
+    bending = 2 + refinement
+    twist = 1 + refinement
+    modes = np.zeros((len(part), 6, 2 * bending + twist))
+    modes[:, 1, :bending] = modes[:, 0, bending : 2 * bending] = legvander(part, bending - 1)
+    modes[:, 2, 2 * bending :] = legvander(part, twist - 1)
+    # Twist about the shear centre shears the neutral axis, which lies off it, sideways.
+    modes[:, 4, 2 * bending :] = shear_centre * modes[:, 2, 2 * bending :]
+    return modes

@@ -14,12 +14,13 @@ from notchflex.robot import Tube
 
 
 @singledispatch
-def rod(notch: Any, tube: Tube) -> Rod:
+def rod(notch: Any, tube: Tube, refinement: int = 0) -> Rod:
     """Rod of one notch.
 
     Args:
         notch: A notch description, such as `notchflex.ArcNotch(...)`.
         tube: The tube it is cut into.
+        refinement: 0 has the modes that serve for usual loads; 1, 2 ... has more.
 
     Returns:
         The rod, in mm and rad.
@@ -27,7 +28,7 @@ def rod(notch: Any, tube: Tube) -> Rod:
     Raises:
         TypeError: There is no rod for this kind of description.
     """
-    del tube
+    del tube, refinement
     raise TypeError(
         f"no rod is registered for a notch of type {type(notch).__name__}; "
         "add one to notchflex/flexure with @rod.register"

@@ -1,8 +1,12 @@
 """What one notch becomes for the solver: a short rod with a few strain modes, as arrays.
 
-The rod is followed along its neutral axis in intervals of constant strain. The strain of
-interval i is `reference_strain[i] + basis[i] @ q`; strains are (curvature about x, y, z of the
-rod, shear along x, y, stretch along z), the stretch being 1 where nothing is strained.
+The rod is followed along its neutral axis and looked at in Gauss's nodes. The strain of node k is
+`reference_strain[k] + basis[k] @ q`; strains are (curvature about x, y, z of the rod, shear along
+x, y, stretch along z), the stretch being 1 where nothing is strained.
+
+Its pose is found beside a curve r(s) that may be chosen: the free rod itself, so that only what
+the load adds is left to integrate, or a point, so that a rod of constant strain is exact. With
+the pose written as g(s) r(s), g follows the twist Ad_r (strain - strain of the curve).
 """
 
 from __future__ import annotations
@@ -20,26 +24,52 @@ class Rod(eqx.Module):
         start_rotation: Rotation from the rod's first section to the proximal body.
         start_offset: Where the rod starts, in the frame of the proximal body. A notch alone
             counts it from its proximal face on the tube axis; the chain adds the body's length.
+        curve_rotation: Rotation from the end of the curve that is followed to its start.
+        curve_offset: Where that curve ends, in the frame of its start.
         end_rotation: Rotation from the distal body to the rod's last section.
-        end_offset: Where the distal face of the notch lies on the tube axis, in the frame of
-            the rod's last section.
-        length: Length of each interval along the neutral axis.
-        reference_strain: Strain of each interval of the free, cut tube.
-        basis: Strain of each interval for a unit of each mode.
-        section: What is left of the tube at each interval.
-        lip: Where the notch closes, across the section from the neutral axis (x, y): the
-            fibre that has no length left when the lips meet.
+        end_offset: Where the distal body's frame lies, in the frame of the rod's last section.
+        length: Length of the neutral axis that each node stands for.
+        reference_strain: Strain at each node of the free, cut tube.
+        basis: Strain at each node for a unit of each mode.
+        followed_reference: Twist at each node of the free rod beside the curve, in the frame of
+            the rod's start.
+        followed_basis: The same for a unit of each mode.
+        node_rotation: Rotation from the followed curve at each node to its start.
+        node_offset: Where the followed curve is at each node, in the frame of its start.
+        section: What is left of the tube at each node.
+        lip: Where a notch with a solid spine closes, across the section from the neutral axis
+            (x, y): the fibre that has no length left when the lips meet.
+        lip_closes: 1 where there is such a fibre, 0 where the notch closes otherwise.
+        small: 1 where displacements are taken in proportion to the strains (small deflection);
+            None where no flexure of a chain asks for it, so that nothing is computed for it.
+        chord: 1 where the angle of the chord from start to end is of interest (Liu 2022); None
+            likewise.
+        idle: 1 for modes that only fill up the arrays, because another notch has more.
+        levels: How many modes serve tendons alone, loads in the plane of bending, and space.
+        nodes_per_interval: Gauss's nodes of an interval, 1 or 3.
     """
 
     start_rotation: Float[Array, "*n 3 3"]
     start_offset: Float[Array, "*n 3"]
+    curve_rotation: Float[Array, "*n 3 3"]
+    curve_offset: Float[Array, "*n 3"]
     end_rotation: Float[Array, "*n 3 3"]
     end_offset: Float[Array, "*n 3"]
-    length: Float[Array, "*n intervals"]
-    reference_strain: Float[Array, "*n intervals 6"]
-    basis: Float[Array, "*n intervals 6 modes"]
+    length: Float[Array, "*n nodes"]
+    reference_strain: Float[Array, "*n nodes 6"]
+    basis: Float[Array, "*n nodes 6 modes"]
+    followed_reference: Float[Array, "*n nodes 6"]
+    followed_basis: Float[Array, "*n nodes 6 modes"]
+    node_rotation: Float[Array, "*n nodes 3 3"]
+    node_offset: Float[Array, "*n nodes 3"]
     section: FibreSection
     lip: Float[Array, "*n 2"]
+    lip_closes: Float[Array, "*n"]
+    small: Float[Array, "*n"] | None
+    chord: Float[Array, "*n"] | None
+    idle: Float[Array, "*n modes"]
+    levels: tuple[int, int, int] = eqx.field(static=True)
+    nodes_per_interval: int = eqx.field(static=True)
 
     @property
     def modes(self) -> int:

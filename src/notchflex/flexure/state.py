@@ -1,4 +1,4 @@
-"""From the modes of one flexure to its pose, its resultants and its lengths."""
+"""From the modes of one flexure to its pose, its resultants and its chord."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.flexure.rod import Rod
+from notchflex.flexure.shape import relative_pose, rod_end
 from notchflex.material import SectionLaw
-from notchflex.motion import Motion, exponential, unskew
+from notchflex.motion import Motion, rotation_about, unskew
 
 
 class FlexureState(eqx.Module):
@@ -24,9 +25,10 @@ class FlexureState(eqx.Module):
         resultants: Internal moments and forces of each interval, in the rod's frame.
         strain: Strain of each interval beyond that of the free tube.
         internal: Generalised internal force of each mode, N mm per unit of mode.
-        lip_gap: What is left of the notch's opening at its lips, mm.
-        lip_slope: Change of the gap per unit of mode, mm.
         bend: Bending of the whole rod about x and y of its frame, rad.
+        chord_turn: Rotation, in the proximal body's frame, by which the chord from the rod's
+            start to its end has turned in the plane of bending; None where nobody asked.
+        chord_angle: Its angle, rad; None where nobody asked.
     """
 
     pose: Motion | None
@@ -34,22 +36,14 @@ class FlexureState(eqx.Module):
     resultants: Float[Array, "intervals 6"]
     strain: Float[Array, "intervals 6"]
     internal: Float[Array, " modes"]
-    lip_gap: Float[Array, ""]
-    lip_slope: Float[Array, " modes"]
     bend: Float[Array, " 2"]
+    chord_turn: Float[Array, "3 3"] | None
+    chord_angle: Float[Array, ""] | None
 
 
 def strain(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "intervals 6"]:
     """Strain of every interval of a rod."""
     return rod.reference_strain + rod.basis @ modes
-
-
-def relative_pose(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Pose of the distal body as seen from the proximal one."""
-    pose = Motion(rod.start_rotation, rod.start_offset)
-    for interval, length in zip(strain(rod, modes), rod.length, strict=True):
-        pose = pose.then(exponential(length * interval))
-    return pose.then(Motion(rod.end_rotation, rod.end_offset))
 
 
 def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
@@ -103,14 +97,29 @@ def flexure_state(
     every_strain = strain(rod, modes)
     elastic = every_strain - rod.reference_strain
     response = jax.vmap(law.respond)(elastic, rod.section, memory)
-    to_lip = rod.length[:, None] * fibre_stretch(rod.lip)[None]
+    # A mode that only fills up the arrays is held by a stiffness of 1.
+    internal = jnp.einsum("i,ic,icm->m", rod.length, response.resultants, rod.basis)
+    has_chord = with_pose and rod.chord is not None
+    chord_turn, chord_angle = chord(rod, modes) if has_chord else (None, None)
     return FlexureState(
         pose=pose,
         twist=twist,
         resultants=response.resultants,
         strain=elastic,
-        internal=jnp.einsum("i,ic,icm->m", rod.length, response.resultants, rod.basis),
-        lip_gap=jnp.sum(to_lip * every_strain),
-        lip_slope=jnp.einsum("ic,icm->m", to_lip, rod.basis),
+        internal=internal + rod.idle * modes,
         bend=rod.length @ every_strain[:, :2],
+        chord_turn=chord_turn,
+        chord_angle=chord_angle,
     )
+
+
+def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "3 3"], Float[Array, ""]]:
+    """How far the chord of a rod has turned in its plane of bending (Liu 2022, eq. 19).
+
+    The chord is the straight line from the rod's start to its end; for a strip this is the angle
+    that the paper calls bending angle, about two thirds of the slope at the end.
+    """
+    end, free = rod_end(rod, modes).translation, rod.curve_offset
+    angle = jnp.atan2(end[0] * free[2] - end[2] * free[0], end[0] * free[0] + end[2] * free[2])
+    turn = rotation_about(angle * jnp.array([0.0, 1.0, 0.0]))
+    return rod.start_rotation @ turn @ rod.start_rotation.T, angle

@@ -11,7 +11,9 @@ from functools import singledispatch
 from typing import Any
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
+
+from notchflex._jax import jnp
 
 
 class FrictionLaw(eqx.Module):
@@ -30,6 +32,17 @@ class FrictionLaw(eqx.Module):
         Returns:
             The bound at the exit edge and at the entry edge, each >= 0.
         """
+
+    def valid(
+        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
+    ) -> Bool[Array, "*t"]:
+        """Tell where the law holds; beyond, `bounds` is finite but means nothing.
+
+        Args:
+            exit_turning: As for `bounds`.
+            entry_turning: As for `bounds`.
+        """
+        return jnp.ones_like(exit_turning + entry_turning, dtype=bool)
 
 
 @singledispatch

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from notchflex.plot.bent import bent_by_angles
 from notchflex.plot.outline import outline
 from notchflex.plot.style import (
     BLUE,
@@ -139,9 +140,6 @@ def _draw_points(
 
 def _draw_centre_lines(axes: Axes, comparison: Comparison) -> None:
     """Draw measured and computed centre lines at some points of the longest trial."""
-    # Not at the head of the file: what draws paths alone needs no solver.
-    from notchflex.statics import bodies_from_angles
-
     measured, robot = comparison.measured, comparison.robot
     view = np.radians(robot.notches[0].direction_deg)
     points = _telling_points(comparison)
@@ -150,9 +148,8 @@ def _draw_centre_lines(axes: Axes, comparison: Comparison) -> None:
         axes.text(0.5, 0.5, "no point was solved", transform=axes.transAxes, ha="center")
         return
     for angles, style in ((comparison.notch_angle, "-"), (measured.notch_angle, (0, (1, 1.2)))):
-        bodies = bodies_from_angles(robot, angles[points])
-        for position, rotation, colour in zip(*bodies, colours, strict=True):
-            line = outline(robot, position, rotation, view).centre_line
+        for row, colour in zip(angles[points], colours, strict=True):
+            line = outline(bent_by_angles(robot, row), view).centre_line
             axes.plot(
                 *line.T, color=colour, linestyle=style, linewidth=1.4 if style == "-" else 2.4
             )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Polygon
+from matplotlib.patches import FancyArrowPatch, Polygon
 
+from notchflex.plot.acting import COLOUR, Acting, acting_at
+from notchflex.plot.bent import bent_at
 from notchflex.plot.outline import Outline, outline
 from notchflex.plot.style import GREY, ORANGE, VERMILLION, sequence_colours
 
@@ -18,19 +20,27 @@ if TYPE_CHECKING:
 MOST_SHAPES = 5
 """More shapes than this hide each other."""
 
+ARROW = 0.18
+"""Length of the arrow of the largest force, in lengths of the robot."""
 
-def telling_steps(path: Path, most: int = MOST_SHAPES) -> list[int]:
+
+def telling_steps(
+    path: Path, most: int = MOST_SHAPES, among: Sequence[int] | None = None
+) -> list[int]:
     """Return the steps to draw: spread evenly over the shapes that the robot goes through.
 
     Args:
         path: Solved path.
         most: How many steps at most.
+        among: The steps to choose from; all if None.
 
     Returns:
-        Indices of converged steps, from the straightest to the most bent. Both branches of a loop
-        pass the same shapes, so the first step that reaches a shape stands for it.
+        Indices of converged steps, from the straightest to the most bent. Where both branches of
+        a loop pass the same shapes, the first step that reaches a shape stands for it.
     """
     good = np.flatnonzero(np.asarray(path.converged) & np.isfinite(path.total_angle))
+    if among is not None:
+        good = np.array([step for step in among if step in good], int)
     if not len(good):
         return []
     bend = np.abs(path.notch_angle[good]).sum(axis=1)
@@ -45,7 +55,7 @@ def telling_steps(path: Path, most: int = MOST_SHAPES) -> list[int]:
 
 
 def draw_wrist(axes: Axes, path: Path, steps: Sequence[int], view: float = 0.0) -> None:
-    """Draw a robot at several steps of a path into axes of equal scale.
+    """Draw a robot at several steps of a path into axes of equal scale, with its loads.
 
     Args:
         axes: Where to draw.
@@ -53,13 +63,14 @@ def draw_wrist(axes: Axes, path: Path, steps: Sequence[int], view: float = 0.0) 
         steps: Which of its steps.
         view: Direction across the base that is drawn to the right [rad].
     """
-    colours = sequence_colours(len(steps))
+    top = 3 * len(steps) + 5
     any_closed = False
-    for order, (step, colour) in enumerate(zip(steps, colours, strict=True)):
-        shape = outline(path.robot, path.body_position[step], path.body_rotation[step], view)
-        label = load_label(path, step)
+    loads: list[Acting] = []
+    for order, (step, colour) in enumerate(zip(steps, sequence_colours(len(steps)), strict=True)):
+        bent = bent_at(path, step)
+        shape = outline(bent, view)
+        _draw(axes, shape, colour, load_label(path, step), level=3 * order)
         closed = np.flatnonzero(path.closed[step])
-        _draw(axes, shape, colour, label, level=3 * order)
         if len(closed):
             points = np.array([shape.lips[notch] for notch in closed])
             axes.plot(
@@ -67,15 +78,77 @@ def draw_wrist(axes: Axes, path: Path, steps: Sequence[int], view: float = 0.0) 
                 "o",
                 color=VERMILLION,
                 markersize=3.5,
-                zorder=3 * len(steps) + 5,
+                zorder=top,
                 label=None if any_closed else "closed notch",
             )
             any_closed = True
+        loads += acting_at(path, step, bent)
+    draw_loads(axes, loads, view, ARROW * extent_of(path), zorder=top + 1)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_ylabel("along the base, z [mm]")
     degrees = round(float(np.degrees(view)), 6) % 360
     name = {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
     axes.set_xlabel(f"across the base, {name} [mm]")
+
+
+def extent_of(path: Path) -> float:
+    """Return about how long a robot is [mm]."""
+    steps = np.diff(path.body_position[0], axis=0)
+    return float(np.linalg.norm(steps, axis=1).sum() + path.robot.tube.outer_diameter)
+
+
+def draw_loads(
+    axes: Axes, loads: Sequence[Acting], view: float, longest: float, zorder: int
+) -> None:
+    """Draw forces as arrows from where they act, moments as bent arrows about it.
+
+    Args:
+        axes: Where to draw.
+        loads: The forces and moments of all shapes.
+        view: Direction across the base that is drawn to the right [rad].
+        longest: Length of the arrow of the largest force [mm].
+        zorder: Above what to draw.
+    """
+    across = np.array([np.cos(view), np.sin(view), 0.0])
+    normal = np.array([-np.sin(view), np.cos(view), 0.0])
+    largest = max((one.size for one in loads if one.name == "force"), default=0.0)
+    named: set[str] = set()
+    for one in loads:
+        start = np.array([one.point @ across, one.point[2]])
+        if one.name == "force":
+            arrow = longest * np.array([one.vector @ across, one.vector[2]]) / largest
+            _arrow(axes, start, start + arrow, COLOUR[one.kind], zorder)
+            reach = [start, start + arrow]
+        else:
+            # Seen with z up and the view's direction right, a moment about +normal turns z to it.
+            turn = -1.0 if one.vector @ normal > 0.0 else 1.0
+            side = 0.4 * longest * np.array([1.0, 0.0])
+            _arrow(
+                axes, start - turn * side, start + turn * side, COLOUR[one.kind], zorder, bend=0.9
+            )
+            reach = [start - longest, start + longest]
+        axes.update_datalim(np.array(reach))
+        if one.label not in named:
+            axes.plot([], [], color=COLOUR[one.kind], marker=">", markersize=4.0, label=one.label)
+            named.add(one.label)
+    axes.autoscale_view()
+
+
+def _arrow(axes: Axes, start: Any, end: Any, colour: str, zorder: int, bend: float = 0.0) -> None:
+    axes.add_patch(
+        FancyArrowPatch(
+            tuple(start),
+            tuple(end),
+            arrowstyle="-|>",
+            connectionstyle=f"arc3,rad={bend}",
+            mutation_scale=9.0,
+            shrinkA=0.0,
+            shrinkB=0.0,
+            color=colour,
+            linewidth=1.4,
+            zorder=zorder,
+        )
+    )
 
 
 def load_label(path: Path, step: int) -> str:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex.results.files import write_text
-from notchflex.results.json import spans_of
-from notchflex.results.quantities import AXES, QUANTITIES, Quantity, span_names
+from notchflex.results.quantities import AXES, QUANTITIES, span_names
+from notchflex.results.quantity import Quantity
+from notchflex.results.spans import holds, spans_of
 
 if TYPE_CHECKING:
     from pathlib import Path as FilePath
@@ -29,7 +30,7 @@ def path_columns(path: Path) -> dict[str, Sequence[Any]]:
     """Return the columns of a path: header to the values of its S steps, at the edge units."""
     columns: dict[str, Sequence[Any]] = {"step": range(1, len(path) + 1)}
     for quantity in QUANTITIES.values():
-        if quantity.column and hasattr(path, quantity.name):
+        if quantity.column and holds(path, quantity):
             columns.update(_columns_of(path, quantity))
     return columns
 

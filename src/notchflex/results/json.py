@@ -10,7 +10,9 @@ import numpy as np
 
 from notchflex import __version__
 from notchflex.results.files import write_text
-from notchflex.results.quantities import CONTACT_STATES, QUANTITIES, Quantity, units
+from notchflex.results.quantities import CONTACT_STATES, QUANTITIES, units
+from notchflex.results.quantity import Quantity
+from notchflex.results.spans import holds, spans_of
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
@@ -24,6 +26,18 @@ PLAIN = tuple(
 )  # all but the contacts, which are gathered contact by contact
 CONTACTS = tuple(q for q in QUANTITIES.values() if q.per == ("tendon", "contact"))
 
+# Loads from outside are what a user gave, and no result: they have no row in the table.
+LOAD_UNITS = {
+    "load.tip_force_N": "N",
+    "load.tip_moment_Nmm": "N mm",
+    "load.tip_point_mm": "mm",
+    "load.tip_mass_g": "g",
+    "load.gravity_m_s2": "m/s^2",
+    "load.body_forces.force_N": "N",
+    "load.body_forces.moment_Nmm": "N mm",
+    "load.body_forces.point_mm": "mm",
+}
+
 
 def path_document(path: Path) -> dict[str, Any]:
     """Return a path as a document of plain lists, numbers, strings and None.
@@ -34,15 +48,20 @@ def path_document(path: Path) -> dict[str, Any]:
     Returns:
         `name`, `version`, `robot` (its whole description), `units` (JSON key to unit),
         `converged`, `reason` and `steps`, a list of S objects. None stands where there is no
-        number. Angles in deg, lengths in mm, forces in N.
+        number. Angles in deg, lengths in mm, forces in N. Where loads act from outside in any
+        step, `load` tells those of every step.
     """
     failed = [str(r) for r, good in zip(path.reason, path.converged, strict=True) if not good]
+    steps = [_step(path, index) for index in range(len(path))]
+    outside = _outside(path)
+    for step, loads in zip(steps, outside, strict=False):
+        step.setdefault("load", {}).update(loads)
     return {
         **document_head(path.robot),
-        "units": units(),
+        "units": units() | (LOAD_UNITS if outside else {}),
         "converged": not failed,
         "reason": failed[0] if failed else "",
-        "steps": [_step(path, index) for index in range(len(path))],
+        "steps": steps,
     }
 
 
@@ -101,17 +120,10 @@ def plain(value: Any) -> Any:
     return value
 
 
-def spans_of(path: Path, tendon: int) -> int:
-    """Return how many spans a tendon (counted from 0) has: two for each notch up to its end."""
-    end = path.robot.tendon[tendon].end_body
-    notches = path.notch_angle.shape[-1]
-    return 2 * (notches if end is None else end)
-
-
 def _step(path: Path, index: int) -> dict[str, Any]:
     step: dict[str, Any] = {"step": index + 1}
     for quantity in PLAIN:
-        if not hasattr(path, quantity.name):
+        if not holds(path, quantity):
             continue
         holder = step
         *outer, last = quantity.key.split(".")
@@ -120,6 +132,34 @@ def _step(path: Path, index: int) -> dict[str, Any]:
         holder[last] = _value(path, quantity, index)
     step["contacts"] = [_contacts(path, tendon, index) for tendon in range(path.tension.shape[1])]
     return step
+
+
+def _outside(path: Path) -> list[dict[str, Any]]:
+    """Loads from outside of every step; nothing at all where no step has any."""
+    external = path.load.external
+    if all(one.is_nothing for one in external):
+        return []
+    return [
+        {
+            "tip_force_N": one.tip_force,
+            "tip_moment_Nmm": one.tip_moment,
+            "tip_point_mm": one.tip_point,
+            "following": one.following,
+            "tip_mass_g": one.tip_mass,
+            "gravity_m_s2": one.gravity,
+            "body_forces": [
+                {
+                    "body": force.body,
+                    "force_N": force.force,
+                    "moment_Nmm": force.moment,
+                    "point_mm": force.point,
+                    "following": force.following,
+                }
+                for force in one.body_forces
+            ],
+        }
+        for one in external
+    ]
 
 
 def _value(path: Path, quantity: Quantity, index: int) -> Any:
@@ -133,6 +173,10 @@ def _value(path: Path, quantity: Quantity, index: int) -> Any:
 
 def _contacts(path: Path, tendon: int, index: int) -> list[dict[str, Any]]:
     count = spans_of(path, tendon) - 1
-    columns = {q.key.split(".")[1]: getattr(path, q.name)[index, tendon, :count] for q in CONTACTS}
+    columns = {
+        q.key.split(".")[1]: getattr(path, q.name)[index, tendon, :count] * q.scale
+        for q in CONTACTS
+        if holds(path, q)
+    }
     columns["state"] = [CONTACT_STATES[int(state)] for state in columns["state"]]
     return [{key: column[contact] for key, column in columns.items()} for contact in range(count)]

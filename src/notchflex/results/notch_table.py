@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.flexure import Rod, rod
+from notchflex.chain import prepared
+from notchflex.flexure import rod
 from notchflex.results.quantities import DEGREES
 from notchflex.robot import Robot
+from notchflex.robot._explain import fields_of
 from notchflex.robot.kinds import Notch
-from notchflex.statics import closing
+from notchflex.statics.closing import closing, moment_arms
 
 
 def notch_table(robot: Robot) -> list[dict[str, Any]]:
@@ -20,15 +22,16 @@ def notch_table(robot: Robot) -> list[dict[str, Any]]:
         robot: The robot, n notches, t tendons.
 
     Returns:
-        n rows with the values of the robot file and
+        n rows with the values of the robot file, their units in their names, and
 
-        * `area_mm2`, `centroid_mm` (from the tube axis toward the spine), `second_moment_mm4`
-          of the section that the cut leaves,
+        * `area_mm2` and `second_moment_mm4` of the section that the cut leaves, where it is
+          weakest; `centroid_mm` (from the tube axis toward the spine) where there is a spine,
         * `moment_arm_mm`, t numbers: how far each tendon runs from the neutral axis, positive
-          where it bends the notch toward its direction,
+          where it bends the notch toward its direction, 0 where it does not go,
         * `closing_angle_deg`, `closing_tendon` (from 1: the one with the longest arm),
           `closing_tension_N` (of that tendon, pulled from rest; NaN if the notch never closes),
-          `closing_outer_strain` (Pacheco 2021, eq. 16) and `closing_peak_strain` (farthest fibre).
+          `closing_outer_strain` (Pacheco 2021, eq. 16) and `closing_peak_strain` (farthest fibre),
+          both NaN without a spine.
 
     Example:
         >>> from notchflex import load_robot
@@ -37,41 +40,52 @@ def notch_table(robot: Robot) -> list[dict[str, Any]]:
         (30.63, 1.387)
     """
     table = closing(robot)
-    sections: dict[Notch, Rod] = {}  # equal notches have equal sections
-    rows: list[dict[str, Any]] = []
-    for index, notch in enumerate(robot.notches):
-        if notch not in sections:
-            sections[notch] = rod(notch, robot.tube)
-        section = sections[notch].section
-        centroid = robot.tube.outer_radius - float(section.edge_spine[0])
-        rows.append(
-            {
-                "notch": index + 1,
-                **{
-                    name: getattr(notch, key)
-                    for key, name in {
-                        "cut": "cut",
-                        "depth": "depth_mm",
-                        "height": "height_mm",
-                        "uncut_length": "uncut_length_mm",
-                        "direction_deg": "direction_deg",
-                        "precurvature_deg": "precurvature_deg",
-                    }.items()
-                },
-                "area_mm2": float(section.area[0]),
-                "centroid_mm": centroid,
-                "second_moment_mm4": float(section.second_moment_weak[0]),
-                "moment_arm_mm": [
-                    centroid
-                    + tendon.radius
-                    * float(np.cos(np.radians(tendon.direction_deg - notch.direction_deg)))
-                    for tendon in robot.tendon
-                ],
-                "closing_angle_deg": float(table.angle[index]) * DEGREES,
-                "closing_tendon": int(table.tendon[index]),
-                "closing_tension_N": float(table.tension[index]),
-                "closing_outer_strain": float(table.outer_strain[index]),
-                "closing_peak_strain": float(table.peak_strain[index]),
-            }
-        )
-    return rows
+    arms = moment_arms(prepared(robot))
+    described = {notch: _description(notch, robot) for notch in dict.fromkeys(robot.notches)}
+    return [
+        {
+            "notch": index + 1,
+            **described[notch],
+            "moment_arm_mm": arms[index].tolist(),
+            "closing_angle_deg": float(table.angle[index]) * DEGREES,
+            "closing_tendon": int(table.tendon[index]),
+            "closing_tension_N": float(table.tension[index]),
+            "closing_outer_strain": float(table.outer_strain[index]),
+            "closing_peak_strain": float(table.peak_strain[index]),
+        }
+        for index, notch in enumerate(robot.notches)
+    ]
+
+
+def named_values(notch: Notch) -> dict[str, Any]:
+    """Return the values of a notch as in a robot file, their units in their names.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> list(named_values(load_robot("pacheco2021-a").notches[0]))[:3]
+        ['kind', 'cut', 'depth_mm']
+    """
+    return {
+        _with_unit(type(notch), name): getattr(notch, name)
+        for name in fields_of(type(notch))
+        if name != "repeat"
+    }
+
+
+def _description(notch: Notch, robot: Robot) -> dict[str, Any]:
+    one = rod(notch, robot.tube)
+    section = one.section
+    weakest = int(np.argmin(section.second_moment_weak))
+    values: dict[str, Any] = {
+        "area_mm2": float(section.area[weakest]),
+        "second_moment_mm4": float(section.second_moment_weak[weakest]),
+    }
+    if float(one.lip_closes) > 0.0:  # opposite a spine
+        values["centroid_mm"] = robot.tube.outer_radius - float(section.edge_spine[weakest])
+    return named_values(notch) | values
+
+
+def _with_unit(kind: type, name: str) -> str:
+    extra = fields_of(kind)[name].json_schema_extra or {}
+    unit = extra.get("unit", "")
+    return f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name

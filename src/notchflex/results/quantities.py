@@ -10,71 +10,11 @@ Inside Python: mm, N, MPa, rad. At the edges (files, pictures, terminal): mm, N,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+from notchflex.results.quantity import Quantity
 
 DEGREES = 180.0 / math.pi
 AXES = ("x", "y", "z")
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One quantity of a solved state, and how it is written at the edges.
-
-    Attributes:
-        name: The attribute of `Path` and `Equilibrium` that holds it.
-        title: What an axis or a table calls it, without its unit.
-        symbol: The symbol, as mathtext.
-        unit: The unit at the edges; "" for numbers without one.
-        description: One sentence that says exactly what it is.
-        key: The key in a step of the JSON document; a dot goes one object deeper. "" if left out.
-        column: The CSV column; `{tendon}`, `{notch}`, `{axis}` and `{span}` are filled in.
-            "" where it has no column.
-        per: What its entries stand for within one step, outermost first: "tendon", "notch",
-            "axis", "span", "contact", "row". Empty for a single number.
-        scale: The factor from the inside of the program to the edge (rad to deg).
-    """
-
-    name: str
-    title: str
-    symbol: str
-    unit: str
-    description: str
-    key: str
-    column: str
-    per: tuple[str, ...] = ()
-    scale: float = 1.0
-
-    @property
-    def label(self) -> str:
-        r"""The label of an axis: title, symbol and unit.
-
-        Example:
-            >>> QUANTITIES["total_angle"].label
-            'total bending angle $\\theta$ [deg]'
-        """
-        parts = [self.title, f"${self.symbol}$" if self.symbol else ""]
-        parts.append(f"[{self.unit}]" if self.unit else "")
-        return " ".join(part for part in parts if part)
-
-    def header(self, **indices: object) -> str:
-        """Return the CSV column for the given indices.
-
-        Args:
-            **indices: `tendon`, `notch` (counted from 1), `axis` ("x", "y", "z") or `span`.
-                `tendon=""` is written for the only tendon of a robot.
-
-        Returns:
-            The header, for example `notch_3_deg`.
-
-        Example:
-            >>> QUANTITIES["tension"].header(tendon="")
-            'tendon_force_N'
-            >>> QUANTITIES["tension"].header(tendon=2)
-            'tendon_2_force_N'
-        """
-        if "tendon" in indices:
-            indices["tendon"] = f"_{indices['tendon']}" if indices["tendon"] != "" else ""
-        return self.column.format(**indices)
 
 
 def _rows() -> tuple[Quantity, ...]:
@@ -107,9 +47,21 @@ def _rows() -> tuple[Quantity, ...]:
             "notch_angle_deg", "notch_{notch}_deg", ("notch",), DEGREES,
         ),
         q(
+            "chord_angle", "chord angle", r"\psi_j", "deg",
+            "Angle by which the chord of a strip has turned in its plane of bending: the bending "
+            "angle of Liu 2022, about two thirds of the notch angle.",
+            "chord_angle_deg", "notch_{notch}_chord_deg", ("notch",), DEGREES, optional=True,
+        ),
+        q(
+            "total_chord_angle", "total chord angle", r"\psi", "deg",
+            "Sum of the chord angles, where every flexure has one.",
+            "total_chord_angle_deg", "total_chord_deg", (), DEGREES, optional=True,
+        ),
+        q(
             "total_angle", "total bending angle", r"\theta", "deg",
-            "Bending angle of the robot: the sum of its notch angles where they bend in one plane, "
-            "otherwise the angle between the axes of base and tip.",
+            "Bending angle of the robot: where all notches bend in one plane the sum of their angles, "
+            "positive toward the bend of the first; otherwise the angle between the axes of base "
+            "and tip.",
             "total_angle_deg", "total_deg", (), DEGREES,
         ),
         q(
@@ -124,27 +76,28 @@ def _rows() -> tuple[Quantity, ...]:
         ),
         q(
             "span_tension", "span tension", "T", "N",
-            "Tension along a tendon: proximal, gap 1, body 1, gap 2, ... to its last gap.",
+            "Tension along a tendon: proximal, gap 1, body 1, gap 2, ... to its last gap, of the gaps "
+            "and bodies that it runs through.",
             "span_tension_N", "tendon{tendon}_{span}_N", ("tendon", "span"),
         ),
         q(
             "notch_moment", "notch moment", "M_j", "N mm",
-            "Bending moment carried by what the cut of a notch leaves.",
+            "Bending moment carried by what the cut of a notch leaves, the largest along it.",
             "notch_moment_Nmm", "notch_{notch}_moment_Nmm", ("notch",),
         ),
         q(
             "outer_strain", "outer strain", r"\varepsilon_j", "",
-            "Strain of the outer fibre of the spine (Pacheco 2021, eq. 16).",
+            "Bending strain of the outer fibre of the spine (Pacheco 2021, eq. 16).",
             "outer_strain", "notch_{notch}_outer_strain", ("notch",),
         ),
         q(
             "peak_strain", "peak strain", r"\varepsilon_\mathrm{max}", "",
-            "Strain of the fibre of the notch farthest from its neutral axis.",
+            "Largest bending strain of a notch, in the fibre farthest from its neutral axis.",
             "peak_strain", "notch_{notch}_peak_strain", ("notch",),
         ),
         q(
             "gap", "notch gap", "g_j", "mm",
-            "What is left of the opening of a notch, at its lips opposite the spine.",
+            "What is left of the opening of a notch between its lips, where it is narrowest.",
             "gap_mm", "notch_{notch}_gap_mm", ("notch",),
         ),
         q(
@@ -168,13 +121,46 @@ def _rows() -> tuple[Quantity, ...]:
             "contacts.slid_mm", "", ("tendon", "contact"),
         ),
         q(
+            "contact_turning", "turning at a contact", r"\beta_i", "deg",
+            "Angle by which a tendon turns at a friction contact.",
+            "contacts.turning_deg", "", ("tendon", "contact"), DEGREES,
+        ),
+        q(
             "contact_state", "state of a contact", "", "",
             'What a friction contact does: "stick", "slip toward base" or "slip toward tip".',
             "contacts.state", "", ("tendon", "contact"),
         ),
         q(
+            "front_contact", "friction front", "m", "",
+            "Contact, from 1 at the base, up to which the friction of a tendon has turned from "
+            "pulling to letting go (Gao 2017, eq. 26); one more than there are where all have.",
+            "front.m", "tendon{tendon}_front_m", ("tendon",),
+        ),
+        q(
+            "front_eta", "friction at the front", r"\eta", "",
+            "Friction of that contact over its largest, from 1 (pulling) to -1 (letting go).",
+            "front.eta", "tendon{tendon}_front_eta", ("tendon",),
+        ),
+        q(
+            "base_force", "base force", "F", "N",
+            "Force of the holder on the base, in the world; it balances the loads and the pull of "
+            "the drives on the tendons.",
+            "base_force_N", "base_force_{axis}_N", ("axis",),
+        ),
+        q(
+            "base_moment", "base moment", "M", "N mm",
+            "Moment of the holder on the base about its proximal end, in the world.",
+            "base_moment_Nmm", "base_moment_{axis}_Nmm", ("axis",),
+        ),
+        q(
+            "moment_error", "moment error", "e", "",
+            "Largest difference between the moment of the strain modes and that which the loads ask "
+            "for, over the largest moment: how well the modes serve.",
+            "moment_error", "moment_error",
+        ),
+        q(
             "stored_energy", "stored energy", "U", "N mm",
-            "Elastic energy held by the flexures.",
+            "Elastic energy held by flexures and stretched tendons.",
             "stored_energy_Nmm", "stored_energy_Nmm",
         ),
         q(
@@ -199,7 +185,7 @@ def _rows() -> tuple[Quantity, ...]:
         ),
         q(
             "smallest_eigenvalue", "smallest eigenvalue", r"\lambda_\mathrm{min}", "N mm",
-            "Smallest eigenvalue of the symmetric part of the stiffness.",
+            "Smallest real part of an eigenvalue of the stiffness, sticking contacts held.",
             "smallest_eigenvalue_Nmm", "",
         ),
         q(
@@ -226,7 +212,7 @@ def span_names(count: int) -> list[str]:
     """Return the names of the spans of a tendon, base to tip.
 
     Args:
-        count: Number of spans, 2 m for a tendon that ends on body m.
+        count: Number of spans, 2 m for a tendon that runs through m bodies to its end.
 
     Returns:
         `["proximal", "gap_1", "body_1", "gap_2", ...]`, `count` names.

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from notchflex.statics import Path
 
+MOMENT_ERROR = 0.01
+"""A larger part of the bending moment than this that the strain modes miss is warned of."""
+
 
 def path_warnings(path: Path) -> list[str]:
     """Return one sentence for each thing about a path that asks for care.
@@ -20,9 +23,15 @@ def path_warnings(path: Path) -> list[str]:
 
     Returns:
         Sentences on strains beyond what the material is allowed or its law is known for, and on
-        unstable equilibria; none if there is nothing to say.
+        unstable equilibria, and on strain modes that do not serve; none if there is nothing to
+        say.
     """
-    return [*_allowed_strain(path), *_plastic_strain(path), *_unstable(path)]
+    return [
+        *_allowed_strain(path),
+        *_plastic_strain(path),
+        *_unstable(path),
+        *_coarse(path),
+    ]
 
 
 def _allowed_strain(path: Path) -> Iterator[str]:
@@ -77,6 +86,27 @@ def _unstable(path: Path) -> Iterator[str]:
             f"{len(bad)} step{plural} unstable, first step {bad[0] + 1} ({_load(path, bad[0])}): "
             "a real robot would snap to another shape."
         )
+
+
+def _coarse(path: Path) -> Iterator[str]:
+    error = np.where(np.asarray(path.converged), path.moment_error, -np.inf)
+    if not (error > MOMENT_ERROR).any():
+        return
+    step = int(np.argmax(error))
+    # Not at the head of the file: what only reads this table needs no solver.
+    from notchflex.statics.solve import MOST_REFINEMENT
+
+    refinement = path.chain.refinement
+    remedy = (
+        f"simulate with --refinement {refinement + 1} (in Python refinement={refinement + 1}) "
+        "and see what changes"
+        if refinement < MOST_REFINEMENT
+        else "there is no finer --refinement, so take the result with care"
+    )
+    yield (
+        f"the strain modes miss the bending moment by up to {100 * error[step]:.2g} % of the largest "
+        f"one, at step {step + 1} ({_load(path, step)}): {remedy}."
+    )
 
 
 def _load(path: Path, step: int) -> str:

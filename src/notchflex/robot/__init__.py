@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from notchflex._ready import list_robots
 from notchflex.robot.friction_capstan import Capstan
+from notchflex.robot.friction_corner import Corner
 from notchflex.robot.friction_frictionless import Frictionless
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.material_linear import Linear
 from notchflex.robot.material_superelastic import Superelastic
 from notchflex.robot.notch_arc import ArcNotch
+from notchflex.robot.notch_strip import StripNotch
+from notchflex.robot.notch_u_link import ULink
+from notchflex.robot.opening import Opening, openings_along
 from notchflex.robot.paths import Changed, parse_assignment, set_values
 from notchflex.robot.reading import load_robot, robot_from_text
 from notchflex.robot.robot import Robot, from_table, to_table
@@ -26,20 +30,25 @@ __all__ = [
     "ArcNotch",
     "Capstan",
     "Changed",
+    "Corner",
     "Friction",
     "Frictionless",
     "Linear",
     "Material",
     "Notch",
+    "Opening",
     "Robot",
+    "StripNotch",
     "Superelastic",
     "Tendon",
     "Tube",
+    "ULink",
     "from_table",
     "json_schema",
     "kinds_of",
     "list_robots",
     "load_robot",
+    "openings_along",
     "parse_assignment",
     "robot_from_text",
     "robot_text",

@@ -5,8 +5,9 @@ A kind is one class in one file of this folder, named after what it is a kind of
 a new kind needs: reading, writing, the JSON Schema and `--set` pick it up.
 """
 
+import dataclasses
 import pkgutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Union
@@ -15,12 +16,17 @@ from pydantic import Field
 
 from notchflex.robot._explain import kind_of
 from notchflex.robot._part import Float, Int, part, quantity
+from notchflex.robot.opening import Opening
+from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
 
 @part(kw_only=True)
 class Notch:
     """What every kind of notch has.
+
+    The methods say where the rigid bodies and the tendons lie; they describe a slot across one
+    side of the tube with a rigid piece behind it, and a kind that differs overrides them.
 
     Args:
         kind: The word that names the kind in a file.
@@ -47,6 +53,53 @@ class Notch:
         """Find what does not fit the tube: pairs of a key and the rest of the sentence."""
         del tube
         yield from ()
+
+    def row_problems(self, before: "Notch") -> Iterator[tuple[str, str]]:
+        """Find what does not fit the notch right before this one, toward the base."""
+        del before
+        yield from ()
+
+    def tendon_problems(self, tendon: Tendon) -> Iterator[tuple[str, str]]:
+        """Find why a tendon cannot run over this notch: keys of the tendon, rest of the sentence.
+
+        It is asked only about tendons that end behind the notch.
+        """
+        del tendon
+        yield from ()
+
+    def expanded(self) -> tuple["Notch", ...]:
+        """Return the notches that this one stands for: `repeat` of them, each with `repeat` 1."""
+        return (dataclasses.replace(self, repeat=1),) * self.repeat
+
+    @classmethod
+    def further_on(cls, table: Mapping[str, Any], count: int) -> dict[str, Any]:
+        """Return the table of a repeated row for what is left of it behind `count` notches.
+
+        Args:
+            table: The keys of the row as in a robot file, perhaps not checked yet.
+            count: How many notches stand before what is left; `repeat` is the caller's.
+        """
+        del count
+        return dict(table)
+
+    def spacing(self, following: "Notch | None") -> float:
+        """Return the rigid length along the axis up to the next notch, or to the tip [mm].
+
+        Args:
+            following: The next notch toward the tip; None behind the last one.
+        """
+        del following
+        return self.uncut_length
+
+    def openings(self, before: "Notch | None", after: "Notch | None") -> tuple[Opening, ...]:
+        """Return the openings through which tendons enter the body behind this notch.
+
+        Args:
+            before: The notch right before this one, toward the base; None for the first.
+            after: The next notch toward the tip; None for the last.
+        """
+        del before, after
+        return (Opening(None, 0.0, 0.0),)
 
 
 @part(kw_only=True)

@@ -153,8 +153,11 @@ def _chosen(table: dict[str, Any], target: _Target) -> list[dict[str, Any]]:
         group += 1
     if count > 1:
         one = tables[group]
-        pieces = [one | {"repeat": n} for n in (before, 1, count - before - 1) if n]
-        tables[group : group + 1] = pieces
+        kind = cast("type[Notch]", _class_of("notch", one))  # nothing else is repeated
+        pieces = ((0, before), (before, 1), (before + 1, count - before - 1))
+        tables[group : group + 1] = [
+            kind.further_on(one, start) | {"repeat": number} for start, number in pieces if number
+        ]
         group += 1 if before else 0
     return [tables[group]]
 

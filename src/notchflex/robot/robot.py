@@ -11,6 +11,7 @@ from notchflex.errors import InputError
 from notchflex.robot._explain import fields_of, sentences
 from notchflex.robot._part import ProblemError, part
 from notchflex.robot.kinds import Friction, Material, Notch, one_of
+from notchflex.robot.opening import openings_along
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
@@ -74,10 +75,17 @@ class Robot:
             yield ("notch", f"makes {number} notches; at most {MOST_NOTCHES} are allowed.")
             return
         first = 1
+        last: Notch | None = None  # the notch right before the table
+        found: list[tuple[str, str]] = []
+        row: list[tuple[str, str]] = []  # what one notch lacks its neighbours often lack too
         for notch in self.notch:
-            for key, text in notch.problems(self.tube):
-                yield (f"notch[{first}].{key}", text)
+            found += [(f"notch[{first}].{key}", text) for key, text in notch.problems(self.tube)]
+            if last and not row:
+                row = [(f"notch[{first}].{key}", text) for key, text in notch.row_problems(last)]
             first += notch.repeat
+            last = notch.expanded()[-1]
+        found += row
+        yield from found
         for i, tendon in enumerate(self.tendon, start=1):
             if tendon.radius > self.tube.outer_radius:
                 yield (
@@ -91,15 +99,36 @@ class Robot:
                     f"is {tendon.end_body}; the robot has the bodies 1 to {number}, one after each "
                     "notch.",
                 )
+            elif not found:
+                for key, text in self._tendon_problems(tendon):
+                    yield (f"tendon[{i}].{key}", text)
+
+    def _tendon_problems(self, tendon: Tendon) -> Iterator[tuple[str, str]]:
+        """Check a tendon against the notches that it crosses, and the body that it ends in."""
+        end = tendon.end_body or self.number_of_notches
+        found: dict[tuple[str, str], None] = {}  # equal notches say the same
+        first = 1
+        for notch in self.notch:
+            if first <= end:
+                found |= dict.fromkeys(notch.tendon_problems(tendon))
+            first += notch.repeat
+        yield from found
+        if found or tendon.end_body is None:
+            return
+        bodies = [number for number, _ in openings_along(self.notches, tendon.direction_deg)]
+        if end not in bodies:
+            near = [n for n in bodies if n < end][-1:] + [n for n in bodies if n > end][:1]
+            yield (
+                "end_body",
+                f"is {end}, which has no wall on the tendon's side of the tube; the tendon runs "
+                f"through the {'bodies' if len(near) > 1 else 'body'} "
+                f"{' and '.join(map(str, near))} there.",
+            )
 
     @functools.cached_property
     def notches(self) -> tuple[Notch, ...]:
         """Every notch from base to tip, each with `repeat` 1."""
-        return tuple(
-            single
-            for notch in self.notch
-            for single in (dataclasses.replace(notch, repeat=1),) * notch.repeat
-        )
+        return tuple(single for notch in self.notch for single in notch.expanded())
 
     @property
     def number_of_notches(self) -> int:

@@ -20,7 +20,10 @@ class Tendon:
             None is the last body.
         axial_stiffness: E A of the tendon [N]; infinite is an inextensible tendon.
         path: How it crosses a notch: "wall-arc" lies on the concentric arc of the wall
-            (Pacheco 2021, eq. 3), "straight" is the chord between the edges.
+            (Pacheco 2021, eq. 3), "straight" is the chord between the edges.  Two more readings of
+            a straight tendon pull on the body beyond a gap not along that chord but parallel to
+            the channel of the body before the gap ("straight-dead") or of the body beyond it
+            ("straight-follower"); Liu 2022 leaves the choice open.
         free_length: Length between the drive and the base [mm]; counts for stretch only.
 
     Example:
@@ -40,9 +43,11 @@ class Tendon:
         FloatOrInf, quantity("N", "E A of the tendon; inf is inextensible", above=0)
     ] = math.inf
     path: Annotated[
-        Literal["wall-arc", "straight"],
+        Literal["wall-arc", "straight", "straight-dead", "straight-follower"],
         Field(
-            description='"wall-arc" (along the arc of the wall) or "straight" (across the notch)'
+            description='"wall-arc" (along the arc of the wall), "straight" (across the notch), '
+            '"straight-dead" or "straight-follower" (across it, the pull parallel to the channel '
+            "of the body before or beyond it)"
         ),
     ] = "wall-arc"
     free_length: Annotated[

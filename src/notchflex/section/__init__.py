@@ -3,3 +3,5 @@
 from notchflex.section.section import Section as Section
 from notchflex.section.sector import annular_sector as annular_sector
 from notchflex.section.segment import annular_segment as annular_segment
+from notchflex.section.two_walls import clamped_torsion_constant as clamped_torsion_constant
+from notchflex.section.two_walls import two_walls as two_walls

@@ -1,22 +1,26 @@
 """Statics: loads, balance, Newton's method, states with memory."""
 
 from notchflex.statics.closing import Closing, closing
+from notchflex.statics.external import BodyForce, ExternalLoad
 from notchflex.statics.kinematics import (
     SharedStroke,
     bodies_from_angles,
     equal_stroke,
     tip_from_angles,
 )
-from notchflex.statics.load import Load, LoadPath, draw, pull
+from notchflex.statics.load import Load, LoadPath
 from notchflex.statics.newton import Settings
 from notchflex.statics.path import ConvergenceError, Equilibrium, Path
+from notchflex.statics.ramps import draw, pull
 from notchflex.statics.solve import simulate, solve, solve_each
 from notchflex.statics.state import SavedState, State
 
 __all__ = [
+    "BodyForce",
     "Closing",
     "ConvergenceError",
     "Equilibrium",
+    "ExternalLoad",
     "Load",
     "LoadPath",
     "Path",

@@ -9,22 +9,26 @@ from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import constant, jax, jnp
 from notchflex.chain import Chain
+from notchflex.contact import closing_travel
 from notchflex.flexure import fibre_stretch
+from notchflex.statics.applied import Applied
 from notchflex.statics.element import Beyond
 from notchflex.statics.walk import per_tendon
 from notchflex.tendon.wall_arc import WallArc
 
 
 class Command(NamedTuple):
-    """Demand on every tendon.
+    """Demand on every tendon, and the other loads.
 
     Attributes:
         value: Tension (N) or stroke (mm).
         by_stroke: Whether it is a stroke.
+        applied: Other loads on the bodies; None for a chain assembled for tendons alone.
     """
 
     value: Float[Array, " t"]
     by_stroke: Bool[Array, " t"]
+    applied: Applied | None
 
 
 def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Beyond) -> Float[Array, " t"]:
@@ -36,20 +40,18 @@ def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Beyond) -> Floa
 def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
     """Stroke at which every notch is closed (mm), infinite where that is not known beforehand.
 
-    Where one bending mode closes a notch, a tendon on the wall shortens by the notch's travel
-    times its lever.
+    Where every notch closes against its spine, a tendon on the wall shortens by the notch's
+    travel times its lever.
     """
     reach = np.full(chain.tendons, np.inf)
     rods = jax.tree.map(np.asarray, chain.rods)
-    if rods.modes != 1:
+    travel = closing_travel(rods)
+    if not np.isfinite(travel).all():
         return reach
-    to_lip = np.einsum("nc,nic,ni->n", fibre_stretch(rods.lip), rods.reference_strain, rods.length)
-    lip_slope = np.einsum("nc,nicm,ni->n", fibre_stretch(rods.lip), rods.basis, rods.length)
-    travel = -to_lip / lip_slope
     for group in chain.groups:
         if isinstance(group, WallArc):
             weights = fibre_stretch(constant(group.across))
-            slope = np.einsum("ntc,nicm,ni->nt", weights, rods.basis, rods.length)
+            slope = np.einsum("ntc,nic,ni->nt", weights, rods.basis[..., 0], rods.length)
             loss = np.asarray(group.present) * np.maximum(-slope * travel[:, None], 0.0)
             reach[list(group.numbers)] = loss.sum(axis=0)
     return reach

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 from scipy.optimize import elementwise
 
+from notchflex._jax import constant
 from notchflex.chain import Chain, assemble
+from notchflex.contact import closing_travel, free_angle
 from notchflex.robot import Robot
-from notchflex.statics.load import LoadPath
+from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
-from notchflex.statics.path import command
 from notchflex.statics.run import lips
 from notchflex.statics.stepping import at_rest
-from notchflex.tendon.wall_arc import WallArc
 
 # Where a tension of this many times the one that would close a linear notch does not close it,
 # it is said not to close.
@@ -62,38 +63,36 @@ def closing(robot: Robot) -> Closing:
     """
     chain = assemble(robot)
     rods = chain.rods
+    travel, free = closing_travel(rods), free_angle(rods)
     height = np.asarray(rods.length.sum(-1))
-    lever = np.asarray(rods.lip[:, 0])
-    free = np.asarray((rods.length * rods.reference_strain[..., 1]).sum(-1))
-    angle = height / lever
-    elastic = (angle - free) / height
     section = rods.section
     spine, near = np.asarray(section.edge_spine)[:, 0], np.asarray(section.edge_near)[:, 0]
-    arm = _moment_arms(chain)
+    arm = moment_arms(chain)
     tendon = np.argmax(arm, axis=1)
     longest = arm[np.arange(len(arm)), tendon]
+    tension, met = _tensions(chain, tendon, longest, travel)
+    has_spine = np.isfinite(travel)
+    elastic = np.where(has_spine, travel / height, np.nan)
     return Closing(
-        angle=angle,
-        tension=_tensions(chain, tendon, longest, angle - free),
+        angle=np.where(has_spine, travel + free, met),
+        tension=tension,
         tendon=tendon + 1,
         outer_strain=elastic * spine,
         peak_strain=np.abs(elastic) * np.maximum(spine, near),
     )
 
 
-def _moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
-    """Lever of every tendon about the neutral axis of every notch in the free robot, mm."""
+def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
+    """Lever of every tendon about the neutral axis of every notch in the free robot, mm.
+
+    Positive where it bends the notch toward its direction; 0 where it does not go.
+    """
+    place = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_place)[..., 0]
+    spine = np.where(np.asarray(chain.rods.lip_closes) > 0.0, chain.rods.end_offset[:, 0], 0.0)
     arm = np.zeros((chain.flexures, chain.tendons))
     for group in chain.groups:
-        across = (
-            group.across[..., 0]
-            if isinstance(group, WallArc)
-            else (
-                np.einsum("nab,ntb->nta", chain.rods.end_rotation, group.entry)[..., 0]  # type: ignore[attr-defined]
-                + np.asarray(chain.rods.end_offset)[:, None, 0]
-            )
-        )
-        arm[:, list(group.numbers)] = np.asarray(group.present) * np.asarray(across)
+        own = list(group.numbers)
+        arm[:, own] = np.asarray(group.present) * (place[:, own] + spine[:, None])
     return arm
 
 
@@ -102,27 +101,34 @@ def _tensions(
     tendon: np.ndarray,
     arm: Float[np.ndarray, " n"],
     travel: Float[np.ndarray, " n"],
-) -> Float[np.ndarray, " n"]:
-    """Base tension that closes every notch, pulling its own tendon."""
-    found = np.full(chain.flexures, np.nan)
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Base tension that closes every notch, pulling its own tendon, and the notch's angle then."""
+    found, met = np.full(chain.flexures, np.nan), np.full(chain.flexures, np.nan)
     notches = np.flatnonzero((arm > 0.0) & (travel > 0.0))
     if len(notches) == 0:
-        return found
+        return found, met
     stiffness = np.asarray(chain.lip_stiffness)
     rest = at_rest(chain)
 
-    def pressed(tension: Float[np.ndarray, " m"], notch: Float[np.ndarray, " m"]) -> np.ndarray:
+    def states(tension: Float[np.ndarray, " m"], notch: np.ndarray) -> tuple[np.ndarray, ...]:
         # Always as many rows as notches, whichever are still searched: one compiled program.
         which = np.resize(notch.astype(int), chain.flexures)
         rows = np.arange(chain.flexures)
-        value = np.full((chain.flexures, chain.tendons), np.nan)
+        value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[which]] = np.resize(tension, chain.flexures)
-        load = LoadPath(value, np.full_like(value, np.nan))
-        force, gap, converged = lips(chain, command(load), rest, Settings())
+        by_stroke = np.zeros(value.shape, bool)
+        commands = Command(constant(value), cast("Array", by_stroke), None)
+        force, gap, angle, converged = lips(chain, commands, rest, Settings())
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
-        return np.where(converged, overlap, np.nan)[: len(notch)]
+        return np.where(converged, overlap, np.nan)[: len(notch)], angle[rows, which][: len(notch)]
 
-    linear = np.asarray(chain.stiffness)[notches, 0] * travel[notches] / arm[notches]
+    def pressed(tension: Float[np.ndarray, " m"], notch: Float[np.ndarray, " m"]) -> np.ndarray:
+        return states(tension, notch)[0]
+
+    # Where the lips are not opposite a spine, the angle they meet at is of the size of their
+    # opening over the tube's radius: half a radian serves to begin with.
+    scale = np.where(np.isfinite(travel), travel, 0.5)
+    linear = np.asarray(chain.stiffness)[notches, 0] * scale[notches] / arm[notches]
     high = linear.copy()
     for _ in range(int(np.log2(_BEYOND_LINEAR)) + 1):
         short = ~(pressed(high, notches) > 0.0)
@@ -136,4 +142,6 @@ def _tensions(
         tolerances={"xatol": 0.0, "xrtol": _PRECISION, "fatol": 0.0, "frtol": 0.0},
     )
     found[notches] = np.where(root.success, root.x, np.nan)
-    return found
+    angle = states(np.where(root.success, root.x, 0.0), notches.astype(float))[1]
+    met[notches] = np.where(root.success, angle, np.nan)
+    return found, met

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from notchflex._jax import jax, jit, jnp
 from notchflex.chain import Chain, assemble, prepared
+from notchflex.contact import closing_travel, free_angle
 from notchflex.errors import InputError
 from notchflex.flexure import relative_pose
 from notchflex.motion import Motion
@@ -77,7 +78,7 @@ def tip_from_angles(
         [[0.0, 0.0, 10.0]]
     """
     position, rotation = bodies_from_angles(robot, notch_angle)
-    along = rotation[:, -1, :, 2] * robot.notches[-1].uncut_length
+    along = rotation[:, -1, :, 2] * robot.notches[-1].spacing(None)
     return position[:, -1] + along, rotation[:, -1]
 
 
@@ -152,8 +153,8 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
             f"which it bends; that of {robot.name} does not"
         )
     share = drawn[:, None] / chain.flexures
-    closing = np.asarray(chain.rods.length.sum(-1) / chain.rods.lip[:, 0])
-    free = np.asarray((chain.rods.length * chain.rods.reference_strain[..., 1]).sum(-1))
+    free = free_angle(chain.rods)
+    closing = free + closing_travel(chain.rods)
     angle = np.clip(free + share / arm, free, closing)
     lost = np.maximum(share - arm * (angle - free), 0.0)
     # Rounding of a share that is taken whole is no loss.

@@ -1,21 +1,23 @@
-"""What is done to a robot: tension or stroke at the base of every tendon, step by step."""
+"""What is done to a robot, step by step: its tendons pulled or drawn, loads from outside."""
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
 from notchflex.errors import InputError
+from notchflex.statics.external import NOTHING, BodyForce, ExternalLoad
+from notchflex.statics.given import number, shown, table, vector
 
 _FORM = "a number, or one entry per tendon with None where nothing is commanded"
+_TURN = "rotation vector, rad"
 
 
-@dataclass(frozen=True)
-class Load:
+@dataclass(frozen=True, repr=False)
+class Load(ExternalLoad):
     """One load on a robot.
 
     Args:
@@ -23,17 +25,38 @@ class Load:
             a sequence has one entry per tendon, None where its tension is not commanded.
         stroke: Tendon drawn out at the base since the free robot, mm; in the same form.
         base_rotation: Rotation vector of the base in the world, rad.
+        tip_force: Force at the tip, N; in the world, or in the tip's frame if `following`.
+        tip_moment: Moment at the tip, N mm; in the same frame.
+        tip_point: Where the tip force acts and the tip mass hangs, from the tip (the end of the
+            last uncut length, on the tube axis), in the tip's frame, mm.
+        following: Whether tip force and tip moment turn with the tip.
+        body_forces: Forces and moments on single bodies, each a `BodyForce`.
+        tip_mass: Mass that hangs at the tip point, g.
+        gravity: Acceleration of gravity in the world, m/s^2. Given, the robot's own weight counts
+            where its material has a density. Not given, a tip mass hangs along (0, 0, -9.81).
 
-    A tendon of which neither is commanded hangs slack (0 N).
+    A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
+
+    Raises:
+        InputError: A load from outside is not of its form; tensions and strokes are checked when
+            the robot is known.
 
     Example:
-        >>> Load(tension=2.0)
-        Load(tension=2.0, stroke=None, base_rotation=(0.0, 0.0, 0.0))
+        >>> Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
+        Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
     """
 
     tension: float | Sequence[float | None] | None = None
     stroke: float | Sequence[float | None] | None = None
     base_rotation: Sequence[float] = (0.0, 0.0, 0.0)
+
+    def __repr__(self) -> str:
+        """What is given, and nothing of what is not; tendons first."""
+        ordered = sorted(fields(self), key=lambda one: bool(one.kw_only))
+        values = {one.name: getattr(self, one.name) for one in ordered}
+        unlike = {one.name for one in ordered if repr(values[one.name]) != repr(one.default)}
+        given = (f"{name}={value!r}" for name, value in values.items() if name in unlike)
+        return f"Load({', '.join(given)})"
 
 
 @dataclass(frozen=True)
@@ -44,17 +67,20 @@ class LoadPath:
         tension: Commanded tensions, N, steps by tendons, NaN where not commanded.
         stroke: Commanded strokes, mm, in the same form.
         base_rotation: Rotation vector of the base in the world, rad.
+        external: What acts from outside at each step; nothing where not given. `loaded` puts the
+            same on all steps.
     """
 
     tension: np.ndarray
     stroke: np.ndarray
     base_rotation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    external: tuple[ExternalLoad, ...] = ()
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        tension = np.atleast_2d(_table(self.tension, "tension"))
-        stroke = np.atleast_2d(_table(self.stroke, "stroke"))
-        base_rotation = _rotation(self.base_rotation)
+        tension = np.atleast_2d(table(self.tension, "tension"))
+        stroke = np.atleast_2d(table(self.stroke, "stroke"))
+        base_rotation = np.array(vector(self.base_rotation, "base_rotation", _TURN))
         if tension.shape != stroke.shape or tension.ndim != 2:
             raise InputError(
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
@@ -75,6 +101,7 @@ class LoadPath:
         object.__setattr__(self, "tension", tension)
         object.__setattr__(self, "stroke", stroke)
         object.__setattr__(self, "base_rotation", base_rotation)
+        object.__setattr__(self, "external", _for_steps(self.external, len(tension)))
 
     def __len__(self) -> int:
         """Number of steps."""
@@ -84,13 +111,15 @@ class LoadPath:
         """The same way there and back, the peak twice.
 
         Example:
+            >>> from notchflex import pull
             >>> len(pull(0.0, 3.0, steps=31).release())
             62
         """
-        return LoadPath(
-            np.concatenate([self.tension, self.tension[::-1]]),
-            np.concatenate([self.stroke, self.stroke[::-1]]),
-            self.base_rotation,
+        return replace(
+            self,
+            tension=np.concatenate([self.tension, self.tension[::-1]]),
+            stroke=np.concatenate([self.stroke, self.stroke[::-1]]),
+            external=self.external + self.external[::-1],
         )
 
     def then(self, following: LoadPath) -> LoadPath:
@@ -100,20 +129,69 @@ class LoadPath:
             InputError: What follows is no path.
 
         Example:
+            >>> from notchflex import pull
             >>> pull(0.0, 1.0, steps=2).then(pull(1.0, 1.0, steps=1, tendon=2)).tension.tolist()
             [[0.0, nan], [1.0, nan], [nan, 1.0]]
         """
         if not isinstance(following, LoadPath):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError(
-                f"a load path goes on with another notchflex.LoadPath; got {_shown(following)}"
+                f"a load path goes on with another notchflex.LoadPath; got {shown(following)}"
             )
         count = max(self.tension.shape[1], following.tension.shape[1])
         first, second = self.for_tendons(count), following.for_tendons(count)
-        return LoadPath(
-            np.concatenate([first.tension, second.tension]),
-            np.concatenate([first.stroke, second.stroke]),
-            self.base_rotation,
+        return replace(
+            self,
+            tension=np.concatenate([first.tension, second.tension]),
+            stroke=np.concatenate([first.stroke, second.stroke]),
+            external=self.external + following.external,
         )
+
+    def loaded(
+        self,
+        *,
+        tip_force: Sequence[float] | None = None,
+        tip_moment: Sequence[float] | None = None,
+        tip_point: Sequence[float] | None = None,
+        following: bool | None = None,
+        body_forces: Sequence[BodyForce] | None = None,
+        tip_mass: float | None = None,
+        gravity: Sequence[float] | None = None,
+    ) -> LoadPath:
+        """The same path with loads from outside on all its steps.
+
+        Args:
+            tip_force: Force at the tip, N; this and all others as in `Load`.
+            tip_moment: Moment at the tip, N mm.
+            tip_point: Where the tip force acts and the tip mass hangs, mm.
+            following: Whether tip force and tip moment turn with the tip.
+            body_forces: Forces and moments on single bodies.
+            tip_mass: Mass that hangs at the tip point, g.
+            gravity: Acceleration of gravity in the world, m/s^2.
+
+        What is not given stays as it is.
+
+        Raises:
+            InputError: A value is not of its form.
+
+        Example:
+            >>> from notchflex import pull
+            >>> path = pull(0.0, 1.0, steps=2).loaded(tip_force=(0.0, 0.1, 0.0))
+            >>> [one.tip_force for one in path.release().external]
+            [(0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0)]
+        """
+        every: dict[str, Any] = {
+            "tip_force": tip_force,
+            "tip_moment": tip_moment,
+            "tip_point": tip_point,
+            "following": following,
+            "body_forces": body_forces,
+            "tip_mass": tip_mass,
+            "gravity": gravity,
+        }
+        given = {name: value for name, value in every.items() if value is not None}
+        # Usually all steps carry the same: each different load is made and checked once.
+        changed = {one: replace(one, **given) for one in dict.fromkeys(self.external)}
+        return replace(self, external=tuple(changed[one] for one in self.external))
 
     def for_tendons(self, count: int) -> LoadPath:
         """The same path for a robot of so many tendons; tendons not named hang slack."""
@@ -124,71 +202,11 @@ class LoadPath:
                 f"give at most {count}"
             )
         added = np.full((len(self), count - given), np.nan)
-        return LoadPath(
-            np.concatenate([self.tension, added], axis=1),
-            np.concatenate([self.stroke, added], axis=1),
-            self.base_rotation,
+        return replace(
+            self,
+            tension=np.concatenate([self.tension, added], axis=1),
+            stroke=np.concatenate([self.stroke, added], axis=1),
         )
-
-
-def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
-    """Pull one tendon by tension, from one value to another in equal steps.
-
-    Args:
-        start: First tension, N.
-        stop: Last tension, N.
-        steps: Number of steps, both ends included.
-        tendon: Which tendon, counted from 1.
-
-    Returns:
-        The path; `.release()` adds the way back.
-
-    Raises:
-        InputError: Fewer than one step, a negative or infinite tension, no such tendon.
-
-    Example:
-        >>> pull(0.0, 3.0, steps=4).tension[:, 0].tolist()
-        [0.0, 1.0, 2.0, 3.0]
-    """
-    return _ramp("tension", start, stop, steps, tendon)
-
-
-def draw(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
-    """Draw one tendon by stroke, from one value to another in equal steps.
-
-    Args:
-        start: First stroke, mm.
-        stop: Last stroke, mm.
-        steps: Number of steps, both ends included.
-        tendon: Which tendon, counted from 1.
-
-    Returns:
-        The path; `.release()` adds the way back.
-
-    Raises:
-        InputError: Fewer than one step, an infinite stroke, no such tendon.
-
-    Example:
-        >>> draw(0.0, 1.0, steps=3).stroke[:, 0].tolist()
-        [0.0, 0.5, 1.0]
-    """
-    return _ramp("stroke", start, stop, steps, tendon)
-
-
-def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> LoadPath:
-    steps, tendon = _whole(steps, "steps"), _whole(tendon, "tendon")
-    if steps < 1:
-        raise InputError(f"a range needs at least one step; got {steps}")
-    if tendon < 1:
-        raise InputError(f"tendons are counted from 1; got {tendon}")
-    first, last = _number(start, f"the first {what}"), _number(stop, f"the last {what}")
-    commanded = np.full((steps, tendon), np.nan)
-    with np.errstate(over="ignore", invalid="ignore"):
-        commanded[:, tendon - 1] = np.linspace(first, last, steps)
-    if not np.isfinite(commanded[:, tendon - 1]).all():
-        raise InputError(f"a {what} range needs finite ends; got {first:g} and {last:g}")
-    nothing = np.full_like(commanded, np.nan)
-    return LoadPath(commanded, nothing) if what == "tension" else LoadPath(nothing, commanded)
 
 
 def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
@@ -210,21 +228,42 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
         every = [loads] if isinstance(loads, Load) else list(loads)
     except TypeError:
         raise InputError(
-            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {_shown(loads)}"
+            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {shown(loads)}"
         ) from None
     if not every:
         raise InputError("there are no loads; give at least one")
     for load in every:
         if not isinstance(load, Load):
             raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
-    rotation = _rotation(every[0].base_rotation)
-    if any((_rotation(load.base_rotation) != rotation).any() for load in every):
+    turns = {vector(load.base_rotation, "base_rotation", _TURN) for load in every}
+    if len(turns) > 1:
         raise InputError("base_rotation must be the same for all loads of a path")
     return LoadPath(
         np.stack([_entries(load.tension, tendons, "tension") for load in every]),
         np.stack([_entries(load.stroke, tendons, "stroke") for load in every]),
-        rotation,
+        np.array(turns.pop()),
+        tuple(load.external for load in every),
     )
+
+
+def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
+    """What acts from outside, one entry per step."""
+    try:
+        given = tuple(external)
+        if not all(isinstance(one, ExternalLoad) for one in given):
+            raise TypeError
+    except TypeError:
+        raise InputError(
+            "external of a load path must hold one ExternalLoad per step; "
+            f"got {shown(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
+        ) from None
+    if given and len(given) != steps:
+        raise InputError(
+            f"external of a load path has {len(given)} entries, but there are {steps} steps; "
+            "give one per step"
+        )
+    plain = tuple(one.external if isinstance(one, Load) else one for one in given)
+    return plain or (NOTHING,) * steps
 
 
 def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
@@ -242,59 +281,10 @@ def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
     for i, entry in enumerate(given):
         if entry is None:
             continue
-        entries[i] = _number(entry, what, _FORM)
+        entries[i] = number(entry, what, _FORM)
         if not np.isfinite(entries[i]):
-            raise InputError(f"{what} must be finite; got {_shown(entry)}")
+            raise InputError(f"{what} must be finite; got {shown(entry)}")
     return entries
 
 
-def _number(value: Any, what: str, form: str = "a number") -> float:
-    """A number, which text and truth values are not."""
-    try:
-        if isinstance(value, str | bytes | bytearray | bool | np.bool_):
-            raise TypeError
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} must be {form}; got {_shown(value)}") from None
-
-
-def _whole(value: Any, what: str) -> int:
-    try:
-        if isinstance(value, bool | np.bool_):
-            raise TypeError
-        return operator.index(value)
-    except TypeError:
-        raise InputError(f"{what} must be a whole number; got {_shown(value)}") from None
-
-
-def _table(value: Any, what: str) -> np.ndarray:
-    """Numbers, steps by tendons; None within them is NaN."""
-    try:
-        if value is None or np.asarray(value).dtype.kind not in "iufO":
-            raise TypeError
-        return np.asarray(value, float)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(
-            f"{what} of a load path must be numbers, steps by tendons; got {_shown(value)}"
-        ) from None
-
-
-def _rotation(value: Any) -> np.ndarray:
-    try:
-        rotation = np.asarray(value, float)
-    except (TypeError, ValueError, OverflowError):
-        rotation = np.empty(0)
-    if rotation.shape != (3,) or not np.isfinite(rotation).all():
-        raise InputError(
-            f"base_rotation needs three finite numbers (rotation vector, rad); got {_shown(value)}"
-        )
-    return rotation
-
-
-def _shown(value: Any) -> str:
-    """A value as Python writes it, cut short."""
-    try:
-        text = " ".join(repr(value).split())
-    except ValueError:  # a whole number of thousands of digits
-        text = f"a huge {type(value).__name__}"
-    return text if len(text) <= 60 else f"{text[:57]}..."
+__all__ = ["Load", "LoadPath", "load_path"]

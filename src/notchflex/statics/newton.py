@@ -12,7 +12,8 @@ from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual, stroke
 from notchflex.statics.element import Memory, Unknowns
-from notchflex.statics.sweep import linear_step
+from notchflex.statics.play import played
+from notchflex.statics.sweep import Step, linear_step
 from notchflex.statics.walk import evaluate
 
 
@@ -45,6 +46,7 @@ class NewtonResult(NamedTuple):
     Attributes:
         point: The answer, or the last guess.
         slid: Tendon slid over the contacts there, mm.
+        bound: Largest log ratios of the contacts there.
         stroke: Tendon drawn out at the base there, mm.
         residual: Largest scaled imbalance there.
         iterations: Iterations taken.
@@ -53,6 +55,7 @@ class NewtonResult(NamedTuple):
 
     point: Point
     slid: tuple[Float[Array, "n t 2"], ...]
+    bound: tuple[Float[Array, "n t 2"], ...]
     stroke: Float[Array, " t"]
     residual: Float[Array, ""]
     iterations: Int[Array, ""]
@@ -78,6 +81,10 @@ _TRIES = 7
 # The first steps are taken whole, whatever they do to the imbalance: where a tendon turns round,
 # all its contacts must leave their bound at once, and the way there is not downhill.
 _UNLIMITED = 8
+# With a stroke given, contacts are put by the play operator in so many first iterations, while the
+# imbalance is above this.
+_PLAYED = 15
+_PLAYED_ABOVE = 1e-4
 # A state whose imbalance has stopped falling at this multiple of the tolerance is as good as
 # rounding allows.
 _ROUNDING = 100.0
@@ -85,7 +92,12 @@ _LARGEST_GROWTH = 1e4
 
 
 def newton(
-    chain: Chain, command: Command, memory: Memory, start: Point, settings: Settings
+    chain: Chain,
+    command: Command,
+    memory: Memory,
+    before: Float[Array, " t"],
+    start: Point,
+    settings: Settings,
 ) -> NewtonResult:
     """Find the equilibrium under a command near a starting point.
 
@@ -96,6 +108,7 @@ def newton(
         chain: The chain.
         command: What is demanded of the tendons.
         memory: What the contacts remember; not changed.
+        before: Base tensions of the last solved state, N.
         start: Where to begin.
         settings: How hard to try.
 
@@ -104,10 +117,12 @@ def newton(
     """
     # Rounding grows with the moments that must balance, so the tolerance does, within reason.
     height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
-    turn_per_newton = height / jnp.min(chain.stiffness)
+    softest = jnp.min(jnp.where(chain.rods.idle > 0.0, jnp.inf, chain.stiffness))
+    turn_per_newton = height / softest
     largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
     growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
     tolerance = settings.tolerance * growth
+    closing_force = jnp.mean(chain.lip_stiffness * jnp.sum(chain.rods.length, axis=-1))
 
     def searching(search: _Search) -> Bool[Array, ""]:
         return ~search.over & (search.best.iterations <= settings.max_iterations)
@@ -115,7 +130,7 @@ def newton(
     def iterate(search: _Search) -> _Search:
         best = search.best
         point = jax.tree.map(lambda at, by: at + search.part * by, best.point, search.step)
-        at = evaluate(chain, point.unknowns, memory, point.base_tension)
+        at = evaluate(chain, point.unknowns, memory, point.base_tension, command.applied)
         demand = command_residual(chain, command, point.base_tension, at.base)
         residual = ravel_pytree((at.result.residual, demand))[0]
         largest, size = jnp.max(jnp.abs(residual)), jnp.linalg.norm(residual)
@@ -127,6 +142,7 @@ def newton(
         found = NewtonResult(
             point=point,
             slid=at.result.slid,
+            bound=at.result.bound,
             stroke=stroke(chain, point.base_tension, at.base),
             residual=largest,
             iterations=best.iterations + 1,
@@ -139,7 +155,33 @@ def newton(
             logs = [jnp.max(jnp.abs(leaf), initial=0.0) for leaf in step.unknowns.log_ratio]
             log_ratio = jnp.max(jnp.array([0.0, *logs]))
             whole = jnp.minimum(_LARGEST_TURN / turn, _LARGEST_LOG_RATIO / log_ratio)
-            return Point(step.unknowns, step.base_tension), jnp.minimum(1.0, whole)
+            part = jnp.minimum(1.0, whole)
+            # While the tensions of tendons drawn by stroke are still to be found, every contact
+            # is put where its tension would leave it, not where a linear step does; and stuck
+            # contacts, which make a tendon very stiff, must not throw its tension about.
+            early = (
+                jnp.any(command.by_stroke) & (best.iterations < _PLAYED) & (largest > _PLAYED_ABOVE)
+            )
+            tension = point.base_tension + jnp.where(early, part, 1.0) * step.base_tension
+            moderate = jnp.clip(
+                tension, 0.5 * point.base_tension, 2.0 * point.base_tension + closing_force
+            )
+            tension = jnp.where(early & command.by_stroke, moderate, tension)
+            put = played(chain, before, tension, memory._replace(bound=at.result.bound))
+            there = jax.tree.map(jnp.subtract, put, point.unknowns.log_ratio)
+            turn_part = jnp.minimum(1.0, _LARGEST_TURN / turn)
+            part = jnp.where(early, turn_part, part)
+            step = Step(
+                step.unknowns._replace(
+                    log_ratio=jax.tree.map(
+                        lambda own, other: jnp.where(early, other / part, own),
+                        step.unknowns.log_ratio,
+                        there,
+                    )
+                ),
+                jnp.where(early, (tension - point.base_tension) / part, step.base_tension),
+            )
+            return Point(step.unknowns, step.base_tension), part
 
         step, part = jax.lax.cond(taken & ~solved, again, lambda: (search.step, 0.5 * search.part))
         return _Search(
@@ -154,6 +196,7 @@ def newton(
     nowhere = NewtonResult(
         point=start,
         slid=memory.slid,
+        bound=memory.bound,
         stroke=jnp.zeros(chain.tendons),
         residual=jnp.array(jnp.inf),
         iterations=jnp.array(-1),

@@ -15,6 +15,7 @@ from notchflex.chain import Chain
 from notchflex.motion import rotation_about
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command, drawn_when_closed
+from notchflex.statics.applied import applied
 from notchflex.statics.load import LoadPath
 from notchflex.statics.run import Run, stability
 from notchflex.statics.state import State
@@ -28,6 +29,8 @@ class ConvergenceError(RuntimeError):
 # A stroke is followed up to the last good state before the last notch closes, which leaves it
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
+# Log ratios this close to their bound are on it.
+_NEAR_BOUND = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +99,19 @@ class Path:
         """Angle of every notch, base to tip, precurvature included, rad, (s, n)."""
         return self._of("notch_angle")
 
+    @property
+    def chord_angle(self) -> np.ndarray:
+        """Angle by which the chord of every flexure has turned (Liu 2022), rad, (s, n).
+
+        NaN where a flexure is none whose chord is of interest.
+        """
+        return self._of("chord_angle")
+
+    @cached_property
+    def total_chord_angle(self) -> np.ndarray:
+        """Sum of the chord angles, the bending angle of Liu 2022, rad, (s,)."""
+        return self.chord_angle.sum(axis=-1)
+
     @cached_property
     def total_angle(self) -> np.ndarray:
         """Bending angle of the whole robot, rad, (s,).
@@ -136,9 +152,9 @@ class Path:
 
     @property
     def span_tension(self) -> np.ndarray:
-        """Tension along every tendon: proximal, gap 1, body 1, gap 2, ..., gap n, N, (s, t, 2n).
+        """Tension along every tendon: proximal, gap 1, body 1, gap 2, ..., last gap, N.
 
-        NaN beyond the end body of a tendon.
+        (s, t, spans): gaps and bodies that the tendon runs through, NaN beyond its end.
         """
         return self._of("span_tension")
 
@@ -174,23 +190,85 @@ class Path:
 
     @property
     def contact_log_ratio(self) -> np.ndarray:
-        """ln(tension on the base side / on the tip side) at every contact, (s, t, 2n - 1)."""
+        """ln(tension on the base side / on the tip side) at every contact, (s, t, contacts)."""
         return self._of("contact_log_ratio")
 
     @property
     def contact_slid(self) -> np.ndarray:
-        """Tendon slid over every contact toward the base, mm, (s, t, 2n - 1)."""
+        """Tendon slid over every contact toward the base, mm, (s, t, contacts)."""
         return self._of("contact_slid")
 
     @property
     def contact_bound(self) -> np.ndarray:
-        """Largest magnitude of the log ratio at every contact, (s, t, 2n - 1)."""
+        """Largest magnitude of the log ratio at every contact, (s, t, contacts)."""
         return self._of("contact_bound")
 
     @property
+    def contact_turning(self) -> np.ndarray:
+        """Angle by which the tendon turns at every contact, rad, (s, t, contacts)."""
+        return self._of("contact_turning")
+
+    @property
     def contact_state(self) -> np.ndarray:
-        """0 sticks, +1 slips toward the base, -1 toward the tip, (s, t, 2n - 1)."""
+        """0 sticks, +1 slips toward the base, -1 toward the tip, (s, t, contacts)."""
         return self._of("contact_state")
+
+    @cached_property
+    def front(self) -> tuple[np.ndarray, np.ndarray]:
+        """How far a turn of the friction has come along every tendon, m and eta, (s, t) each.
+
+        Gao 2017, eq. 26: the friction of contact i is that of letting go for i < m, eta times
+        the largest for i = m, and that of pulling for i > m. Contacts are counted from 1 at the
+        base; m is one more than there are when all have turned (eta is then NaN). A tendon that
+        is pulled for the first time has m = 1 and eta = 1.
+        """
+        ratio, bound = self.contact_log_ratio, self.contact_bound
+        there = ~np.isnan(ratio)
+        rubs = there & (bound > 0.0)
+        # A contact without friction (a law may lay it all on one edge of a gap) is passed over.
+        turned = (ratio < 0.0) & (ratio <= _NEAR_BOUND - bound)
+        waits = rubs & ~turned
+        every = np.where(rubs.any(axis=-1), there.sum(axis=-1), 0)
+        count = np.where(waits.any(axis=-1), waits.argmax(axis=-1), every)
+        at_front = np.minimum(count, ratio.shape[-1] - 1)[..., None]
+        own, largest = (
+            np.take_along_axis(value, at_front, axis=-1)[..., 0] for value in (ratio, bound)
+        )
+        holds = waits.any(axis=-1)
+        # Friction over its largest at a corner is (1 - rho)/(1 + rho) over the same at the bound.
+        part = np.tanh(0.5 * own) / np.tanh(0.5 * np.where(holds, largest, 1.0))
+        return count + 1, np.where(holds, part, np.nan)
+
+    @property
+    def front_contact(self) -> np.ndarray:
+        """Contact m of the friction front along every tendon, (s, t); see `front`."""
+        return self.front[0]
+
+    @property
+    def front_eta(self) -> np.ndarray:
+        """Friction eta of that contact over its largest, (s, t); NaN where all have turned."""
+        return self.front[1]
+
+    @property
+    def base_force(self) -> np.ndarray:
+        """Force of the holder on the tube's base in the world, N, (s, 3).
+
+        It balances all loads and the pull of the drives, along the tube, on the tendons.
+        """
+        return self._of("base_force") @ self._base.T
+
+    @property
+    def base_moment(self) -> np.ndarray:
+        """Moment of the holder about the proximal end in the world, N mm, (s, 3)."""
+        return self._of("base_moment") @ self._base.T
+
+    @property
+    def moment_error(self) -> np.ndarray:
+        """Largest |EI kappa - M| along any flexure over the largest |M|, (s,).
+
+        How well the chosen strain modes meet the moment that the loads ask for.
+        """
+        return self._of("moment_error")
 
     @property
     def stored_energy(self) -> np.ndarray:
@@ -219,7 +297,7 @@ class Path:
 
     @cached_property
     def dissipation(self) -> np.ndarray:
-        """Work that every contact turned to heat since the start, N mm, (s, t, 2n - 1).
+        """Work that every contact turned to heat since the start, N mm, (s, t, contacts).
 
         Taken by the trapezoid rule from step to step, as is the work of the tendons, so the two
         balance with the stored energy as the steps get small. Over a few coarse steps across a
@@ -229,8 +307,9 @@ class Path:
 
     @property
     def converged(self) -> np.ndarray:
-        """Whether a step was solved, (s,)."""
-        return np.asarray(self.run.converged)
+        """Whether a step was solved, and within what its friction law holds for, (s,)."""
+        solved = np.asarray(self.run.converged)
+        return solved & (self._of("friction_holds") | ~solved)
 
     @property
     def residual(self) -> np.ndarray:
@@ -254,6 +333,11 @@ class Path:
             failed = int(np.argmin(self.converged))
             return f"not tried, because step {failed + 1} of the path did not converge"
         state = self.run.quantities
+        if self.run.converged[step]:
+            return (
+                "a tendon turns so sharply at an edge that its friction would hold any pull "
+                "(coefficient * tan(turning / 2) is 1 or more), where the friction law says nothing"
+            )
         tension = ", ".join(f"{value:.4g}" for value in np.asarray(state.tension)[step])
         drawn = ", ".join(f"{value:.4g}" for value in np.asarray(state.stroke)[step])
         last = f"the last good state has tension {tension} N and stroke {drawn} mm"
@@ -280,7 +364,9 @@ class Path:
 
     @cached_property
     def _stability(self) -> tuple[np.ndarray, np.ndarray]:
-        value, sign = stability(self.chain, command(self.load), self.run.solved)
+        value, sign = stability(
+            self.chain, command(self.load, self.robot, self.chain), self.run.solved
+        )
         return np.asarray(value), np.asarray(sign)
 
     @property
@@ -299,7 +385,8 @@ class Path:
     def state_at(self, step: int) -> State:
         """State after a step (or the last good one before it), to save or continue from."""
         solved: Solved = tree_util.tree_map(lambda leaf: np.asarray(leaf)[step], self.run.solved)
-        return State(self.robot.name, solved)
+        chain = self.chain
+        return State(self.robot.name, solved, chain.level, chain.loaded, chain.refinement)
 
     @property
     def state(self) -> State:
@@ -338,6 +425,8 @@ class Equilibrium:
         if name.startswith("_") or name in {"run", "before", "chain", "load", "each_from_rest"}:
             raise AttributeError(name)
         value = getattr(self._path, name)
+        if isinstance(value, tuple):  # such as the friction front, m and eta
+            return tuple(part[self._step] for part in cast("tuple[Any, ...]", value))
         return value if name == "robot" else value[self._step]
 
     @property
@@ -356,11 +445,20 @@ class Equilibrium:
         return self
 
 
-def command(load: LoadPath) -> Command:
+def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
     by_stroke = ~np.isnan(load.stroke)
     value = np.where(by_stroke, load.stroke, np.nan_to_num(load.tension))
-    return Command(constant(value), cast("Array", by_stroke))
+    others = None
+    if chain.loaded:
+        others = applied(
+            load,
+            robot,
+            np.asarray(chain.body_mass),
+            np.asarray(chain.body_centre),
+            np.asarray(chain.body_length),
+        )
+    return Command(constant(value), cast("Array", by_stroke), others)
 
 
 __all__ = ["ConvergenceError", "Equilibrium", "Path", "command"]

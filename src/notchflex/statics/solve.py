@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from notchflex.chain import prepared
+import numpy as np
+
+from notchflex.chain import Chain, prepared
 from notchflex.errors import InputError
+from notchflex.flexure import LEVELS
 from notchflex.robot import Robot
+from notchflex.statics.applied import bending_normal, is_planar, is_unloaded
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import Settings
 from notchflex.statics.path import Equilibrium, Path, command
 from notchflex.statics.run import run
 from notchflex.statics.state import SavedState, State, fitted
+
+MOST_REFINEMENT = 3
 
 
 def simulate(
@@ -20,6 +26,7 @@ def simulate(
     *,
     from_state: State | SavedState | None = None,
     settings: Settings | None = None,
+    refinement: int = 0,
 ) -> Path:
     """Follow loads one after the other, with friction that remembers.
 
@@ -28,6 +35,8 @@ def simulate(
         loads: A path such as `pull(0.0, 3.0).release()`, or loads in order.
         from_state: State to continue from; rest where not given.
         settings: How hard the solver tries.
+        refinement: 0 has the strain modes that serve for usual loads, 1, 2, 3 more of them: a
+            result that stays the same can be trusted (`moment_error` tells how much is missing).
 
     Returns:
         The states, one per load. A load that does not converge is told by `converged` and
@@ -42,15 +51,16 @@ def simulate(
         >>> bool(path.total_angle[3] == path.total_angle[2] > path.total_angle[1])
         True
     """
-    chain = prepared(robot)
     load = load_path(loads, robot.number_of_tendons)
     if from_state is not None and from_state.robot != robot.name:
         raise InputError(
             f"the state belongs to robot {from_state.robot!r}, this one is {robot.name!r}; "
             "continue from a state of the same robot"
         )
+    chain = chain_for(robot, load, from_state, refinement)
     start = fitted(from_state, chain)
-    came = run(chain, command(load), start, settings or Settings(), each_from_start=False)
+    commands = command(load, robot, chain)
+    came = run(chain, commands, start, settings or Settings(), each_from_start=False)
     return Path(robot, load, chain, came)
 
 
@@ -60,6 +70,7 @@ def solve(
     *,
     from_state: State | SavedState | None = None,
     settings: Settings | None = None,
+    refinement: int = 0,
 ) -> Equilibrium:
     """Find the equilibrium under one load, from rest or from a state.
 
@@ -68,6 +79,8 @@ def solve(
         load: Tension or stroke of its tendons.
         from_state: State to start from; rest where not given.
         settings: How hard the solver tries.
+        refinement: 0 has the strain modes that serve for usual loads, 1, 2, 3 more of them: a
+            result that stays the same can be trusted (`moment_error` tells how much is missing).
 
     Returns:
         The equilibrium, or the last good state on the way with `converged` false and a reason.
@@ -82,11 +95,15 @@ def solve(
         >>> print(f"{degrees(state.total_angle):.2f} deg")
         150.08 deg
     """
-    return simulate(robot, load, from_state=from_state, settings=settings)[0]
+    return simulate(robot, load, from_state=from_state, settings=settings, refinement=refinement)[0]
 
 
 def solve_each(
-    robot: Robot, loads: LoadPath | Iterable[Load], *, settings: Settings | None = None
+    robot: Robot,
+    loads: LoadPath | Iterable[Load],
+    *,
+    settings: Settings | None = None,
+    refinement: int = 0,
 ) -> Path:
     """Solve many loads, each from rest, without memory from one to the next.
 
@@ -94,6 +111,8 @@ def solve_each(
         robot: The robot.
         loads: The loads.
         settings: How hard the solver tries.
+        refinement: 0 has the strain modes that serve for usual loads, 1, 2, 3 more of them: a
+            result that stays the same can be trusted (`moment_error` tells how much is missing).
 
     Returns:
         The states, one per load; a failure of one does not touch the others.
@@ -107,11 +126,48 @@ def solve_each(
         >>> path.converged.tolist()
         [True, True, True]
     """
-    chain = prepared(robot)
     load = load_path(loads, robot.number_of_tendons)
+    chain = chain_for(robot, load, refinement=refinement)
+    commands = command(load, robot, chain)
     rest = fitted(None, chain)
-    came = run(chain, command(load), rest, settings or Settings(), each_from_start=True)
+    came = run(chain, commands, rest, settings or Settings(), each_from_start=True)
     return Path(robot, load, chain, came, each_from_rest=True)
+
+
+def chain_for(
+    robot: Robot,
+    load: LoadPath,
+    from_state: State | SavedState | None = None,
+    refinement: int = 0,
+) -> Chain:
+    """The chain with modes enough for all loads of a path, and for the state before it."""
+    if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
+        raise InputError(
+            f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
+        )
+    if from_state is not None and from_state.refinement != refinement:
+        raise InputError(
+            f"the state was computed with refinement {from_state.refinement}, not {refinement}; "
+            "go on with the same"
+        )
+    loaded = not is_unloaded(load) or (from_state is not None and from_state.loaded)
+    level = "tendons" if not loaded else "plane"
+    if not (tendons_in_plane(robot) and is_planar(load, robot)):
+        level = "space"
+    if from_state is not None:
+        level = max(level, from_state.level, key=LEVELS.index)
+    return prepared(robot, level, loaded=loaded, refinement=refinement)
+
+
+def tendons_in_plane(robot: Robot) -> bool:
+    """Whether every tendon runs in the one plane in which all notches bend."""
+    normal = bending_normal(robot)
+    if normal is None:
+        return False
+    direction = np.radians([tendon.direction_deg for tendon in robot.tendon])
+    return bool(
+        (np.abs(np.cos(direction) * normal[0] + np.sin(direction) * normal[1]) < 1e-9).all()
+    )
 
 
 __all__ = ["simulate", "solve", "solve_each"]

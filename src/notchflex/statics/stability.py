@@ -44,18 +44,18 @@ def held_stiffness(
     point = solved.point
     modes = point.unknowns.modes.size
     flat, point_of = ravel_pytree(point)
-    here = evaluate(chain, point.unknowns, solved.memory, point.base_tension)
+    here = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
     slid = tuple(
         over - _SLIP * at_bound(ratio, bound)
         for over, ratio, bound in zip(
             here.result.slid, point.unknowns.log_ratio, here.result.bound, strict=True
         )
     )
-    memory = Memory(point.unknowns.log_ratio, slid)
+    memory = Memory(point.unknowns.log_ratio, slid, here.result.bound)
 
     def imbalance(flat: Array) -> Array:
         varied: Point = point_of(flat)
-        at = evaluate(chain, varied.unknowns, memory, varied.base_tension)
+        at = evaluate(chain, varied.unknowns, memory, varied.base_tension, solved.applied)
         demand = command_residual(chain, command, varied.base_tension, at.base)
         residual = at.result.residual
         residual = residual._replace(modes=residual.modes * chain.stiffness)
@@ -64,8 +64,13 @@ def held_stiffness(
     matrix = jax.jacfwd(imbalance)(flat)
     natural_gap = chain.rods.length.sum(-1)
     give = 1.0 / (_HOLDING_STIFFNESS * chain.lip_stiffness * natural_gap)
-    lips = jnp.arange(modes, modes + chain.flexures)
-    matrix = matrix.at[lips, lips].add(give)
+    softened = [jnp.zeros(modes)]
+    softened += [
+        jnp.broadcast_to(give[:, None], group.closes.shape).ravel() for group in chain.lips
+    ]
+    on_diagonal = jnp.concatenate(softened)
+    rows = jnp.arange(len(on_diagonal))
+    matrix = matrix.at[rows, rows].add(on_diagonal)
     drawn = len(flat) - chain.tendons + jnp.arange(chain.tendons)
     soft = command.by_stroke / (_HOLDING_STIFFNESS * stroke_scale(chain))
     matrix = matrix.at[drawn, drawn].add(soft)

@@ -12,9 +12,12 @@ import numpy as np
 
 from notchflex.chain import Chain
 from notchflex.errors import InputError
+from notchflex.flexure import LEVELS
 from notchflex.statics.stepping import Solved, at_rest
 
-_FORMAT = "notchflex state 1"
+_MODES = ".point.unknowns.modes"
+_LOADS = ".applied"
+_FORMAT = "notchflex state 2"
 
 
 @dataclass(frozen=True)
@@ -23,11 +26,17 @@ class State:
 
     Attributes:
         robot: Name of the robot it belongs to.
-        solved: Unknowns, base tensions (N), memory of the contacts and stroke (mm).
+        solved: Unknowns, base tensions (N), memory of the contacts, stroke (mm) and loads.
+        level: For which loads its chain was assembled.
+        loaded: Whether loads other than the tendons' act in it.
+        refinement: How many more modes its chain has than for usual loads.
     """
 
     robot: str
     solved: Solved
+    level: str
+    loaded: bool
+    refinement: int
 
     def save(self, path: str | FilePath) -> None:
         """Write the state to a JSON file.
@@ -38,15 +47,26 @@ class State:
         Raises:
             InputError: The file cannot be written.
         """
-        leaves, _ = tree_util.tree_flatten_with_path(self.solved)
-        arrays = {tree_util.keystr(key): np.asarray(leaf).tolist() for key, leaf in leaves}
-        content = {"format": _FORMAT, "robot": self.robot, "arrays": arrays}
+        content = {
+            "format": _FORMAT,
+            "robot": self.robot,
+            "level": self.level,
+            "loaded": self.loaded,
+            "refinement": self.refinement,
+            "arrays": {name: array.tolist() for name, array in self.arrays.items()},
+        }
         text = json.dumps(content, indent=1) + "\n"
         try:
             FilePath(path).write_text(text, encoding="utf-8")
         except (OSError, ValueError) as error:  # ValueError: a null character in the name
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"the state cannot be written to {path}: {reason}") from None
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Its numbers by name."""
+        leaves, _ = tree_util.tree_flatten_with_path(self.solved)
+        return {tree_util.keystr(key): np.asarray(leaf) for key, leaf in leaves}
 
     @classmethod
     def load(cls, path: str | FilePath) -> SavedState:
@@ -77,7 +97,12 @@ class State:
         robot, arrays = content.get("robot"), content.get("arrays")
         if not isinstance(robot, str) or not isinstance(arrays, dict):
             raise _damaged(path, "the name of its robot or its numbers are missing")
-        return SavedState(robot, arrays, str(path))
+        level, loaded = content.get("level"), content.get("loaded")
+        refinement = content.get("refinement")
+        kept = isinstance(loaded, bool) and isinstance(refinement, int)
+        if level not in LEVELS or not kept:
+            raise _damaged(path, "what loads it is for is missing")
+        return SavedState(robot, arrays, level, loaded, refinement, str(path))
 
 
 @dataclass(frozen=True)
@@ -86,6 +111,9 @@ class SavedState:
 
     robot: str
     arrays: Any
+    level: str
+    loaded: bool
+    refinement: int
     source: str
 
     def fitted(self, chain: Chain) -> Solved:
@@ -94,25 +122,20 @@ class SavedState:
         Raises:
             InputError: It is damaged, or belongs to a robot of another make.
         """
-        leaves, structure = tree_util.tree_flatten_with_path(at_rest(chain))
-        read = []
-        for key, leaf in leaves:
-            name = tree_util.keystr(key)
-            if name not in self.arrays:
-                raise _damaged(self.source, f"{name} is missing")
+        read: dict[str, np.ndarray] = {}
+        for name, numbers in self.arrays.items():
             try:
-                array = np.asarray(self.arrays[name], float)
+                array = np.asarray(numbers, float)
             except (TypeError, ValueError, OverflowError):
                 raise _damaged(self.source, f"{name} is no table of numbers") from None
             if not np.isfinite(array).all():
                 raise _damaged(self.source, f"{name} holds what is no finite number")
-            if array.shape != leaf.shape:
-                raise InputError(
-                    f"{self.source} holds a state of robot {self.robot!r} with other notches or "
-                    "tendons than this robot; continue from a state of the same robot"
-                )
-            read.append(array)
-        return tree_util.tree_unflatten(structure, read)
+            read[name] = array
+        wanted, _ = tree_util.tree_flatten_with_path(at_rest(chain))
+        for name in (tree_util.keystr(key) for key, _ in wanted):
+            if name not in read and not name.startswith(_LOADS):
+                raise _damaged(self.source, f"{name} is missing")
+        return _on_chain(read, chain, f"{self.source} holds a state of robot {self.robot!r}")
 
 
 def _damaged(source: str | FilePath, what: str) -> InputError:
@@ -125,11 +148,23 @@ def fitted(state: State | SavedState | None, chain: Chain) -> Solved:
         return at_rest(chain)
     if isinstance(state, SavedState):
         return state.fitted(chain)
-    rest = at_rest(chain)
-    shapes = [leaf.shape for leaf in tree_util.tree_leaves(rest)]
-    if [np.shape(leaf) for leaf in tree_util.tree_leaves(state.solved)] != shapes:
-        raise InputError(
-            f"the state belongs to robot {state.robot!r} with other notches or tendons; "
-            "continue from a state of the same robot"
-        )
-    return state.solved
+    return _on_chain(state.arrays, chain, f"the state belongs to robot {state.robot!r}")
+
+
+def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solved:
+    """A state on a chain that may have been assembled for more loads than that of the state."""
+    leaves, structure = tree_util.tree_flatten_with_path(at_rest(chain))
+    fitting = []
+    for key, leaf in leaves:
+        name = tree_util.keystr(key)
+        array = arrays.get(name, np.asarray(leaf))
+        if name == _MODES and array.ndim == leaf.ndim and array.shape[-1] < leaf.shape[-1]:
+            # The modes of every level are the first ones of the next.
+            array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
+        if array.shape != leaf.shape:
+            raise InputError(
+                f"{whose} with other notches or tendons than this robot; "
+                "continue from a state of the same robot"
+            )
+        fitting.append(array)
+    return tree_util.tree_unflatten(structure, fitting)

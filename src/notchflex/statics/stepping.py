@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +11,10 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import constant, jax, jnp
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
+from notchflex.statics.applied import Applied
 from notchflex.statics.element import Memory, Unknowns
 from notchflex.statics.newton import NewtonResult, Point, Settings, newton
+from notchflex.statics.play import played
 
 
 class Solved(NamedTuple):
@@ -21,11 +24,13 @@ class Solved(NamedTuple):
         point: Unknowns and base tensions.
         memory: What the contacts remember, as of this state.
         stroke: Tendon drawn out at the base, mm.
+        applied: Other loads on the bodies; None for a chain assembled for tendons alone.
     """
 
     point: Point
     memory: Memory
     stroke: Float[Array, " t"]
+    applied: Applied | None
 
 
 class Advance(NamedTuple):
@@ -46,16 +51,29 @@ class Advance(NamedTuple):
     reached: Float[Array, ""]
 
 
+# Part of the way at which the other loads are on, where they come before the tendons.
+_LOADS_ON = 0.5
+
+
 def at_rest(chain: Chain) -> Solved:
     """The free robot with slack tendons that have not yet slid."""
     none = tuple(constant(np.zeros((*group.present.shape, 2))) for group in chain.groups)
     unknowns = Unknowns(
         modes=constant(np.zeros(chain.stiffness.shape)),
-        lip_force=constant(np.zeros(chain.flexures)),
+        lip_force=tuple(constant(np.zeros(group.closes.shape)) for group in chain.lips),
         log_ratio=none,
     )
     slack = constant(np.zeros(chain.tendons))
-    return Solved(Point(unknowns, slack), Memory(none, none), slack)
+    return Solved(Point(unknowns, slack), Memory(none, none, none), slack, unloaded(chain))
+
+
+def unloaded(chain: Chain) -> Applied | None:
+    """No loads on any body, as a chain takes them."""
+    if not chain.loaded:
+        return None
+    bodies = chain.flexures + 1
+    shapes = ((bodies, 3), (bodies, 3), (bodies, 3, 3), (bodies, 6))
+    return Applied(*(constant(np.zeros(shape)) for shape in shapes))
 
 
 def advance(chain: Chain, command: Command, last: Solved, settings: Settings) -> Advance:
@@ -63,6 +81,9 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
 
     The whole way is tried first. Where Newton's method fails, the way is halved until it
     succeeds, and lengthened again after; memory is kept only of parts that converged.
+
+    Where all tendons are slack before, other loads come on first, with slack tendons, and then all
+    tensions together: half the way each.
 
     Args:
         chain: The chain.
@@ -74,14 +95,27 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
         What came of it.
     """
     from_here = jnp.where(command.by_stroke, last.stroke, last.point.base_tension)
+    slack = jnp.all(last.point.base_tension == 0.0)
+    loads_first = slack if chain.loaded else jnp.array(False)
 
-    def attempt(solved: Solved, part: Array) -> NewtonResult:
-        value = jnp.where(
-            part >= 1.0, command.value, from_here + part * (command.value - from_here)
+    def towards(part: Array) -> Command:
+        """The command at a part of the way; exactly the wanted one at its end."""
+        for_loads = jnp.where(loads_first, jnp.minimum(2.0 * part, 1.0), part)
+        for_tendons = jnp.where(loads_first, jnp.maximum(2.0 * part - 1.0, 0.0), part)
+        only_loads = loads_first & (for_tendons == 0.0)
+        return Command(
+            value=jnp.where(only_loads, 0.0, between(from_here, command.value, for_tendons)),
+            by_stroke=command.by_stroke & ~only_loads,
+            applied=jax.tree.map(partial(between, part=for_loads), last.applied, command.applied),
         )
-        tension = jnp.where(command.by_stroke, solved.point.base_tension, value)
-        start = Point(solved.point.unknowns, tension)
-        return newton(chain, Command(value, command.by_stroke), solved.memory, start, settings)
+
+    def attempt(solved: Solved, part: Array) -> tuple[NewtonResult, Command]:
+        wanted = towards(part)
+        tension = jnp.where(wanted.by_stroke, solved.point.base_tension, wanted.value)
+        guess = played(chain, solved.point.base_tension, tension, solved.memory)
+        start = Point(solved.point.unknowns._replace(log_ratio=guess), tension)
+        found = newton(chain, wanted, solved.memory, solved.point.base_tension, start, settings)
+        return found, wanted
 
     def going(state: tuple[Advance, Array, Array]) -> Bool[Array, ""]:
         advanced, part, tries = state
@@ -93,13 +127,14 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
 
     def follow(state: tuple[Advance, Array, Array]) -> tuple[Advance, Array, Array]:
         advanced, part, tries = state
-        aim = jnp.minimum(advanced.reached + part, 1.0)
-        found = attempt(advanced.solved, aim)
-        remembered = Memory(found.point.unknowns.log_ratio, found.slid)
+        stop = jnp.where(loads_first & (advanced.reached < _LOADS_ON), _LOADS_ON, 1.0)
+        aim = jnp.minimum(advanced.reached + part, stop)
+        found, wanted = attempt(advanced.solved, aim)
+        remembered = Memory(found.point.unknowns.log_ratio, found.slid, found.bound)
         solved = jax.tree.map(
             lambda old, new: jnp.where(found.converged, new, old),
             advanced.solved,
-            Solved(found.point, remembered, found.stroke),
+            Solved(found.point, remembered, found.stroke, wanted.applied),
         )
         advanced = Advance(
             solved=solved,
@@ -119,3 +154,8 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
     )
     advanced, _, _ = jax.lax.while_loop(going, follow, (start, jnp.ones(()), jnp.zeros((), int)))
     return advanced
+
+
+def between(start: Float[Array, ...], end: Float[Array, ...], part: Array) -> Array:
+    """A value at a part of the way from one to another; exactly the other at its end."""
+    return jnp.where(part >= 1.0, end, start + part * (end - start))

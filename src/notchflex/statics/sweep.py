@@ -20,18 +20,22 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
-from notchflex.flexure import flexure_state
+from notchflex.flexure import FlexureState, flexure_state
+from notchflex.motion import skew, unskew
 from notchflex.statics.actuation import Command, command_residual
+from notchflex.statics.applied import Applied
 from notchflex.statics.element import (
     Beyond,
+    Carried,
     Memory,
     Unknowns,
     element_result,
     elements,
+    leave_base,
     nothing_beyond,
     shared,
 )
-from notchflex.statics.walk import Evaluation, leave_base
+from notchflex.statics.walk import Evaluation
 
 _HELD = 1e-9
 
@@ -61,35 +65,68 @@ class Step(NamedTuple):
     base_tension: Float[Array, " t"]
 
 
-def element_blocks(chain: Chain, unknowns: Unknowns, memory: Memory, at: Evaluation) -> Blocks:
-    """Derivatives of all elements, by differentiating each on its own, all at once."""
+def element_blocks(
+    chain: Chain,
+    unknowns: Unknowns,
+    memory: Memory,
+    applied: Applied | None,
+    at: Evaluation,
+) -> Blocks:
+    """Derivatives of all elements, by differentiating each on its own, all at once.
+
+    The flexure's own state depends on its modes alone; it is differentiated by them only.
+    """
     common = shared(chain)
 
-    def blocks(element: Any, own: Unknowns, past: Memory, carried: Any, beyond: Beyond) -> Blocks:
+    def blocks(
+        element: Any,
+        flexure: FlexureState,
+        own: Unknowns,
+        past: Memory,
+        carried: Carried,
+        onward: Carried,
+        beyond: Beyond,
+    ) -> Blocks:
         flat_own, own_of = ravel_pytree(own)
-        flat_carried, carried_of = ravel_pytree(carried)
         flat_beyond, beyond_of = ravel_pytree(beyond)
-        ends = (len(flat_own), len(flat_own) + len(flat_carried))
+        no_change = jnp.zeros(changes(carried))
+        ends = (len(flat_own), len(flat_own) + len(no_change))
 
-        def flat(everything: Array) -> tuple[Array, Array, Array]:
+        def flat(state: FlexureState, everything: Array) -> tuple[Array, Array, Array]:
             mine, brought, back = jnp.split(everything, ends)
-            unknown = own_of(mine)
-            flexure = flexure_state(
+            result = element_result(
+                element,
+                common,
+                state,
+                own_of(mine),
+                past,
+                varied(carried, brought),
+                beyond_of(back),
+            )
+            return (
+                ravel_pytree(result.residual)[0],
+                change(onward, result.onward),
+                ravel_pytree(result.behind)[0],
+            )
+
+        at_flexure = jnp.concatenate([flat_own, no_change, flat_beyond])
+        directly = jax.jacfwd(flat, argnums=1)(flexure, at_flexure)
+
+        def through_flexure(modes: Array) -> tuple[Array, Array, Array]:
+            state = flexure_state(
                 element.rod,
                 common.law,
                 element.memory,
-                unknown.modes,
+                modes,
                 with_pose=chain.forces_on_bodies,
             )
-            result = element_result(
-                element, common, flexure, unknown, past, carried_of(brought), beyond_of(back)
-            )
-            on = tuple(crossing.carried for crossing in result.crossings)
-            parts = (result.residual, on, result.behind)
-            return tuple(ravel_pytree(part)[0] for part in parts)  # type: ignore[return-value]
+            return flat(state, at_flexure)
 
-        residual, on, back = jax.jacfwd(flat)(
-            jnp.concatenate([flat_own, flat_carried, flat_beyond])
+        by_modes = jax.jacfwd(through_flexure)(own.modes)
+        # The modes are the first of the unknowns.
+        residual, on, back = (
+            direct.at[:, : len(own.modes)].add(through)
+            for direct, through in zip(directly, by_modes, strict=True)
         )
         by_unknown, by_carried, by_beyond = jnp.split(residual, ends, axis=1)
         on_by_unknown, on_by_carried, _ = jnp.split(on, ends, axis=1)
@@ -105,7 +142,41 @@ def element_blocks(chain: Chain, unknowns: Unknowns, memory: Memory, at: Evaluat
             back_by_beyond,
         )
 
-    return jax.vmap(blocks)(elements(chain), unknowns, memory, at.carried, at.beyond)
+    return jax.vmap(blocks)(
+        elements(chain, applied),
+        at.flexure,
+        unknowns,
+        memory,
+        at.carried,
+        at.result.onward,
+        at.beyond,
+    )
+
+
+def changes(carried: Carried) -> int:
+    """How many numbers say how what is carried may change: three for a rotation."""
+    flat, _ = ravel_pytree(carried._replace(rotation=None))
+    return len(flat) + (0 if carried.rotation is None else 3)
+
+
+def varied(carried: Carried, by: Float[Array, " c"]) -> Carried:
+    """What is carried, changed by a little: a rotation by a rotation vector in the body's frame."""
+    flat, carried_of = ravel_pytree(carried._replace(rotation=None))
+    moved: Carried = carried_of(flat + by[: len(flat)])
+    if carried.rotation is None:
+        return moved
+    turned = carried.rotation @ (jnp.eye(3) + skew(by[len(flat) :]))
+    return moved._replace(rotation=turned)
+
+
+def change(start: Carried, end: Carried) -> Float[Array, " c"]:
+    """The change that `varied` takes, from one state to another close by."""
+    first, _ = ravel_pytree(start._replace(rotation=None))
+    second, _ = ravel_pytree(end._replace(rotation=None))
+    if start.rotation is None or end.rotation is None:
+        return second - first
+    turned = unskew(start.rotation.T @ end.rotation)
+    return jnp.concatenate([second - first, turned])
 
 
 def linear_step(
@@ -129,10 +200,10 @@ def linear_step(
     Returns:
         The step.
     """
-    blocks = element_blocks(chain, unknowns, memory, at)
+    blocks = element_blocks(chain, unknowns, memory, command.applied, at)
     residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.result.residual)
     nothing, beyond_of = ravel_pytree(nothing_beyond(chain))
-    start, _ = ravel_pytree(leave_base(chain, base_tension))
+    start = leave_base(chain, base_tension)
 
     def eliminate(tail: Any, item: Any) -> tuple[Any, Any]:
         matrix, constant = tail
@@ -156,12 +227,12 @@ def linear_step(
         )
         return tail, (fixed, gain)
 
-    tip = (jnp.zeros((len(nothing), len(start))), jnp.zeros_like(nothing))
+    tip = (jnp.zeros((len(nothing), changes(start))), jnp.zeros_like(nothing))
     (matrix, constant), (fixed, gain) = jax.lax.scan(
         eliminate, tip, (blocks, residual), reverse=True
     )
 
-    leave = jax.jacfwd(lambda tension: ravel_pytree(leave_base(chain, tension))[0])(base_tension)
+    leave = jax.jacfwd(lambda tension: change(start, leave_base(chain, tension)))(base_tension)
     flat_base, _ = ravel_pytree(at.base)
 
     def demand(tension: Array, flat: Array) -> Array:

@@ -9,14 +9,17 @@ from jaxtyping import Array, Float
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain, flexure_states
 from notchflex.flexure import FlexureState
+from notchflex.statics.applied import Applied
 from notchflex.statics.element import (
     Beyond,
+    Carried,
     ElementResult,
     Memory,
     Unknowns,
     cross,
     element_result,
     elements,
+    leave_base,
     nothing_beyond,
     shared,
 )
@@ -35,18 +38,17 @@ class Evaluation(NamedTuple):
 
     flexure: FlexureState
     result: ElementResult
-    carried: tuple[Any, ...]
+    carried: Carried
     beyond: Beyond
     base: Beyond
 
 
-def leave_base(chain: Chain, base_tension: Float[Array, " t"]) -> tuple[Any, ...]:
-    """What every group of tendons carries when it leaves the base."""
-    return tuple(group.leave_base(base_tension[jnp.array(group.numbers)]) for group in chain.groups)
-
-
 def evaluate(
-    chain: Chain, unknowns: Unknowns, memory: Memory, base_tension: Float[Array, " t"]
+    chain: Chain,
+    unknowns: Unknowns,
+    memory: Memory,
+    base_tension: Float[Array, " t"],
+    applied: Applied | None,
 ) -> Evaluation:
     """Walk from base to tip with the tensions, then back with the pulls, judging every element.
 
@@ -55,18 +57,19 @@ def evaluate(
         unknowns: Its unknowns, flexures as leading axis.
         memory: What its contacts remember.
         base_tension: Tension of every tendon at the base, N.
+        applied: Other loads on the bodies; None for a chain assembled for tendons alone.
 
     Returns:
         The evaluation.
     """
-    every, common, end = elements(chain), shared(chain), nothing_beyond(chain)
+    every, common, end = elements(chain, applied), shared(chain), nothing_beyond(chain)
     flexures = flexure_states(chain, unknowns.modes, with_pose=chain.forces_on_bodies)
 
     def outward(carried: Any, item: Any) -> tuple[Any, Any]:
         # Tension, and where the tendon is, do not depend on what comes back from the tip.
         element, flexure, own = item
-        crossings = cross(element, flexure, own, carried, end.reaction)
-        return tuple(crossing.carried for crossing in crossings), carried
+        *_, onward = cross(element, flexure, own, carried, end)
+        return onward, carried
 
     start = leave_base(chain, base_tension)
     _, carried = jax.lax.scan(outward, start, (every, flexures, unknowns))

@@ -32,7 +32,8 @@ class Crossing(NamedTuple):
         wrench: Moment and force of the tendons on the distal body, about and along its frame;
             None for a group that does not act on bodies.
         carried: What goes on to the next flexure.
-        reaction: Pull on the last point visited, in the proximal body's frame.
+        reaction: What the pull does to the last body visited, as a wrench about the proximal
+            body's origin; nothing for a group that does not act on bodies.
     """
 
     gap_tension: Float[Array, " t"]

@@ -2,61 +2,100 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant
+from notchflex.errors import InputError
 from notchflex.flexure import Rod, fibre_stretch
 from notchflex.motion import Motion
 from notchflex.robot import Tendon
+from notchflex.robot.kinds import Notch
 from notchflex.tendon.crossing import TendonGroup
+from notchflex.tendon.openings import Passage, passages
 from notchflex.tendon.straight import Straight
 from notchflex.tendon.wall_arc import WallArc
 
+_PULLS = {"straight": "gap", "straight-dead": "dead", "straight-follower": "follower"}
 
-def route(
-    tendons: Sequence[Tendon],
-    rods: Rod,
-    free: Motion,
-    body_length: Float[Array, " bodies"],
-) -> tuple[TendonGroup, ...]:
-    """Group the tendons by the way they run and lay them through the chain.
 
-    Args:
-        tendons: Descriptions, base to tip end bodies counted from 1.
+class Ground(NamedTuple):
+    """What tendons are laid through.
+
+    Attributes:
+        notches: Every notch, base to tip.
         rods: All flexures of the chain.
         free: Relative poses of all flexures in the free robot.
-        body_length: Axial length of the rigid pieces, base first, mm.
-
-    Returns:
-        One group per kind of path in use.
+        body_length: Length of the rigid pieces on the tube axis, base first, mm.
+        turns_with_chord: Whether tendons turn with the chords of the flexures.
     """
-    groups = []
-    for path, lay in _LAYING.items():
+
+    notches: Sequence[Notch]
+    rods: Rod
+    free: Motion
+    body_length: Float[Array, " bodies"]
+    turns_with_chord: bool
+
+
+class Laid(NamedTuple):
+    """Tendons laid through a robot.
+
+    Attributes:
+        groups: One group per kind of path in use.
+        place: Where every tendon crosses a section of the tube, mm from its axis.
+        base_length: Length of every tendon inside the base, mm.
+    """
+
+    groups: tuple[TendonGroup, ...]
+    place: Float[Array, "t 3"]
+    base_length: Float[np.ndarray, " t"]
+
+
+def route(tendons: Sequence[Tendon], ground: Ground) -> Laid:
+    """Group the tendons by the way they run and lay them through the chain.
+
+    Raises:
+        InputError: A tendon ends in a body that has no wall on its side.
+    """
+    line = passages(
+        ground.notches, ground.body_length, [tendon.direction_deg for tendon in tendons]
+    )
+    groups: list[TendonGroup] = []
+    for path in ("wall-arc", *_PULLS):
         numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
         if numbers:
             chosen = [tendons[i] for i in numbers]
-            groups.append(lay(numbers, chosen, rods, free, body_length))
-    return tuple(groups)
+            own = Passage(*(np.asarray(values)[..., list(numbers)] for values in line))
+            masks = _masks(numbers, chosen, own)
+            lay = _wall_arc if path == "wall-arc" else _straight
+            groups.append(lay(masks, chosen, own, ground, path))
+    return Laid(tuple(groups), _on_tube(tendons), np.asarray(line.base_leaves))
 
 
-def _masks(
-    numbers: tuple[int, ...], tendons: Sequence[Tendon], bodies: Float[Array, " bodies"]
-) -> dict[str, Any]:
+def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
     """Where each tendon is: flexures as rows, tendons as columns."""
-    count = bodies.shape[0] - 1
+    count = line.visits.shape[0]
     end = np.array([tendon.end_body or count for tendon in tendons])
     body = np.arange(1, count + 1)[:, None]
     present = (body <= end).astype(float)
+    visits = present * line.visits
+    ends = (body == end).astype(float)
+    for column, number in enumerate(numbers):
+        if not (ends * visits)[:, column].any():
+            on_its_side = ", ".join(str(j + 1) for j in np.flatnonzero(line.visits[:, column]))
+            raise InputError(
+                f"tendon[{number + 1}].end_body has no wall on the tendon's side; "
+                f"the bodies there are {on_its_side}"
+            )
     return {
         "numbers": numbers,
         "present": present,
-        "visits": present,
-        "ends": (body == end).astype(float),
-        "body_length": present * bodies[1:, None],
+        "visits": visits,
+        "ends": ends,
+        "body_length": visits * (line.leaves - line.enters),
     }
 
 
@@ -69,19 +108,16 @@ def _on_tube(tendons: Sequence[Tendon]) -> Float[Array, "t 3"]:
     )
 
 
-def _lay_wall_arc(
-    numbers: tuple[int, ...],
-    tendons: Sequence[Tendon],
-    rods: Rod,
-    free: Motion,
-    body_length: Float[Array, " bodies"],
+def _wall_arc(
+    masks: dict[str, Any], tendons: Sequence[Tendon], line: Passage, ground: Ground, path: str
 ) -> WallArc:
-    del free
+    del line, path
+    rods = ground.rods
     across = (
         np.einsum("nab,tb->nta", rods.end_rotation, _on_tube(tendons)) + rods.end_offset[:, None]
     )[..., :2]
     return WallArc(
-        **_masks(numbers, tendons, body_length),
+        **masks,
         natural_gap=np.einsum(
             "ntc,nic,ni->nt", fibre_stretch(across), rods.reference_strain, rods.length
         ),
@@ -89,32 +125,39 @@ def _lay_wall_arc(
     )
 
 
-def _lay_straight(
-    numbers: tuple[int, ...],
-    tendons: Sequence[Tendon],
-    rods: Rod,
-    free: Motion,
-    body_length: Float[Array, " bodies"],
+def _straight(
+    masks: dict[str, Any], tendons: Sequence[Tendon], line: Passage, ground: Ground, path: str
 ) -> Straight:
-    del rods
-    place = _on_tube(tendons)
-    count = body_length.shape[0] - 1
-    channel = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (count, *place.shape))
-    entry = np.broadcast_to(place, channel.shape)
-    leaves = place + channel * body_length[:-1, None, None]
-    arrives = np.einsum("nab,tb->nta", free.rotation, place) + free.translation[:, None]
+    along = np.array([0.0, 0.0, 1.0])
+    place = np.asarray(_on_tube(tendons))
+    entry = place + line.enters[..., None] * along
+    leave = place + line.leaves[..., None] * along
+    base = place + np.asarray(line.base_leaves)[:, None] * along
+    everywhere = entry.shape
     return Straight(
-        **_masks(numbers, tendons, body_length),
-        natural_gap=np.linalg.norm(arrives - leaves, axis=-1),
+        **masks,
+        natural_gap=_free_gaps(masks["visits"], entry, leave, base, ground.free),
         entry=constant(entry),
-        exit=constant(entry + channel * body_length[1:, None, None]),
-        channel=constant(channel),
-        base_exit=constant(entry + channel * body_length[0]),
-        base_channel=constant(channel),
+        exit=constant(leave),
+        channel=constant(np.broadcast_to(along, everywhere)),
+        base_exit=constant(np.broadcast_to(base, everywhere)),
+        base_channel=constant(np.broadcast_to(along, everywhere)),
+        pulls=_PULLS[path],
+        turns_with_chord=ground.turns_with_chord,
     )
 
 
-_LAYING: dict[str, Callable[..., TendonGroup]] = {
-    "wall-arc": _lay_wall_arc,
-    "straight": _lay_straight,
-}
+def _free_gaps(
+    visits: Float[np.ndarray, "n t"],
+    entry: Float[np.ndarray, "n t 3"],
+    leave: Float[np.ndarray, "n t 3"],
+    base: Float[np.ndarray, "t 3"],
+    free: Motion,
+) -> Float[Array, "n t"]:
+    """Length of every straight span in the free robot, mm; 0 where a tendon passes by."""
+    point, gaps = base, np.zeros(visits.shape)
+    for j in range(len(visits)):
+        point = (point - free.translation[j]) @ free.rotation[j]
+        gaps[j] = visits[j] * np.linalg.norm(entry[j] - point, axis=-1)
+        point = np.where(visits[j][:, None] > 0.0, leave[j], point)
+    return constant(gaps)

@@ -3,6 +3,10 @@
 It may skip bodies. The pull between two bodies is a force along the straight span on each of
 them; cutting beam and tendon in a gap shows that contact forces need not be summed
 (physics of Gao 2017 and Liu 2022 alike).
+
+Liu 2022 also reads the pull as a dead load or a follower: it then stands along the channel of
+the proximal or the distal body, on the same point, while the way and its turning stay as they
+are. That is a reading of a paper; it is no tendon whose work is tension times length.
 """
 
 from __future__ import annotations
@@ -34,6 +38,10 @@ class Straight(TendonGroup):
         channel: Unit direction of its channel through the distal body.
         base_exit: Where it leaves the base, mm, the same for every flexure.
         base_channel: Unit direction of its channel in the base.
+        pulls: Along what it pulls: the "gap", or the channel of the body before ("dead") or
+            behind ("follower").
+        turns_with_chord: Whether it turns at the distal body by the turn of the flexure's chord
+            rather than that of the body (the reading of Liu 2022).
     """
 
     acts_on_bodies = True
@@ -49,6 +57,8 @@ class Straight(TendonGroup):
     channel: Float[Array, "*n t 3"]
     base_exit: Float[Array, "*n t 3"]
     base_channel: Float[Array, "*n t 3"]
+    pulls: str = eqx.field(static=True)
+    turns_with_chord: bool = eqx.field(static=True)
 
     def leave_base(self, base_tension: Float[Array, " t"]) -> Any:
         """Tension, exit point and direction at the base."""
@@ -56,7 +66,7 @@ class Straight(TendonGroup):
 
     def no_reaction(self) -> Any:
         """No pull from beyond the tip."""
-        return jnp.zeros((len(self.numbers), 3))
+        return jnp.zeros((len(self.numbers), 6))
 
     def cross(
         self,
@@ -77,10 +87,9 @@ class Straight(TendonGroup):
         along = span / jnp.where(length == 0.0, 1.0, length)[:, None]
         gap_tension = self.visits * fall(carried.tension, log_ratios[:, 0])
         body_tension = self.visits * fall(gap_tension, log_ratios[:, 1])
-        on_entry = -gap_tension[:, None] * along
-        on_exit = self.visits[:, None] * reaction
-        forces = on_entry + on_exit
-        moments = jnp.cross(self.entry, on_entry) + jnp.cross(self.exit, on_exit)
+        pulled = {"gap": along, "dead": direction, "follower": self.channel}[self.pulls]
+        force = -gap_tension[:, None] * pulled
+        on_entry = jnp.concatenate([jnp.cross(self.entry, force), force], axis=-1)
         visited = self.visits[:, None] > 0.0
         going_on = self.visits == 0.0
         back = jnp.where(visited, -on_entry, reaction)
@@ -89,16 +98,26 @@ class Straight(TendonGroup):
             body_tension=body_tension,
             shortening=self.visits * (self.natural_gap - length),
             exit_turning=turning(direction, along),
-            entry_turning=turning(along, self.channel),
+            entry_turning=turning(along, self._onward(flexure, direction)),
             pull=jnp.zeros_like(flexure.internal),
-            wrench=jnp.concatenate([moments.sum(0), forces.sum(0)]),
+            wrench=jnp.sum(on_entry + self.visits[:, None] * reaction, axis=0),
             carried=Carried(
                 tension=jnp.where(going_on, carried.tension, body_tension),
                 point=jnp.where(visited, self.exit, point),
                 direction=jnp.where(visited, self.channel, direction),
             ),
-            reaction=back @ pose.rotation.T,
+            reaction=pose.wrenches(back),
         )
+
+    def _onward(self, flexure: FlexureState, direction: Float[Array, "t 3"]) -> Float[Array, "t 3"]:
+        """Direction in which the tendon goes on through the distal body, in its frame."""
+        if not self.turns_with_chord:
+            return self.channel
+        pose, turn = flexure.pose, flexure.chord_turn
+        assert pose is not None
+        assert turn is not None
+        before = direction @ pose.rotation.T
+        return before @ turn.T @ pose.rotation
 
 
 def turning(before: Float[Array, "t 3"], after: Float[Array, "t 3"]) -> Float[Array, " t"]:

@@ -1,0 +1,208 @@
+"""A robot in one state as points in space: its rigid bodies, its flexures along their length.
+
+All is taken from the chain: where the walls of the bodies begin and end on every side from the
+openings of the notches, the flexures from their rods. A new notch shape needs nothing here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plot.twist import between
+from notchflex.robot import Robot
+
+if TYPE_CHECKING:
+    from notchflex.chain import Chain
+    from notchflex.statics import Path
+
+Points = NDArray[np.float64]
+
+FLEXURE_POINTS = 17  # a notch bends by less than a right angle; 2 degrees a piece look round
+HELD = 0.8  # length of held tube drawn below the base, in outer radii
+
+
+@dataclass(frozen=True)
+class Sections:
+    """One flexure from its start to its end, k sections (mm, in the frame of the base).
+
+    Attributes:
+        rotation: Axes of each section as columns: across in the plane of bending, across out of
+            it, along; (k, 3, 3).
+        position: Its neutral axis, (k, 3).
+        spine: How far it reaches against its first axis, (k,).
+        near: How far it reaches along it, (k,).
+        area: Its area, (k,), mm².
+    """
+
+    rotation: Points
+    position: Points
+    spine: Points
+    near: Points
+    area: Points
+
+    def fibre(self, across: Any, out: Any = 0.0) -> Points:
+        """Return the line at (across, out) from the neutral axis, (k, 3)."""
+        across, out = np.broadcast_to(across, len(self.area)), np.broadcast_to(out, len(self.area))
+        return (
+            self.position
+            + across[:, None] * self.rotation[..., 0]
+            + out[:, None] * self.rotation[..., 1]
+        )
+
+
+@dataclass(frozen=True)
+class Bent:
+    """A robot of n notches in one state, in the frame of its base (mm).
+
+    Attributes:
+        robot: The robot.
+        chain: The robot as arrays.
+        rotation: Rotation of each body, (n + 1, 3, 3).
+        position: Its proximal face centre, (n + 1, 3).
+        flexures: The flexures, base to tip.
+    """
+
+    robot: Robot
+    chain: Chain
+    rotation: Points
+    position: Points
+    flexures: list[Sections]
+
+    @cached_property
+    def body_length(self) -> Points:
+        """Length of each body on the tube axis, (n + 1,)."""
+        return np.asarray(self.chain.body_length)
+
+    @property
+    def tip(self) -> Points:
+        """The tip on the tube axis."""
+        return self.on_body(-1, [0.0, 0.0, self.body_length[-1]])
+
+    def on_body(self, body: int, points: Any) -> Points:
+        """Carry points (..., 3) of a body's frame to that of the base."""
+        return self.position[body] + np.asarray(points, float) @ self.rotation[body].T
+
+    def walls(self, side_deg: float) -> list[tuple[float, float] | None]:
+        """Return from where to where each body has wall on a side [mm in its frame], or None."""
+        # Not at the head of the file: importing the pictures alone needs no solver.
+        from notchflex.tendon.openings import passage
+
+        line = passage(self.robot.notches, self.chain.body_length, side_deg)
+        held = -HELD * self.robot.tube.outer_radius
+        return [
+            (held, line.base_leaves),
+            *(
+                (float(enters), float(leaves)) if visits else None
+                for visits, enters, leaves in zip(
+                    line.visits, line.enters, line.leaves, strict=True
+                )
+            ),
+        ]
+
+    def tendon(self, number: int) -> Points:
+        """Return the line of a tendon (from 0) through its true points, from below the base."""
+        from notchflex.tendon.wall_arc import WallArc
+
+        group = next(group for group in self.chain.groups if number in group.numbers)
+        column = group.numbers.index(number)
+        present, visits = (
+            np.asarray(values)[:, column] for values in (group.present, group.visits)
+        )
+        walls = self.walls(self.robot.tendon[number].direction_deg)
+        place = np.asarray(self.chain.tendon_place)[number]
+        points: list[Points] = []
+        for body in range(len(self.position)):
+            if body and not present[body - 1]:
+                break
+            if body and isinstance(group, WallArc):
+                across = np.asarray(group.across)[body - 1, column]
+                points.append(self.flexures[body - 1].fibre(*across))
+            ends = walls[body]
+            if ends is not None and (body == 0 or visits[body - 1]):
+                points.append(self.on_body(body, [place + [0.0, 0.0, at] for at in ends]))
+        return np.concatenate(points)
+
+    def lips(self, notch: int) -> Points:
+        """Return the point between the lips of a notch (from 0), where it closes."""
+        outer = self.robot.tube.outer_radius
+        found: list[tuple[float, Points]] = []
+        for turn in (0.0, 180.0):
+            side = self.robot.notches[notch].direction_deg + turn
+            walls = self.walls(side)
+            behind = walls[notch + 1]
+            if behind is None:
+                continue
+            before = max(body for body in range(notch + 1) if walls[body] is not None)
+            last = walls[before]
+            assert last is not None
+            angle = np.radians(side)
+            across = outer * np.array([np.cos(angle), np.sin(angle), 0.0])
+            first = self.on_body(before, across + [0.0, 0.0, last[1]])
+            second = self.on_body(notch + 1, across + [0.0, 0.0, behind[0]])
+            found.append((float(np.linalg.norm(second - first)), 0.5 * (first + second)))
+        return min(found, key=lambda item: item[0])[1]
+
+
+def bent(
+    robot: Robot, chain: Chain, modes: Any, body_position: Points, body_rotation: Points
+) -> Bent:
+    """Return a robot in one state, seen from its base: a turned base gives the same.
+
+    Args:
+        robot: The robot, n notches.
+        chain: Its chain.
+        modes: Amplitudes of the strain modes of each flexure.
+        body_position: Proximal face centre of each body [mm], (n + 1, 3).
+        body_rotation: Rotation of each body, (n + 1, 3, 3).
+    """
+    from notchflex._jax import jax
+    from notchflex.flexure.shape import node_poses
+
+    turn, origin = body_rotation[0], body_position[0]
+    rotation, position = turn.T @ body_rotation, (body_position - origin) @ turn
+    rods = jax.tree.map(np.asarray, chain.rods)
+    nodes = jax.tree.map(np.asarray, jax.jit(jax.vmap(node_poses))(chain.rods, modes))
+    flexures: list[Sections] = []
+    for j in range(len(position) - 1):
+        there = np.flatnonzero(rods.length[j] > 0.0)
+        # From the proximal body's frame: start, nodes; from the distal one's: end.
+        first = np.stack([rods.start_rotation[j], *nodes.rotation[j, there]])
+        places = np.stack([rods.start_offset[j], *nodes.translation[j, there]])
+        last = rods.end_rotation[j].T
+        axes = np.concatenate([rotation[j] @ first, (rotation[j + 1] @ last)[None]])
+        end = position[j + 1] - rotation[j + 1] @ (last @ rods.end_offset[j])
+        line = np.concatenate([position[j] + places @ rotation[j].T, end[None]])
+        parts = max(2, -(-FLEXURE_POINTS // (len(line) - 1)))
+        axes, line = between(axes, line, parts)
+        at_node = np.arange(len(line)) / parts - 1.0
+        section = rods.section
+        spine, near, area = (
+            np.interp(at_node, np.arange(len(there)), values[j, there])
+            for values in (section.edge_spine, section.edge_near, section.area)
+        )
+        flexures.append(Sections(axes, line, spine, near, area))
+    return Bent(robot, chain, rotation, position, flexures)
+
+
+def bent_at(path: Path, step: int) -> Bent:
+    """Return the robot of a path at one of its steps."""
+    modes = path.run.solved.point.unknowns.modes[step]
+    return bent(path.robot, path.chain, modes, path.body_position[step], path.body_rotation[step])
+
+
+def bent_by_angles(robot: Robot, notch_angle: Points) -> Bent:
+    """Return a robot whose notches have given angles [rad], (n,), as measured ones have."""
+    from notchflex.chain import prepared
+    from notchflex.contact import free_angle
+    from notchflex.statics import bodies_from_angles
+
+    chain = prepared(robot)
+    modes = np.zeros(np.shape(chain.stiffness))
+    modes[:, 0] = notch_angle - free_angle(chain.rods)
+    position, rotation = bodies_from_angles(robot, notch_angle[None])
+    return bent(robot, chain, modes, position[0], rotation[0])

@@ -1,0 +1,70 @@
+"""A quantity of a result: what it is called, what it is measured in, where it stands in files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity of a solved state, and how it is written at the edges.
+
+    Attributes:
+        name: The attribute of `Path` and `Equilibrium` that holds it.
+        title: What an axis or a table calls it, without its unit.
+        symbol: The symbol, as mathtext.
+        unit: The unit at the edges; "" for numbers without one.
+        description: One sentence that says exactly what it is.
+        key: The key in a step of the JSON document; a dot goes one object deeper. "" if left out.
+        column: The CSV column; `{tendon}`, `{notch}`, `{axis}` and `{span}` are filled in.
+            "" where it has no column.
+        per: What its entries stand for within one step, outermost first: "tendon", "notch",
+            "axis", "span", "contact", "row". Empty for a single number.
+        scale: The factor from the inside of the program to the edge (rad to deg).
+        optional: Whether it is left out of files where no entry of a path holds a number.
+    """
+
+    name: str
+    title: str
+    symbol: str
+    unit: str
+    description: str
+    key: str
+    column: str
+    per: tuple[str, ...] = ()
+    scale: float = 1.0
+    optional: bool = False
+
+    @property
+    def label(self) -> str:
+        r"""The label of an axis: title, symbol and unit.
+
+        Example:
+            >>> from notchflex.results.quantities import QUANTITIES
+            >>> QUANTITIES["total_angle"].label
+            'total bending angle $\\theta$ [deg]'
+        """
+        parts = [self.title, f"${self.symbol}$" if self.symbol else ""]
+        parts.append(f"[{self.unit}]" if self.unit else "")
+        return " ".join(part for part in parts if part)
+
+    def header(self, **indices: object) -> str:
+        """Return the CSV column for the given indices.
+
+        Args:
+            **indices: `tendon`, `notch` (counted from 1), `axis` ("x", "y", "z") or `span`.
+                `tendon=""` is written for the only tendon of a robot.
+
+        Returns:
+            The header, for example `notch_3_deg`.
+
+        Example:
+            >>> from notchflex.results.quantities import QUANTITIES
+            >>> QUANTITIES["tension"].header(tendon="")
+            'tendon_force_N'
+            >>> QUANTITIES["tension"].header(tendon=2)
+            'tendon_2_force_N'
+        """
+        if "tendon" in indices:
+            indices["tendon"] = f"_{indices['tendon']}" if indices["tendon"] != "" else ""
+        return self.column.format(**indices)

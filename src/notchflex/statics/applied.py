@@ -1,0 +1,211 @@
+"""Loads from outside as the solver takes them: sums over each body, in the frame of the base.
+
+With R the rotation of a body against the base, a force f that keeps its direction in the base
+acts on the body's frame as R^T f, at a point p of the body with the moment p x R^T f about its
+origin. Of many such forces only three sums are needed whatever R is: f, the moments, and the
+products p f^T. Forces that turn with the body are constant in its frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import array_module, constant
+from notchflex.errors import InputError
+from notchflex.motion import rotation_about, unskew
+from notchflex.robot import Robot
+from notchflex.statics.external import BodyForce, ExternalLoad
+from notchflex.statics.load import LoadPath
+
+# Part of a vector that may stick out of a plane by rounding.
+_ROUNDING = 1e-12
+
+
+class Applied(NamedTuple):
+    """Loads from outside on the bodies, base first; loads as leading axis. Units N, N mm.
+
+    Attributes:
+        dead_force: Sum of the forces that keep their direction, in the base frame.
+        dead_moment: Sum of the moments that keep their direction, in the base frame.
+        dead_arm: Sum of the products p f^T of the points where those forces act (in the body's
+            frame) and the forces (in the base frame).
+        following: Moment and force of what turns with a body, about its origin, in its frame.
+    """
+
+    dead_force: Float[Array, "*s bodies 3"]
+    dead_moment: Float[Array, "*s bodies 3"]
+    dead_arm: Float[Array, "*s bodies 3 3"]
+    following: Float[Array, "*s bodies 6"]
+
+
+def applied(
+    load_path: LoadPath,
+    robot: Robot,
+    body_mass: Float[np.ndarray, " bodies"],
+    body_centre: Float[np.ndarray, "bodies 3"],
+    body_length: Float[np.ndarray, " bodies"],
+) -> Applied:
+    """Sum up what acts from outside on each body.
+
+    Args:
+        load_path: The loads, s steps.
+        robot: The robot.
+        body_mass: Mass of each body, base first, g; zeros where the density is not known.
+        body_centre: Centre of mass of each body in its frame, mm.
+        body_length: Axial length of each body, mm; the tip is the end of the last one.
+
+    Returns:
+        The sums, s steps as leading axis; those on the base too.
+
+    Raises:
+        InputError: A body that the robot does not have, or gravity where nothing has a mass.
+    """
+    base = _base(load_path)
+    distinct = list(dict.fromkeys(load_path.external))
+    for external in distinct:
+        _check(external, robot)
+    rows = [
+        _sums(_acting(external, body_mass, body_centre, float(body_length[-1])), base)
+        for external in distinct
+    ]
+    sums = [_on_bodies(one, len(body_mass)) for one in rows]
+    # Loads that stay the same over many steps are summed up once.
+    number = {external: i for i, external in enumerate(distinct)}
+    step = np.array([number[external] for external in load_path.external])
+    return Applied(*(constant(np.stack(field)[step]) for field in zip(*sums, strict=True)))
+
+
+def body_wrench(rotation: Float[Array, "3 3"], one: Applied) -> Float[Array, " 6"]:
+    """Wrench (moment, force) of the loads on one body, about its origin, in its frame.
+
+    Args:
+        rotation: Rotation of the body against the base.
+        one: The sums for this body, without leading axes.
+
+    Returns:
+        The wrench, N mm and N; plain or traced numbers as given.
+
+    Example:
+        >>> at_side = Applied(np.eye(3)[2], np.zeros(3), np.outer([2.0, 0, 0], [0, 0, 1.0]), 0.0)
+        >>> body_wrench(np.eye(3), at_side).tolist()
+        [0.0, -2.0, 0.0, 0.0, 0.0, 1.0]
+    """
+    xp = array_module(rotation, *one)
+    # The vector of the skew part of p f^T is minus half of p x f.
+    moment = one.dead_moment @ rotation - 2.0 * unskew(one.dead_arm @ rotation)
+    return xp.concatenate([moment, one.dead_force @ rotation]) + one.following
+
+
+def is_unloaded(load_path: LoadPath) -> bool:
+    """Whether nothing acts from outside in any step."""
+    return all(external.is_nothing for external in dict.fromkeys(load_path.external))
+
+
+def bending_normal(robot: Robot) -> Float[np.ndarray, " 3"] | None:
+    """Normal of the plane in which all notches bend, in the base frame; None if there is none."""
+    direction = np.radians([notch.direction_deg for notch in robot.notches])
+    if (np.abs(np.sin(direction - direction[0])) > _ROUNDING).any():
+        return None
+    return np.array([-np.sin(direction[0]), np.cos(direction[0]), 0.0])
+
+
+def is_planar(load_path: LoadPath, robot: Robot) -> bool:
+    """Whether every load from outside stays in the robot's plane of bending.
+
+    It does where each force lies in the plane and acts at a point of it, and each moment turns
+    about its normal. Own weight counts as acting on the tube axis.
+
+    Args:
+        load_path: The loads.
+        robot: The robot; one whose notches bend in several planes has no plane to stay in.
+
+    Returns:
+        Whether they all do, to rounding; each load alone, not their sum.
+    """
+    normal = bending_normal(robot)
+    if normal is None:
+        return False
+    base, bodies = _base(load_path), robot.number_of_notches + 1
+    for external in dict.fromkeys(load_path.external):
+        # Only directions matter here, so any mass will do, and where along the axis it is.
+        for force in _acting(external, np.ones(bodies), np.zeros((bodies, 3)), 0.0):
+            turn = np.eye(3) if force.following else base.T
+            acts, turns = turn @ np.asarray(force.force), turn @ np.asarray(force.moment)
+            point = np.asarray(force.point) * bool(acts.any())
+            out = (acts @ normal, np.linalg.norm(np.cross(turns, normal)), point @ normal)
+            size = (np.linalg.norm(acts), np.linalg.norm(turns), np.linalg.norm(point))
+            if (np.abs(out) > _ROUNDING * np.array(size)).any():
+                return False
+    return True
+
+
+def _base(load_path: LoadPath) -> Float[np.ndarray, "3 3"]:
+    return np.asarray(rotation_about(constant(load_path.base_rotation)))
+
+
+def _check(external: ExternalLoad, robot: Robot) -> None:
+    last = robot.number_of_notches
+    for force in external.body_forces:
+        if force.body > last:
+            raise InputError(
+                f"there is no body {force.body}; {robot.name} has the bodies 0 (the base) to "
+                f"{last}, one after each notch"
+            )
+    given = external.gravity is not None and any(external.gravity)
+    if given and robot.material.density is None and external.tip_mass == 0.0:
+        raise InputError(
+            f"gravity has nothing to act on: the density of {robot.name} is not known and no mass "
+            "hangs at its tip; give material.density (kg/m3) or a tip_mass (g)"
+        )
+
+
+def _acting(
+    external: ExternalLoad,
+    body_mass: Float[np.ndarray, " bodies"],
+    body_centre: Float[np.ndarray, "bodies 3"],
+    tip: float,
+) -> Iterator[BodyForce]:
+    """All that acts, each as a force on a body; the tip is `tip` (mm) beyond its body's origin."""
+    yield from external.body_forces
+    last = len(body_mass) - 1
+    x, y, z = external.tip_point
+    point = (x, y, z + tip)
+    if any(external.tip_force) or any(external.tip_moment):
+        yield BodyForce(last, external.tip_force, external.tip_moment, point, external.following)
+    if external.tip_mass:
+        yield BodyForce(last, external.weight(external.tip_mass), point=point)
+    if external.gravity is not None:
+        for body, (mass, centre) in enumerate(zip(body_mass, body_centre, strict=True)):
+            yield BodyForce(body, external.weight(float(mass)), point=centre)
+
+
+def _sums(
+    acting: Iterator[BodyForce], base: Float[np.ndarray, "3 3"]
+) -> Iterator[tuple[int, tuple[np.ndarray, ...]]]:
+    """What each force adds to the sums of its body."""
+    for one in acting:
+        point, force, moment = map(np.asarray, (one.point, one.force, one.moment))
+        if one.following:
+            about_origin = moment + np.cross(point, force)
+            wrench = np.concatenate([about_origin, force])
+            yield one.body, (np.zeros(3), np.zeros(3), np.zeros((3, 3)), wrench)
+        else:
+            held = base.T @ force
+            yield one.body, (held, base.T @ moment, np.outer(point, held), np.zeros(6))
+
+
+def _on_bodies(
+    added: Iterator[tuple[int, tuple[np.ndarray, ...]]], bodies: int
+) -> tuple[np.ndarray, ...]:
+    sums = tuple(np.zeros((bodies, *shape)) for shape in ((3,), (3,), (3, 3), (6,)))
+    for body, parts in added:
+        for total, part in zip(sums, parts, strict=True):
+            total[body] += part
+    return sums
+
+
+__all__ = ["Applied", "applied", "bending_normal", "body_wrench", "is_planar", "is_unloaded"]

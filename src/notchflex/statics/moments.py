@@ -1,0 +1,79 @@
+"""How well the internal moment of the modes meets the moment that the loads ask for.
+
+The modes hold the balance only on average along a flexure. What is left between, the largest
+|M_internal - M_required| over the largest |M|, tells whether there are modes enough.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import jax, jnp
+from notchflex.chain import Chain
+from notchflex.contact.spine import SpineLips
+from notchflex.flexure import Rod, fibre_stretch
+from notchflex.flexure.shape import node_poses, relative_pose, rod_end
+from notchflex.motion import Motion
+from notchflex.statics.element import Unknowns
+from notchflex.statics.walk import Evaluation
+from notchflex.tendon.wall_arc import WallArc
+
+
+def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, ""]:
+    """Largest imbalance of bending moment at any node, over the largest moment."""
+    bending = np.array([0, 1])
+    internal = at.flexure.resultants[..., bending]
+    required = _along_wall(chain, unknowns, at)
+    if at.result.wrench is not None:
+        required = required + jax.vmap(_required)(chain.rods, unknowns.modes, at.result.wrench)
+    counts = (chain.rods.length > 0.0)[..., None]
+    carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
+    error = jnp.max(jnp.abs(internal - required[..., bending]) * counts * carried)
+    largest = jnp.max(jnp.abs(required[..., bending]) * counts)
+    return jnp.where(largest > 0.0, error / jnp.where(largest > 0.0, largest, 1.0), 0.0)
+
+
+def _required(
+    rod: Rod, modes: Float[Array, " modes"], wrench: Float[Array, " 6"]
+) -> Float[Array, "nodes 6"]:
+    """Wrench on all that is beyond each node, about the node, along its section's axes."""
+    body, nodes = relative_pose(rod, modes), node_poses(rod, modes)
+    if rod.small is not None:
+        # A linear beam takes its moments on the free shape, under forces as the body has them.
+        is_small = rod.small > 0.0
+        shapes = (body, nodes), (_about_free_end(rod, modes), _free_nodes(rod))
+        body, nodes = jax.tree.map(lambda large, small: jnp.where(is_small, small, large), *shapes)
+
+    def at_node(node: Motion) -> Array:
+        across = node.rotation.T @ body.rotation
+        offset = (body.translation - node.translation) @ node.rotation
+        return Motion(across, offset).wrench(wrench)
+
+    return jax.vmap(at_node)(nodes)
+
+
+def _about_free_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
+    """Pose of the distal body, turned by the modes but not displaced with the rod's end."""
+    end = Motion(rod_end(rod, modes).rotation, rod.curve_offset)
+    start = Motion(rod.start_rotation, rod.start_offset)
+    return start.then(end).then(Motion(rod.end_rotation, rod.end_offset))
+
+
+def _free_nodes(rod: Rod) -> Motion:
+    """Poses of the sections at the nodes of the free rod, in the frame of the proximal body."""
+    start = Motion(rod.start_rotation, rod.start_offset)
+    return jax.vmap(start.then)(Motion(rod.node_rotation, rod.node_offset))
+
+
+def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, "n nodes 6"]:
+    """What tendons and lips that act along the wall ask of every section."""
+    acting = jnp.zeros((chain.flexures, 6))
+    for group, crossing in zip(chain.groups, at.result.crossings, strict=True):
+        if isinstance(group, WallArc):
+            weights = fibre_stretch(group.across)
+            acting = acting - jnp.einsum("nt,ntc->nc", crossing.gap_tension, weights)
+    for group, force in zip(chain.lips, unknowns.lip_force, strict=True):
+        if isinstance(group, SpineLips):
+            acting = acting + (force * group.closes) * fibre_stretch(chain.rods.lip)
+    return jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)
