@@ -17,9 +17,10 @@ def left_over(path: nf.Path) -> tuple[np.ndarray, np.ndarray]:
         Relative force and moment, steps each.
     """
     acting = [_acting(path, step) for step in range(len(path))]
-    return tuple(
+    force, moment = (
         np.array([_relative([one[kind] for one in step]) for step in acting]) for kind in (0, 1)
     )
+    return force, moment
 
 
 def cone_used(path: nf.Path) -> np.ndarray:
@@ -34,9 +35,8 @@ def cone_used(path: nf.Path) -> np.ndarray:
     assert isinstance(friction, nf.Capstan | nf.Corner)
     tension, turning = path.span_tension, path.contact_turning
     if isinstance(friction, nf.Corner):
-        return _ratio(
-            *_on_corner(tension[..., :-1], tension[..., 1:], turning), friction.coefficient
-        )
+        rubbing, normal = _on_corner(tension[..., :-1], tension[..., 1:], turning)
+        return _ratio(rubbing, normal, friction.coefficient)
     if friction.wrap == "whole-before":
         # Proximal, gap 1, body 1, gap 2, ...: a gap with both its edges lies between two bodies.
         # In the last body the tendon is fixed; its gap turns by twice what it does at one edge.

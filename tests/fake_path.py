@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from notchflex import load_robot
+from notchflex.chain import prepared
 from notchflex.statics.external import NOTHING
 
 CENTROID = 0.6865  # mm, of the section of wrist A
@@ -30,6 +31,29 @@ class FakePath:
         if name in columns:
             return columns[name]
         raise AttributeError(name)
+
+    @property
+    def load(self) -> Any:
+        """The loads from outside."""
+        return SimpleNamespace(external=self.external)
+
+    @property
+    def chain(self) -> Any:
+        """The real chain: pictures and tables take the bodies and contacts from it."""
+        return prepared(self.robot)
+
+    @property
+    def run(self) -> Any:
+        """The modes of the notches, which a notch that bends in an arc has one of."""
+        modes = np.zeros((len(self), *np.shape(self.chain.stiffness)))
+        modes[..., 0] = self.notch_angle
+        unknowns = SimpleNamespace(modes=modes)
+        return SimpleNamespace(solved=SimpleNamespace(point=SimpleNamespace(unknowns=unknowns)))
+
+    @property
+    def front(self) -> Any:
+        """The friction front, as `Path` has it."""
+        return self.front_contact, self.front_eta
 
     def __len__(self) -> int:
         return len(self.tension)
@@ -53,7 +77,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
     columns = {
         "tension": tension[:, None],
         "stroke": (angle * (0.7 + CENTROID)).sum(axis=1)[:, None],
-        "load": SimpleNamespace(external=(NOTHING,) * count),
+        "external": (NOTHING,) * count,
         "commanded_tension": tension[:, None],
         "commanded_stroke": np.full((count, 1), np.nan),
         "notch_angle": angle,
@@ -72,6 +96,14 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "contact_log_ratio": np.full(contacts, 0.03),
         "contact_slid": np.full(contacts, 0.1),
         "contact_bound": np.full(contacts, 0.03),
+        "contact_turning": np.full(contacts, np.radians(3.0)),
+        "chord_angle": np.full((count, n), np.nan),
+        "total_chord_angle": np.full(count, np.nan),
+        "front_contact": np.concatenate([np.ones(steps), np.arange(1, steps + 1)])[:, None],
+        "front_eta": np.ones((count, 1)),
+        "base_force": tension[:, None] * np.array([0.1, 0.0, 1.0]),
+        "base_moment": tension[:, None] * np.array([0.0, 0.7, 0.0]),
+        "moment_error": np.full(count, 1e-4),
         "contact_state": np.tile(np.array([0, 1, -1], np.int8), 2 * n)[: 2 * n - 1]
         * np.ones(contacts, np.int8),
         "stored_energy": tension**2,

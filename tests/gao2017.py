@@ -1,7 +1,7 @@
 """Runs of the ready robot of Gao 2017 that several tests look at, and the tables beside them.
 
-In the tables +y opposes the tendon; our x points toward it. Runs with the same number of modes share
-one compiled program, and each is solved once per test process.
+In the tables +y opposes the tendon; our x points toward it. Runs with the same number of modes
+share one compiled program, and each is solved once per test process.
 """
 
 from __future__ import annotations

@@ -70,7 +70,15 @@ def identity() -> Motion:
 
 def skew(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:
     """Matrix of the cross product: `skew(a) @ b = a x b`."""
-    return constant(_CROSS) @ vector
+    xp = array_module(vector)
+    x, y, z, nothing = vector[0], vector[1], vector[2], xp.zeros_like(vector[0])
+    return xp.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing]).reshape(3, 3)
+
+
+def cross(first: Float[Array, " 3"], second: Float[Array, " 3"]) -> Float[Array, " 3"]:
+    """Cross product, written out: it is compiled and run faster so than as a matrix."""
+    (a, b, c), (x, y, z) = first, second
+    return array_module(first, second).stack([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
 def unskew(matrix: Float[Array, "3 3"]) -> Float[Array, " 3"]:
@@ -108,9 +116,10 @@ def exponential(twist: Float[Array, " 6"]) -> Motion:
 
 def bracket(first: Float[Array, " 6"], second: Float[Array, " 6"]) -> Float[Array, " 6"]:
     """Lie bracket of two twists: how far following one and then the other depends on the order."""
-    xp = array_module(first, second)
-    turn, other = skew(first[:3]), skew(second[:3])
-    return xp.concatenate([turn @ second[:3], turn @ second[3:] - other @ first[3:]])
+    turn, move = first[:3], first[3:]
+    other_turn, other_move = second[:3], second[3:]
+    moved = cross(turn, other_move) - cross(other_turn, move)
+    return array_module(first, second).concatenate([cross(turn, other_turn), moved])
 
 
 def adjoint(motion: Motion) -> Float[Array, "6 6"]:

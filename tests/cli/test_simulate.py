@@ -129,3 +129,27 @@ def test_several_tendons(call, tmp_path):
     assert [step["load"]["tension_N"] for step in steps] == [[0.0, 0.2], [0.5, 0.2], [1.0, 0.2]]
     assert len(steps[0]["contacts"]) == 2
     assert call("simulate", "two.toml", "--tension", "2")[0] == 2
+
+
+def test_loads_and_refinement_reach_the_solver_and_the_head_of_the_table(call, tmp_path):
+    code, out, _ = call(
+        *LOOP[:2], "--tension", "1", "--tip-force", "-0.05,0,0", "--refinement", "1",
+        "--json", "a.json",
+    )  # fmt: skip
+    assert code == 0
+    assert "loads from outside: tip force (-0.05, 0, 0) N" in out
+    step = json.loads((tmp_path / "a.json").read_text())["steps"][0]
+    robot = nf.load_robot("pacheco2021-a")
+    load = nf.Load(tension=1.0, tip_force=(-0.05, 0, 0))
+    state = nf.solve(robot, load, refinement=1)
+    assert step["total_angle_deg"] == pytest.approx(math.degrees(state.total_angle), abs=1e-9)
+    assert step["moment_error"] == pytest.approx(state.moment_error)
+    # The holder takes the force, and what the drive pulls the tendon with.
+    assert step["base_force_N"] == pytest.approx([0.05, 0.0, 1.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("value", ["4", "-1", "0.5"])
+def test_refinement_is_a_small_whole_number(call, value):
+    code, _, err = call(*LOOP, "--refinement", value)
+    assert code == 2
+    assert "refinement" in err

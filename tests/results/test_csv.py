@@ -24,12 +24,16 @@ def test_table_has_a_row_for_every_step(tmp_path):
 
 def test_several_tendons_are_numbered():
     path = fake_path(2)
-    for name in ("tension", "stroke", "span_tension", "tendon_work"):
+    for name in ("tension", "stroke", "span_tension", "tendon_work", "front_contact", "front_eta"):
         path.columns[name] = np.repeat(path.columns[name], 2, axis=1)
     path.robot = path.robot.replace(tendon=path.robot.tendon * 2)
+    path.columns["base_force"] = np.array([[1.0, 2.0, 3.0]] * 4)
     columns = path_columns(path)
     assert "tendon_1_force_N" in columns
     assert "tendon_2_gap_5_N" in columns
+    assert "tendon_2_front_m" in columns
+    assert list(columns["base_force_y_N"]) == [2.0] * 4
+    assert not any("chord" in name for name in columns)
     assert "tendon_force_N" not in columns
 
 

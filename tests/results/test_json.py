@@ -33,7 +33,7 @@ def test_step_holds_lists_per_tendon_and_degrees():
     assert len(step["span_tension_N"][0]) == 10
     assert len(step["contacts"][0]) == 9
     assert step["contacts"][0][1]["state"] == "slip toward base"
-    assert set(step["contacts"][0][0]) == {"log_ratio", "slid_mm", "state"}
+    assert set(step["contacts"][0][0]) == {"log_ratio", "slid_mm", "turning_deg", "state"}
     assert step["closed"] == [bool(closed) for closed in path.closed[2]]
     assert type(step["iterations"]) is int
 
@@ -42,7 +42,7 @@ def test_loads_from_outside_are_told_of_every_step_where_there_are_any():
     path = fake_path(2)
     side = BodyForce(2, (0.1, 0.0, 0.0), point=(0.8, 0.0, 0.0))
     one = ExternalLoad(tip_force=(0.0, 0.0, -0.2), tip_mass=5.0, body_forces=[side])
-    path.columns["load"].external = (NOTHING, one, NOTHING, NOTHING)
+    path.columns["external"] = (NOTHING, one, NOTHING, NOTHING)
     document = json.loads(json_text(path_document(path)))
     nothing, told = (step["load"] for step in document["steps"][:2])
     assert told["tension_N"] == [3.0]
@@ -92,3 +92,21 @@ def test_infinity_is_text_that_reads_back():
 def test_dash_is_standard_output(capsys):
     write_json("-", {"a": 1})
     assert capsys.readouterr().out == '{"a": 1}\n'
+
+
+def test_angles_of_contacts_and_the_front():
+    path = fake_path(3)
+    path.columns["front_eta"][4] = np.nan
+    step = json.loads(json_text(path_document(path)))["steps"][4]
+    assert step["contacts"][0][2]["turning_deg"] == pytest.approx(3.0)
+    assert step["front"] == {"m": [2.0], "eta": [None]}
+    assert step["base_moment_Nmm"] == pytest.approx([0.0, 0.7 * 1.5, 0.0])
+
+
+def test_chord_angles_are_told_where_there_are_any():
+    path = fake_path(2)
+    assert "chord_angle_deg" not in path_document(path)["steps"][0]
+    path.columns["chord_angle"][:, 1] = 0.5
+    step = json.loads(json_text(path_document(path)))["steps"][0]
+    assert step["chord_angle_deg"] == [None, pytest.approx(np.degrees(0.5)), None, None, None]
+    assert "total_chord_angle_deg" not in step

@@ -19,7 +19,13 @@ def test_every_quantity_is_described():
 
 def test_only_angles_change_their_number_at_the_edge():
     scaled = {q.name for q in QUANTITIES.values() if q.scale != 1.0}
-    assert scaled == {"notch_angle", "total_angle"}
+    assert scaled == {
+        "notch_angle",
+        "total_angle",
+        "chord_angle",
+        "total_chord_angle",
+        "contact_turning",
+    }
     assert {q.unit for q in QUANTITIES.values() if q.scale != 1.0} == {"deg"}
 
 
@@ -41,6 +47,13 @@ def test_keys_of_the_interface():
         "contacts.log_ratio",
         "contacts.slid_mm",
         "contacts.state",
+        "contacts.turning_deg",
+        "chord_angle_deg",
+        "front.m",
+        "front.eta",
+        "base_force_N",
+        "base_moment_Nmm",
+        "moment_error",
         "converged",
         "reason",
         "stable",

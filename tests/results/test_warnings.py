@@ -42,3 +42,13 @@ def test_steps_that_were_not_solved_warn_of_nothing():
     path = fake_path(7, failed=14)
     path.columns["stable"] = np.zeros(14, bool)
     assert path_warnings(path) == []
+
+
+def test_coarse_strain_modes_name_the_worst_step_and_the_remedy():
+    path = fake_path(7)
+    path.columns["moment_error"] = np.where(np.arange(14) == 5, 0.0234, 0.01)
+    sentence = path_warnings(path)[-1]
+    assert "by up to 2.3 % of the largest one, at step 6 (2.5 N)" in sentence
+    assert "--refinement 1" in sentence
+    path.columns["moment_error"][5] = 0.01
+    assert not any("strain modes" in one for one in path_warnings(path))

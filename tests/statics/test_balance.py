@@ -29,7 +29,7 @@ class Case(NamedTuple):
 
 CASES = {
     "pacheco2021-a": Case((0.8,), (0.7,), 0.01, 0.02),
-    "pacheco2021-b": Case((0.8,), (0.7,), 0.01, 0.02),
+    "pacheco2021-b": Case((0.8,), (0.75,), 0.01, 0.02),
     "two-axis-wrist": Case((0.8, 0.5, 0.2, 0.3), (0.6, 0.6, 0.2, 0.25), 0.01, 0.02),
     "liu2022": Case((5.0, 1.0), (4.0, 1.5), 0.2, 1.0),
     "gao2017": Case((8.0,), (7.0,), 0.05, 0.5),
@@ -93,4 +93,4 @@ def test_moments_are_met_better_by_more_modes(name, margin):
     usual, more = (loaded(name, refinement)[0].moment_error[0] for refinement in (0, 1))
     margin.note(f"moment error: {usual:.1e}, with more modes {more:.1e}")
     margin.within("usual modes", usual, 2e-3)
-    margin.within("more modes over usual modes", more / usual, 0.2)
+    margin.within("more modes over usual modes", more / usual, 0.5)

@@ -58,7 +58,7 @@ def test_moments_are_met_better_by_more_modes(case, margin):
 
 
 def test_a_hung_mass_is_its_weight(margin):
-    """The tube laid level: a mass and gravity instead of a force. The tube itself weighs nothing."""
+    """A mass at the level tube instead of a force; the tube itself weighs nothing."""
     rows = external_rows(TIP_TOWARD)
     light = robot().with_value("material.density", None)
     loads = [

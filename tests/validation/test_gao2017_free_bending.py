@@ -17,8 +17,8 @@ MODES = [0, 1]  # refinement
 LENGTH = {0: 1e-4, 1: 1e-6}  # mm
 ANGLE = {0: 1e-5, 1: 1e-7}  # rad
 FORCE = {0: 1e-5, 1: 1e-6}  # N
-# The friction at the front is a difference of two tensions over half its own range, which is no
-# less than 0.17 N in this table: FORCE on both of them is 1.2e-4 and 1.2e-5 of it.
+# The friction at the front is the difference of two tensions over the largest it can be, which is
+# 0.13 N or more in this table: an error of FORCE in both would be 1.6e-4 or 1.6e-5 of that.
 PART_OF_FRICTION = {0: 1e-4, 1: 1e-5}
 
 
@@ -76,7 +76,7 @@ def test_coefficient_of_friction_with_more_modes(mu, margin):
     rows = reference("gao_mu_sweep.csv")
     _, pull, y, z, angle, ratio = rows[rows[:, 0] == mu][0]
     other = robot().with_value("friction.coefficient", mu)
-    # Far from rest, where the tendon is pulled only once, one long step leads to the same state.
+    # While the tendon is only pulled, long steps lead to the same state as short ones.
     path = nf.simulate(other, nf.pull(0.0, pull, 3), refinement=1)
     assert path.converged.all(), path.reason
     margin.within("tip", np.linalg.norm(tip(path)[-1] - [y, z]), LENGTH[1], "mm")

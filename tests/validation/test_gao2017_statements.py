@@ -108,9 +108,9 @@ def test_gaps_are_those_between_the_pieces(step, margin):
     widest = robot().tube.outer_radius
     found = np.full(SLOTS - 1, np.inf)
     for slot in range(SLOTS):
-        side = widest * np.array([-1.0 if slot % 2 == 0 else 1.0, 0.0, 0.0])
-        low = side + [0.0, 0.0, robot().tube.base_length + slot * row.pitch]
-        high = low + [0.0, 0.0, row.height]
+        side = -widest if slot % 2 == 0 else widest
+        start = robot().tube.base_length + slot * row.pitch
+        low, high = (np.array([side, 0.0, z]) for z in (start, start + row.height))
         below, above = max(slot - 1, 0), min(slot + 1, SLOTS - 1)
         face = path.body_rotation[step, below][:, 2]
         across = _moved(path, step, above, high) - _moved(path, step, below, low)

@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from liu import STEPS, liu, pulled
+from liu2022 import STEPS, liu, pulled
 from oracles.strip import Strip, march, solve_notch
 
-ANGLE, FORCE, LIP = 1e-7, 1e-8, 1e-5  # rad; of the pull; N
+ANGLE, FORCE, GAP = 1e-7, 1e-8, 2e-6  # rad; tension relative to the pull; mm
+FAR_ANGLE, LIP_FORCE = 3e-7, 1e-5  # rad, N; up to 40 N
 FAR = np.linspace(0.0, 40.0, STEPS + 1)[1:]  # N
 
 
@@ -22,7 +23,10 @@ def test_both_cables(mu, part, margin):
     first = np.linspace(0.0, 12.0, STEPS + 1)[1:]
     path = pulled(liu(0, mu, "slope"), np.stack([first, part * first], axis=1))
     assert path.converged.all(), path.reason
-    for step in (11, STEPS - 1):
+    # Farther on the last notch has next to no tension left to bend it, and the second cable sticks.
+    for step in (5, 11):
+        if mu > 0.0:
+            np.testing.assert_array_equal(path.contact_state[step], [[1] * 13, [-1] * 13])
         wanted = march(Strip(mu=mu), path.tension[step], np.array([1.0, -1.0]))
         angles = [notch.angle for notch in wanted]
         margin.within("angles", path.notch_angle[step] - angles, ANGLE, "rad")
@@ -51,9 +55,11 @@ def test_pulled_along_the_gap_it_stays_open_to_40_newton(margin):
     for step in (5, 11, STEPS - 1):
         wanted = march(Strip(mu=0.2), [path.tension[step, 0], 0.0], np.array([1.0, 1.0]))
         angles = [notch.angle for notch in wanted]
-        margin.within(f"angles at {FAR[step]:.0f} N", path.notch_angle[step] - angles, 3e-6, "rad")
+        margin.within(
+            f"angles at {FAR[step]:.0f} N", path.notch_angle[step] - angles, FAR_ANGLE, "rad"
+        )
         lips = [notch.lip_gap for notch in wanted]
-        margin.within(f"lips at {FAR[step]:.0f} N", path.gap[step] - lips, 3e-5, "mm")
+        margin.within(f"lips at {FAR[step]:.0f} N", path.gap[step] - lips, GAP, "mm")
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.2])
@@ -79,9 +85,9 @@ def test_closed_lips_carry_what_the_strip_does_not(step, margin):
     assert closed == (step >= 13)
     wanted = solve_notch(Strip(dead=True), np.array([FAR[step], 0.0]), np.array([1.0, 1.0]), closed)
     assert closed or wanted.lip_gap > 0.0
-    margin.within("angles", path.notch_angle[step] - wanted.angle, 3e-6, "rad")
-    margin.within("lips", path.gap[step] - wanted.lip_gap, LIP, "mm")
-    margin.within("force of the lips", path.contact_force[step] - wanted.lip_force, 1e-3, "N")
+    margin.within("angles", path.notch_angle[step] - wanted.angle, FAR_ANGLE, "rad")
+    margin.within("lips", path.gap[step] - wanted.lip_gap, GAP, "mm")
+    margin.within("force of the lips", path.contact_force[step] - wanted.lip_force, LIP_FORCE, "N")
 
 
 def test_friction_beyond_its_law_is_told(margin):

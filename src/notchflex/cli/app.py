@@ -65,7 +65,7 @@ VERBS = {
         "    notchflex simulate pacheco2021-a --stroke 0:2:21 --set friction.coefficient=0.1\n"
         "    notchflex simulate my-wrist.toml --tension 1=0:2:21 --tension 2=0.1 --json -\n"
         "    notchflex simulate gao2017 --tension 0:8:9,8:0:9 --tip-mass 20 --plot loop.png\n"
-        "    notchflex simulate liu2022 --tension 9 --tip-force 0,0,-0.5 --refinement 1",
+        "    notchflex simulate liu2022 --tension 1=9 --tip-force 0,0,-0.5 --refinement 1",
     ),
     "compare": (
         "Compare a robot with measured notch angles.",

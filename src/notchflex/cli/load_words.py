@@ -25,12 +25,18 @@ def load_sentences(external: Sequence[ExternalLoad]) -> list[str]:
     lines: list[str] = []
     for one in different:
         steps = [number for number, other in enumerate(external, start=1) if other == one]
-        where = "" if len(different) == 1 else f", steps {steps[0]} to {steps[-1]}"
-        if len(different) > 1 and steps != list(range(steps[0], steps[-1] + 1)):
-            where = f", {len(steps)} of the steps"
+        where = "" if len(different) == 1 else _steps(steps)
         text = f"loads from outside{where}: {in_words(one)}"
         lines += textwrap.wrap(text, width=terminal.NARROW, subsequent_indent="    ")
     return lines
+
+
+def _steps(steps: list[int]) -> str:
+    if len(steps) == 1:
+        return f", step {steps[0]}"
+    if steps == list(range(steps[0], steps[-1] + 1)):
+        return f", steps {steps[0]} to {steps[-1]}"
+    return f", {len(steps)} of the steps"
 
 
 def in_words(load: ExternalLoad) -> str:

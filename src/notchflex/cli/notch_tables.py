@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
@@ -47,7 +47,7 @@ def run_of(numbers: list[int]) -> str:
         >>> run_of([1, 2, 3, 7]), run_of([1, 3, 5, 7]), run_of([2, 6])
         ('1–3, 7', '1, 3 … 7', '2, 6')
     """
-    steps = {after - before for before, after in zip(numbers, numbers[1:], strict=False)}
+    steps = {after - before for before, after in pairwise(numbers)}
     if len(numbers) > 3 and len(steps) == 1 and steps != {1}:
         return f"{numbers[0]}, {numbers[1]} … {numbers[-1]}"
     runs = groupby(enumerate(numbers), key=lambda item: item[1] - item[0])

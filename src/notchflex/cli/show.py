@@ -65,6 +65,7 @@ def _print(robot: Robot, length: float, notches: list[dict[str, Any]]) -> None:
         console.print(table)
         console.print()
     console.print(closing_table(notches))
+    console.print()
     console.print(textwrap.fill(closing_legend(notches), width=terminal.NARROW - 1))
 
 

@@ -33,10 +33,16 @@ _LYING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 @rod.register
 def _(notch: StripNotch, tube: Tube, refinement: int = 0) -> Rod:
-    return strip_rod(notch, tube, 5 + refinement, 5 + 3 * refinement)
+    return strip_rod(notch, tube, 5 + refinement, 5 + 3 * refinement, refinement)
 
 
-def strip_rod(notch: StripNotch, tube: Tube, bending_modes: int = 5, intervals: int = 5) -> Rod:
+def strip_rod(
+    notch: StripNotch,
+    tube: Tube,
+    bending_modes: int = 5,
+    intervals: int = 5,
+    more_sideways: int = 0,
+) -> Rod:
     """Build the rod of a strip.
 
     Args:
@@ -44,6 +50,7 @@ def strip_rod(notch: StripNotch, tube: Tube, bending_modes: int = 5, intervals: 
         tube: The tube that it is cut into.
         bending_modes: Legendre polynomials of the curvature in the plane of bending.
         intervals: Intervals of three Gauss nodes along the strip.
+        more_sideways: Polynomials of sideways bending and of twist beyond the usual ones.
 
     Returns:
         The rod, from the clamp to the free end.
@@ -54,7 +61,7 @@ def strip_rod(notch: StripNotch, tube: Tube, bending_modes: int = 5, intervals: 
     """
     length = notch.strip_length_in(tube)
     place, weight = gauss_nodes(np.linspace(0.0, length, intervals + 1).tolist())
-    basis = _modes(2.0 * place / length - 1.0, bending_modes) / length
+    basis = _modes(2.0 * place / length - 1.0, bending_modes, more_sideways) / length
     straight = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(place), 1))
     along = [Motion(constant(np.eye(3)), constant([0.0, 0.0, at])) for at in place]
     turned = rotation_about(constant([0.0, 0.0, np.radians(notch.direction_deg)]))
@@ -83,11 +90,12 @@ def strip_rod(notch: StripNotch, tube: Tube, bending_modes: int = 5, intervals: 
     )
 
 
-def _modes(place: np.ndarray, bending_modes: int) -> np.ndarray:
+def _modes(place: np.ndarray, bending_modes: int, more_sideways: int) -> np.ndarray:
     """Strain per mode times the length, at places from -1 to 1: (nodes, 6, modes)."""
-    modes = np.zeros((len(place), 6, bending_modes + _SIDEWAYS + _TWIST))
+    sideways, twist = _SIDEWAYS + more_sideways, _TWIST + more_sideways
+    modes = np.zeros((len(place), 6, bending_modes + sideways + twist))
     first = 0
-    for component, count in ((1, bending_modes), (0, _SIDEWAYS), (2, _TWIST)):
+    for component, count in ((1, bending_modes), (0, sideways), (2, twist)):
         modes[:, component, first : first + count] = legvander(place, count - 1)
         first += count
     return modes

@@ -35,9 +35,9 @@ def wrench_modes(
 
     In the plane the moment about y is constant, or goes with a lever along x or z, and from the
     fourth mode on with the Legendre polynomials P_2, P_3 ... of arc length (P_1 is nearly a
-    lever); then come forces along x and along z, times P_0, P_1 ... in pairs. The four out of the
-    plane are a constant moment about x, one about z, the moment of a sideways force at the
-    middle, and that force.
+    lever); then come forces along x and along z, times P_0, P_1 ... in pairs. Out of the plane
+    come a constant moment about x, one about z and the moment of a sideways force at the middle,
+    then moments about x and z times P_2, P_3 ... as far as in the plane, and that force.
 
     Args:
         poses: Pose of the free rod at every node, base to tip.
@@ -66,10 +66,16 @@ def wrench_modes(
     wrenches = [np.concatenate([size[:, None] * _Y, none], axis=1) for size in moment]
     wrenches += [np.concatenate([none, size[:, None] * along], axis=1) for size, along in force]
     sideways = np.cross(lever, _Y) / reach[0]
-    wrenches += [np.concatenate([about + none, none], axis=1) for about in (_X, _Z, sideways)]
+    out_of_plane = [about + none for about in (_X, _Z, sideways)]
+    out_of_plane += [
+        legendre[:, degree, None] * about
+        for degree in range(2, moment_modes - 1)
+        for about in (_X, _Z)
+    ]
+    wrenches += [np.concatenate([about, none], axis=1) for about in out_of_plane]
     wrenches += [np.concatenate([none, _Y + none], axis=1)]
     of_force = np.arange(len(wrenches)) >= moment_modes
-    of_force[-4:-1] = False
+    of_force[-len(out_of_plane) - 1 : -1] = False
 
     in_frame = np.einsum(
         "kji,mkcj->kmci", rotation, np.reshape(wrenches, (len(wrenches), -1, 2, 3))

@@ -1,4 +1,4 @@
-"""Along a tendon: its tension from span to span at several steps, and how far friction has turned."""
+"""Along a tendon: its tension from span to span, and how far its friction has turned."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ def draw_profile(axes: Axes, path: Path, tendon: int) -> None:
     number = np.arange(spans_of(path, tendon))
     ways = {way: _spread(path, steps, tendon) for way, steps in way_of(path).items()}
     # One scale of colours for both ways, by the tension at the base.
-    most = max(float(path.tension[step, tendon]) for steps in ways.values() for step in steps)
+    drawn = [step for steps in ways.values() for step in steps]
+    most = float(path.tension[drawn, tendon].max())
     colours = sequence_colours(101)
     for way, steps in ways.items():
         for step in steps:
@@ -46,7 +47,7 @@ def draw_profile(axes: Axes, path: Path, tendon: int) -> None:
             axes.plot(
                 number,
                 path.span_tension[step, tendon, : len(number)],
-                color=colours[round(100 * tension / most) if most > 0.0 else 0],
+                color=colours[round(100 * tension / most)],
                 linestyle=LINE[way],
                 marker="o",
                 markersize=1.8,
@@ -55,7 +56,7 @@ def draw_profile(axes: Axes, path: Path, tendon: int) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylim(bottom=0.0)
     which = f" {tendon + 1}" if path.tension.shape[1] > 1 else ""
-    axes.set_xlabel(f"span of tendon{which}, 0 at the base (contact i between i − 1 and i)")
+    axes.set_xlabel(f"span of tendon{which}, 0 at the base")
     axes.set_ylabel(quantity.label)
     entries = [Line2D([], [], color="0.3", linestyle=LINE[way], label=way) for way in ways]
     axes.legend(handles=entries, loc="best")
@@ -69,6 +70,7 @@ def draw_front(axes: Axes, path: Path) -> None:
     # Between contacts by eta, which falls from 1 to -1 while one contact turns.
     front = m + 0.5 * (1.0 - np.where(np.isnan(eta), 1.0, eta))
     front[~np.asarray(path.converged)] = np.nan
+    front[path.tension <= SLACK] = np.nan  # without tension there is no friction
     for order, tendon in enumerate(tendons):
         named: set[str] = set()
         for part, growing in branches(drive(path)):
@@ -84,6 +86,9 @@ def draw_front(axes: Axes, path: Path) -> None:
                 label=None if way in named else f"{way}{which}",
             )
             named.add(way)
+    # From where the other curves begin, although nothing rubs without tension.
+    room = 0.05 * float(np.ptp(x))
+    axes.set_xlim(x.min() - room, x.max() + room)
     most = max(spans_of(path, tendon) for tendon in tendons)
     axes.set_ylim(0.5, most + 0.5)
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
@@ -100,7 +105,8 @@ def has_friction(path: Path) -> bool:
 
 
 def _spread(path: Path, steps: list[int], tendon: int) -> list[int]:
-    """Some of the steps, evenly spread over the tension of a tendon."""
+    """Some of the steps with tension, evenly spread over it."""
+    steps = [step for step in steps if path.tension[step, tendon] > SLACK]
     if len(steps) <= MOST_STEPS:
         return steps
     tension = path.tension[steps, tendon]

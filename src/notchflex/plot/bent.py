@@ -7,7 +7,7 @@ openings of the notches, the flexures from their rods. A new notch shape needs n
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from notchflex.statics import Path
 
 Points = NDArray[np.float64]
+Walls = list[tuple[float, float] | None]
 
 FLEXURE_POINTS = 17  # a notch bends by less than a right angle; 2 degrees a piece look round
+UP = np.array([0.0, 0.0, 1.0])
 HELD = 0.8  # length of held tube drawn below the base, in outer radii
 
 
@@ -87,22 +89,9 @@ class Bent:
         """Carry points (..., 3) of a body's frame to that of the base."""
         return self.position[body] + np.asarray(points, float) @ self.rotation[body].T
 
-    def walls(self, side_deg: float) -> list[tuple[float, float] | None]:
+    def walls(self, side_deg: float) -> Walls:
         """Return from where to where each body has wall on a side [mm in its frame], or None."""
-        # Not at the head of the file: importing the pictures alone needs no solver.
-        from notchflex.tendon.openings import passage
-
-        line = passage(self.robot.notches, self.chain.body_length, side_deg)
-        held = -HELD * self.robot.tube.outer_radius
-        return [
-            (held, line.base_leaves),
-            *(
-                (float(enters), float(leaves)) if visits else None
-                for visits, enters, leaves in zip(
-                    line.visits, line.enters, line.leaves, strict=True
-                )
-            ),
-        ]
+        return _walls(self.robot, tuple(self.body_length.tolist()), side_deg)
 
     def tendon(self, number: int) -> Points:
         """Return the line of a tendon (from 0) through its true points, from below the base."""
@@ -124,7 +113,7 @@ class Bent:
                 points.append(self.flexures[body - 1].fibre(*across))
             ends = walls[body]
             if ends is not None and (body == 0 or visits[body - 1]):
-                points.append(self.on_body(body, [place + [0.0, 0.0, at] for at in ends]))
+                points.append(self.on_body(body, [place + at * UP for at in ends]))
         return np.concatenate(points)
 
     def lips(self, notch: int) -> Points:
@@ -142,10 +131,33 @@ class Bent:
             assert last is not None
             angle = np.radians(side)
             across = outer * np.array([np.cos(angle), np.sin(angle), 0.0])
-            first = self.on_body(before, across + [0.0, 0.0, last[1]])
-            second = self.on_body(notch + 1, across + [0.0, 0.0, behind[0]])
+            first = self.on_body(before, across + last[1] * UP)
+            second = self.on_body(notch + 1, across + behind[0] * UP)
             found.append((float(np.linalg.norm(second - first)), 0.5 * (first + second)))
         return min(found, key=lambda item: item[0])[1]
+
+
+@lru_cache(maxsize=256)
+def _walls(robot: Robot, body_length: tuple[float, ...], side_deg: float) -> Walls:
+    # Not at the head of the file: importing the pictures alone needs no solver.
+    from notchflex._jax import constant
+    from notchflex.tendon.openings import passage
+
+    line = passage(robot.notches, constant(body_length), side_deg)
+    walls: Walls = [(-HELD * robot.tube.outer_radius, line.base_leaves)]
+    for visits, *ends in zip(line.visits, line.enters, line.leaves, strict=True):
+        # What is fixed in the last body may enter it beyond its far face.
+        walls.append((float(min(ends)), float(max(ends))) if visits else None)
+    return walls
+
+
+@lru_cache(maxsize=1)
+def _node_poses() -> Any:
+    """Compiled once for a shape of the arrays, not for every picture."""
+    from notchflex._jax import jax
+    from notchflex.flexure.shape import node_poses
+
+    return jax.jit(jax.vmap(node_poses))
 
 
 def bent(
@@ -161,12 +173,11 @@ def bent(
         body_rotation: Rotation of each body, (n + 1, 3, 3).
     """
     from notchflex._jax import jax
-    from notchflex.flexure.shape import node_poses
 
     turn, origin = body_rotation[0], body_position[0]
     rotation, position = turn.T @ body_rotation, (body_position - origin) @ turn
     rods = jax.tree.map(np.asarray, chain.rods)
-    nodes = jax.tree.map(np.asarray, jax.jit(jax.vmap(node_poses))(chain.rods, modes))
+    nodes = jax.tree.map(np.asarray, _node_poses()(chain.rods, np.asarray(modes)))
     flexures: list[Sections] = []
     for j in range(len(position) - 1):
         there = np.flatnonzero(rods.length[j] > 0.0)

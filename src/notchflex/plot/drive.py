@@ -19,13 +19,15 @@ PULLING, LETTING_GO = "pulling", "letting go"
 def abscissa(path: Path) -> tuple[NDArray[np.float64], str]:
     """Return what a path is drawn against: the one tendon that changes, or the step.
 
-    That is its stroke where it is commanded by stroke, and its tension otherwise.
+    Where several change in step with each other, the first of them tells. It is its stroke where
+    it is commanded by stroke, and its tension otherwise.
 
     Returns:
         Values (S,) and the label of the axis.
     """
     changing = _changing(path)
-    if len(changing) == 1 or (len(path) == 1 and not len(changing)):
+    together = len(changing) > 0 and all(_in_step(path, changing[0], one) for one in changing)
+    if together or (len(path) == 1 and not len(changing)):
         index = int(changing[0]) if len(changing) else 0
         name = "stroke" if _by_stroke(path, index) else "tension"
         quantity = QUANTITIES[name]
@@ -99,6 +101,19 @@ def _changing(path: Path) -> NDArray[np.intp]:
         commanded = np.isfinite([path.commanded_tension, path.commanded_stroke]).any(axis=(0, 1))
         spread = np.where(commanded, spread, 0.0)
     return np.flatnonzero(spread > 1e-12)
+
+
+def _in_step(path: Path, first: int, other: int) -> bool:
+    """Tell whether what drives two tendons changes in proportion."""
+    good = np.asarray(path.converged)
+    pair = [
+        (path.stroke if _by_stroke(path, int(one)) else path.tension)[good, one]
+        for one in (first, other)
+    ]
+    change = [values - values[0] for values in pair]
+    largest = int(np.argmax(np.abs(change[0])))
+    ratio = change[1][largest] / change[0][largest]
+    return bool(np.allclose(change[1], ratio * change[0], atol=1e-9 * np.ptp(pair[1])))
 
 
 def _by_stroke(path: Path, tendon: int) -> bool:

@@ -56,7 +56,7 @@ def path_figure(path: Path, *, title: str | None = None) -> Figure:
     panels = _panels(path, ways)
     columns = len(shapes) + -(-len(panels) // 2)
     with house_style():
-        figure = new_figure(2.0 + 4.4 * columns, 6.4, path.robot.name if title is None else title)
+        figure = new_figure(1.6 + 4.0 * columns, 6.4, path.robot.name if title is None else title)
         grid = figure.add_gridspec(2, columns)
         drawn: list[Any] = []
         for column, (name, steps) in enumerate(shapes.items()):
@@ -71,7 +71,7 @@ def path_figure(path: Path, *, title: str | None = None) -> Figure:
             if name:
                 axes.set_title(name, loc="left")
             if steps:
-                axes.legend(loc="best" if view is not None else "upper left")
+                _legend(axes, below=view is None)
             else:
                 axes.text(0.5, 0.5, "no step was solved", transform=axes.transAxes, ha="center")
         # Pulling and letting go to one scale (matplotlib shares no axes of equal scale).
@@ -82,6 +82,13 @@ def path_figure(path: Path, *, title: str | None = None) -> Figure:
         for index, draw in enumerate(panels):
             draw(figure.add_subplot(grid[index % 2, len(shapes) + index // 2]))
     return figure
+
+
+def _legend(axes: Any, *, below: bool) -> None:
+    if below:  # axes of three dimensions have no empty corner
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2)
+    else:
+        axes.legend(loc="best")
 
 
 def plane_of(path: Path) -> float | None:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
 from notchflex.plot.acting import COLOUR, Acting, acting_at
 from notchflex.plot.bent import Bent, Sections, bent_at
-from notchflex.plot.style import ORANGE, VERMILLION, sequence_colours
-from notchflex.plot.wrist import ARROW, extent_of, load_label
+from notchflex.plot.style import GREY, ORANGE, VERMILLION, sequence_colours
+from notchflex.plot.wrist import ARROW, arrow_of, extent_of, load_label
 
 if TYPE_CHECKING:
     from notchflex.statics import Path
@@ -40,7 +41,11 @@ def draw_space(axes: Any, path: Path, steps: Sequence[int]) -> None:
     any_closed = False
     for step, colour in zip(steps, sequence_colours(len(steps)), strict=True):
         shape = bent_at(path, step)
-        own = np.concatenate([*_walls(shape), *_flexures(shape)])
+        base, *bodies = _walls(shape)
+        own = np.concatenate([*bodies, *_flexures(shape)])
+        if not faces:  # the base stands still: it is drawn once
+            faces.append(base)
+            colours += _shaded(base, to_rgb(GREY))
         faces.append(own)
         colours += _shaded(own, colour)
         everything.append(own.reshape(-1, 3))
@@ -49,28 +54,29 @@ def draw_space(axes: Any, path: Path, steps: Sequence[int]) -> None:
             axes.plot(*shape.tendon(number).T, color=ORANGE, linewidth=0.9, zorder=5)
         closed = np.flatnonzero(path.closed[step])
         if len(closed):
-            points = np.array([shape.lips(notch) for notch in closed])
-            label = None if any_closed else "closed notch"
-            axes.plot(*points.T, "o", color=VERMILLION, markersize=3.0, zorder=6, label=label)
+            points = np.array([shape.lips(int(notch)) for notch in closed])
+            axes.plot(*points.T, "o", color=VERMILLION, markersize=3.0, zorder=6)
             any_closed = True
         loads += acting_at(path, step, shape)
     if faces:
         together = np.concatenate(faces)
         axes.add_collection3d(
-            Poly3DCollection(together, facecolors=colours, edgecolors="none", alpha=0.75)
+            Poly3DCollection(together, facecolors=colours, edgecolors=colours, linewidths=0.2)
         )
+        if any_closed:
+            axes.plot([], [], [], "o", color=VERMILLION, markersize=3.0, label="closed notch")
         everything += _loads(axes, loads, ARROW * extent_of(path))
         _equal_scale(axes, np.concatenate(everything))
     axes.view_init(elev=ELEVATION, azim=AZIMUTH)
     axes.set_xlabel("x [mm]")
     axes.set_ylabel("y [mm]")
-    axes.set_zlabel("z, along the base [mm]")
+    axes.set_zlabel("z, along the base [mm]", labelpad=9.0)
 
 
 def _walls(shape: Bent) -> Iterator[Faces]:
     """The wall of every body, side by side round the tube: (pieces, 4, 3)."""
     outer = shape.robot.tube.outer_radius
-    edges = 2.0 * np.pi * (np.arange(ROUND + 1) - 0.5) / ROUND
+    edges = 2.0 * np.pi * np.arange(ROUND + 1) / ROUND
     middles = 0.5 * (edges[1:] + edges[:-1])
     sides = [shape.walls(float(np.degrees(angle))) for angle in middles]
     for body in range(len(shape.position)):
@@ -87,7 +93,7 @@ def _walls(shape: Bent) -> Iterator[Faces]:
 
 
 def _flexures(shape: Bent) -> Iterator[Faces]:
-    """Every flexure: the wall beside its spine, or a band as broad as its area and thickness say."""
+    """Every flexure: the wall at its spine, or a band as broad as area and thickness say."""
     outer = shape.robot.tube.outer_radius
     closes = np.asarray(shape.chain.rods.lip_closes) > 0.0
     for one, spine in zip(shape.flexures, closes, strict=True):
@@ -116,7 +122,7 @@ def _shaded(faces: Faces, colour: Any) -> list[Any]:
     size = np.linalg.norm(normal, axis=1)
     facing = np.abs(normal @ LIGHT) / np.where(size > 0.0, size, 1.0) / np.linalg.norm(LIGHT)
     base = np.array(to_rgb(colour))
-    pale = 1.0 - 0.6 * (1.0 - base)
+    base, pale = 0.8 * base, 1.0 - 0.45 * (1.0 - base)
     return [tuple(base + part * (pale - base)) for part in facing]
 
 
@@ -128,15 +134,13 @@ def _loads(axes: Any, loads: Sequence[Acting], longest: float) -> Iterator[NDArr
         for name in ("force", "moment")
     }
     for one in loads:
-        arrow = longest * one.vector / largest[one.name]
+        arrow = arrow_of(one, largest[one.name], longest)
         label = None if one.label in named else one.label
         named.add(one.label)
-        style = "-" if one.name == "force" else ":"
+        width = 1.8 if one.name == "force" else 0.9
         if one.name == "moment" and label:
             label = f"{label}, about its arrow"
-        axes.quiver(
-            *one.point, *arrow, color=COLOUR[one.kind], linewidth=1.6, linestyle=style, label=label
-        )
+        axes.quiver(*one.point, *arrow, color=COLOUR[one.kind], linewidth=width, label=label)
         yield np.stack([one.point, one.point + arrow])
 
 
@@ -145,4 +149,7 @@ def _equal_scale(axes: Any, points: NDArray[np.float64]) -> None:
     room = 0.02 * float((high - low).max())
     for name, first, last in zip("xyz", low - room, high + room, strict=True):
         getattr(axes, f"set_{name}lim")(first, last)
-    axes.set_box_aspect(high - low + 2.0 * room)
+        axis = getattr(axes, f"{name}axis")
+        part = (last - first) / (high - low).max()
+        axis.set_major_locator(MaxNLocator(nbins=max(2, round(6 * part))))
+    axes.set_box_aspect(high - low + 2.0 * room, zoom=0.92)

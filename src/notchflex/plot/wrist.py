@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Polygon
+from numpy.typing import NDArray
 
 from notchflex.plot.acting import COLOUR, Acting, acting_at
 from notchflex.plot.bent import bent_at
@@ -22,6 +23,9 @@ MOST_SHAPES = 5
 
 ARROW = 0.18
 """Length of the arrow of the largest force, in lengths of the robot."""
+
+SHORTEST = 0.25
+"""Length of the shortest arrow, in lengths of the longest."""
 
 
 def telling_steps(
@@ -79,10 +83,11 @@ def draw_wrist(axes: Axes, path: Path, steps: Sequence[int], view: float = 0.0) 
                 color=VERMILLION,
                 markersize=3.5,
                 zorder=top,
-                label=None if any_closed else "closed notch",
             )
             any_closed = True
         loads += acting_at(path, step, bent)
+    if any_closed:
+        axes.plot([], [], "o", color=VERMILLION, markersize=3.5, label="closed notch")
     draw_loads(axes, loads, view, ARROW * extent_of(path), zorder=top + 1)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_ylabel("along the base, z [mm]")
@@ -95,6 +100,11 @@ def extent_of(path: Path) -> float:
     """Return about how long a robot is [mm]."""
     steps = np.diff(path.body_position[0], axis=0)
     return float(np.linalg.norm(steps, axis=1).sum() + path.robot.tube.outer_diameter)
+
+
+def arrow_of(one: Acting, largest: float, longest: float) -> NDArray[np.float64]:
+    """Return the arrow of a load [mm]: `longest` for the largest, never too short to be seen."""
+    return longest * max(one.size / largest, SHORTEST) * one.vector / one.size
 
 
 def draw_loads(
@@ -116,7 +126,8 @@ def draw_loads(
     for one in loads:
         start = np.array([one.point @ across, one.point[2]])
         if one.name == "force":
-            arrow = longest * np.array([one.vector @ across, one.vector[2]]) / largest
+            arrow = arrow_of(one, largest, longest)
+            arrow = np.array([arrow @ across, arrow[2]])
             _arrow(axes, start, start + arrow, COLOUR[one.kind], zorder)
             reach = [start, start + arrow]
         else:

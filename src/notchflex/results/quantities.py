@@ -59,9 +59,9 @@ def _rows() -> tuple[Quantity, ...]:
         ),
         q(
             "total_angle", "total bending angle", r"\theta", "deg",
-            "Bending angle of the robot: where all notches bend in one plane the sum of their angles, "
-            "positive toward the bend of the first; otherwise the angle between the axes of base "
-            "and tip.",
+            "Bending angle of the robot: where all notches bend in one plane the sum of their "
+            "angles, positive toward the bend of the first; otherwise the angle between the axes "
+            "of base and tip.",
             "total_angle_deg", "total_deg", (), DEGREES,
         ),
         q(
@@ -76,8 +76,8 @@ def _rows() -> tuple[Quantity, ...]:
         ),
         q(
             "span_tension", "span tension", "T", "N",
-            "Tension along a tendon: proximal, gap 1, body 1, gap 2, ... to its last gap, of the gaps "
-            "and bodies that it runs through.",
+            "Tension along a tendon: proximal, gap 1, body 1, gap 2, ... to its last gap, of the "
+            "gaps and bodies that it runs through.",
             "span_tension_N", "tendon{tendon}_{span}_N", ("tendon", "span"),
         ),
         q(
@@ -154,8 +154,8 @@ def _rows() -> tuple[Quantity, ...]:
         ),
         q(
             "moment_error", "moment error", "e", "",
-            "Largest difference between the moment of the strain modes and that which the loads ask "
-            "for, over the largest moment: how well the modes serve.",
+            "Largest difference between the moment of the strain modes and that which the loads "
+            "ask for, over the largest moment: how well the modes serve.",
             "moment_error", "moment_error",
         ),
         q(

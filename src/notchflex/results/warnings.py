@@ -104,8 +104,8 @@ def _coarse(path: Path) -> Iterator[str]:
         else "there is no finer --refinement, so take the result with care"
     )
     yield (
-        f"the strain modes miss the bending moment by up to {100 * error[step]:.2g} % of the largest "
-        f"one, at step {step + 1} ({_load(path, step)}): {remedy}."
+        f"the strain modes miss the bending moment by up to {100 * error[step]:.2g} % of the "
+        f"largest one, at step {step + 1} ({_load(path, step)}): {remedy}."
     )
 
 

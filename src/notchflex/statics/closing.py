@@ -22,6 +22,8 @@ from notchflex.statics.stepping import at_rest
 # it is said not to close.
 _BEYOND_LINEAR = 64.0
 _PRECISION = 1e-11  # relative, of the tension
+# The same two where edges of bodies meet, not lips opposite a spine.
+_EDGES = (4.0, 1e-6)
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def closing(robot: Robot) -> Closing:
     arm = moment_arms(chain)
     tendon = np.argmax(arm, axis=1)
     longest = arm[np.arange(len(arm)), tendon]
-    tension, met = _tensions(chain, tendon, longest, travel)
+    tension, met = _tensions(chain, tendon, longest, travel, robot.tube.outer_radius)
     has_spine = np.isfinite(travel)
     elastic = np.where(has_spine, travel / height, np.nan)
     return Closing(
@@ -101,6 +103,7 @@ def _tensions(
     tendon: np.ndarray,
     arm: Float[np.ndarray, " n"],
     travel: Float[np.ndarray, " n"],
+    outer_radius: float,
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Base tension that closes every notch, pulling its own tendon, and the notch's angle then."""
     found, met = np.full(chain.flexures, np.nan), np.full(chain.flexures, np.nan)
@@ -109,6 +112,7 @@ def _tensions(
         return found, met
     stiffness = np.asarray(chain.lip_stiffness)
     rest = at_rest(chain)
+    settings = Settings() if np.isfinite(travel).all() else Settings(max_load_steps=8)
 
     def states(tension: Float[np.ndarray, " m"], notch: np.ndarray) -> tuple[np.ndarray, ...]:
         # Always as many rows as notches, whichever are still searched: one compiled program.
@@ -118,28 +122,34 @@ def _tensions(
         value[rows, tendon[which]] = np.resize(tension, chain.flexures)
         by_stroke = np.zeros(value.shape, bool)
         commands = Command(constant(value), cast("Array", by_stroke), None)
-        force, gap, angle, converged = lips(chain, commands, rest, Settings())
+        force, gap, angle, converged = lips(chain, commands, rest, settings)
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
-        return np.where(converged, overlap, np.nan)[: len(notch)], angle[rows, which][: len(notch)]
+        every = (np.where(converged, overlap, np.nan), angle, force, gap)
+        return tuple(
+            (value if value.ndim == 1 else value[rows, which])[: len(notch)] for value in every
+        )
 
     def pressed(tension: Float[np.ndarray, " m"], notch: Float[np.ndarray, " m"]) -> np.ndarray:
         return states(tension, notch)[0]
 
-    # Where the lips are not opposite a spine, the angle they meet at is of the size of their
-    # opening over the tube's radius: half a radian serves to begin with.
-    scale = np.where(np.isfinite(travel), travel, 0.5)
-    linear = np.asarray(chain.stiffness)[notches, 0] * scale[notches] / arm[notches]
-    high = linear.copy()
-    for _ in range(int(np.log2(_BEYOND_LINEAR)) + 1):
-        short = ~(pressed(high, notches) > 0.0)
+    # The tension that would close a linear notch that is alone with it.
+    force, gap = states(np.zeros(len(notches)), notches.astype(float))[2:]
+    lever = np.where(np.isfinite(travel), chain.rods.lip[:, 0], 0.5 * outer_radius)[notches]
+    linear = (stiffness[notches] * (gap - force) * lever) / arm[notches]
+    # Contacts between bodies ask for far more work, and so for less patience.
+    spines = bool(np.isfinite(travel).all())
+    most, precision = (_BEYOND_LINEAR, _PRECISION) if spines else _EDGES
+    low, high = np.zeros_like(linear), linear.copy()
+    for _ in range(int(np.log2(most)) + 1):
+        short = ~(pressed(high, notches.astype(float)) > 0.0)
         if not short.any():
             break
-        high = np.where(short, 2.0 * high, high)
+        low, high = np.where(short, high, low), np.where(short, 2.0 * high, high)
     root = elementwise.find_root(
         pressed,
-        (np.zeros_like(high), high),
+        (low, high),
         args=(notches.astype(float),),
-        tolerances={"xatol": 0.0, "xrtol": _PRECISION, "fatol": 0.0, "frtol": 0.0},
+        tolerances={"xatol": 0.0, "xrtol": precision, "fatol": 0.0, "frtol": 0.0},
     )
     found[notches] = np.where(root.success, root.x, np.nan)
     angle = states(np.where(root.success, root.x, 0.0), notches.astype(float))[1]

@@ -181,7 +181,8 @@ class Path:
     @property
     def closed(self) -> np.ndarray:
         """Whether the lips of a notch touch, (s, n)."""
-        return self.contact_force > 0.0
+        # Of force and gap one is zero, but for rounding: the larger of them tells.
+        return self.contact_force > self.gap * np.asarray(self.chain.lip_stiffness)
 
     @property
     def contact_force(self) -> np.ndarray:

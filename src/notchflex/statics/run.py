@@ -84,7 +84,9 @@ def run(
 def stability(chain: Chain, commands: Command, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
     """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
     count = len(commands.value)
-    stiffness, sign = _stability(chain, _pad(commands), _pad(solved))
+    padded = _pad(commands)
+    wanted = np.arange(len(padded.value)) < count
+    stiffness, sign = _stability(chain, padded, _pad(solved), wanted)
     held = np.asarray(stiffness)[:count]
     whole = np.isfinite(held).all(axis=(1, 2))
     eigenvalue = np.full(count, np.nan)
@@ -175,8 +177,17 @@ def _run(
 
 
 @jit
-def _stability(chain: Chain, commands: Command, solved: Solved) -> tuple[Array, Array]:
-    return jax.lax.map(lambda item: held_stiffness(chain, *item), (commands, solved))
+def _stability(
+    chain: Chain, commands: Command, solved: Solved, wanted: Bool[Array, " s"]
+) -> tuple[Array, Array]:
+    modes = chain.stiffness.size
+
+    def one(item: tuple[Command, Solved, Array]) -> tuple[Array, Array]:
+        command, state, own = item
+        nothing = (jnp.full((modes, modes), jnp.nan), jnp.array(jnp.nan))
+        return jax.lax.cond(own, lambda: held_stiffness(chain, command, state), lambda: nothing)
+
+    return jax.lax.map(one, (commands, solved, wanted))
 
 
 def _not_tried(last: Solved) -> Advance:

@@ -109,25 +109,30 @@ def element_blocks(
                 ravel_pytree(result.behind)[0],
             )
 
-        at_flexure = jnp.concatenate([flat_own, no_change, flat_beyond])
-        directly = jax.jacfwd(flat, argnums=1)(flexure, at_flexure)
-
-        def through_flexure(modes: Array) -> tuple[Array, Array, Array]:
-            state = flexure_state(
+        def state_at(modes: Array) -> FlexureState:
+            return flexure_state(
                 element.rod,
                 common.law,
                 element.memory,
                 modes,
                 with_pose=chain.forces_on_bodies,
             )
-            return flat(state, at_flexure)
 
-        by_modes = jax.jacfwd(through_flexure)(own.modes)
-        # The modes are the first of the unknowns.
-        residual, on, back = (
-            direct.at[:, : len(own.modes)].add(through)
-            for direct, through in zip(directly, by_modes, strict=True)
+        # One direction for every number that may change; the modes, which are the first of the
+        # unknowns, change the flexure's state as well.
+        here = jnp.concatenate([flat_own, no_change, flat_beyond])
+        others = len(here) - len(own.modes)
+        by_modes = jax.tree.map(
+            lambda leaf: jnp.concatenate(
+                [jnp.moveaxis(leaf, -1, 0), jnp.zeros((others, *leaf.shape[:-1]))]
+            ),
+            jax.jacfwd(state_at)(own.modes),
         )
+
+        def along(state_way: FlexureState, way: Array) -> tuple[Array, Array, Array]:
+            return jax.jvp(flat, (flexure, here), (state_way, way))[1]
+
+        residual, on, back = jax.vmap(along, out_axes=-1)(by_modes, jnp.eye(len(here)))
         by_unknown, by_carried, by_beyond = jnp.split(residual, ends, axis=1)
         on_by_unknown, on_by_carried, _ = jnp.split(on, ends, axis=1)
         back_by_unknown, back_by_carried, back_by_beyond = jnp.split(back, ends, axis=1)

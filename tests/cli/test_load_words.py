@@ -1,0 +1,32 @@
+"""Loads from outside in the head of the table."""
+
+from notchflex.cli.load_words import in_words, load_sentences
+from notchflex.statics.external import NOTHING, BodyForce, ExternalLoad
+
+PUSH = ExternalLoad(tip_force=(0.0, 0.0, -0.2), tip_point=(0.0, 0.0, 1.5))
+
+
+def test_nothing_is_said_of_nothing():
+    assert load_sentences([NOTHING] * 3) == []
+
+
+def test_every_load_is_named_with_its_unit():
+    side = BodyForce(3, (0.1, 0, 0), moment=(0, 2, 0), point=(0.8, 0, 0), following=True)
+    load = ExternalLoad(
+        tip_moment=(1, 0, 0), following=True, tip_mass=20, gravity=(0, 9.81, 0), body_forces=[side]
+    )
+    assert in_words(load) == (
+        "tip moment (1, 0, 0) N mm following the tip, tip mass 20 g, gravity (0, 9.81, 0) m/s2, "
+        "force (0.1, 0, 0) N on body 3 at (0.8, 0, 0) mm following it, "
+        "moment (0, 2, 0) N mm on body 3 following it"
+    )
+    assert in_words(PUSH) == "tip force (0, 0, -0.2) N at (0, 0, 1.5) mm from the tip"
+
+
+def test_lines_fit_and_changes_are_told_by_their_steps():
+    lines = load_sentences([NOTHING, NOTHING, PUSH])
+    assert lines[0] == "loads from outside, steps 1 to 2: none"
+    assert lines[1].startswith("loads from outside, step 3: tip force")
+    assert all(len(line) <= 80 for line in lines)
+    many = [ExternalLoad(tip_mass=mass) for mass in range(1, 6)]
+    assert load_sentences(many) == ["loads from outside: 5 different ones over the steps"]

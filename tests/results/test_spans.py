@@ -1,0 +1,33 @@
+"""What a path has: spans by the bodies that a tendon runs through, quantities with numbers."""
+
+from types import SimpleNamespace
+
+import pytest
+
+import notchflex as nf
+from fake_path import fake_path
+from notchflex.chain import prepared
+from notchflex.results.quantities import QUANTITIES
+from notchflex.results.spans import holds, spans_of
+
+
+@pytest.mark.parametrize(
+    ("name", "spans"), [("gao2017", [28]), ("liu2022", [14, 14]), ("two-axis-wrist", [16] * 4)]
+)
+def test_two_spans_for_each_body_that_a_tendon_runs_through(name, spans):
+    path = SimpleNamespace(chain=prepared(nf.load_robot(name)))
+    assert [spans_of(path, tendon) for tendon in range(len(spans))] == spans
+
+
+def test_a_tendon_that_ends_earlier_has_fewer():
+    robot = nf.load_robot("liu2022").with_value("tendon[2].end_body", 3)
+    path = SimpleNamespace(chain=prepared(robot))
+    assert [spans_of(path, tendon) for tendon in (0, 1)] == [14, 6]
+
+
+def test_optional_quantities_need_a_number():
+    path = fake_path(2)
+    assert not holds(path, QUANTITIES["chord_angle"])
+    path.columns["chord_angle"][0, 2] = 0.1
+    assert holds(path, QUANTITIES["chord_angle"])
+    assert not holds(SimpleNamespace(), QUANTITIES["tension"])
