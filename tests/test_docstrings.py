@@ -30,10 +30,13 @@ def test_docstrings(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert failed == 0
 
 
-def test_readme_example(capsys: pytest.CaptureFixture[str]):
-    code, shown = re.findall(r"```python\n(.*?)```(?:\n+```text\n(.*?)```)?", README, re.DOTALL)[0]
-    exec(compile(code, "README.md", "exec"), {})
-    assert capsys.readouterr().out == shown
+def test_readme_examples(capsys: pytest.CaptureFixture[str]):
+    names: dict[str, object] = {}  # one example goes on from the other
+    for code, shown in re.findall(r"```python\n(.*?)```\n+```text\n(.*?)```", README, re.DOTALL):
+        exec(compile(code, "README.md", "exec"), names)
+        assert capsys.readouterr().out == shown
+    assert "state" in names
+    assert README.count("```python") == README.count("```text")
 
 
 def test_readme_robot_file():

@@ -47,7 +47,7 @@ def pulled(path: nf.Path) -> dict[str, str]:
         rows.append(
             (
                 f"{path.tension[step, 0]:.0f}",
-                f"{np.degrees(path.total_angle[step]):.2f}",
+                f"{abs(np.degrees(path.total_angle[step])):.2f}",
                 front,
                 part,
             )
@@ -57,7 +57,7 @@ def pulled(path: nf.Path) -> dict[str, str]:
     return {
         "tip": f"({-top.tip_position[0]:.3f}, {top.tip_position[2]:.3f})",
         "angle": f"{np.degrees(top.total_angle):.2f}",
-        "ratio": f"{tension[0] / tension[-1]:.3f}",
+        "ratio": f"{tension[0] / tension[-1]:.2f}",
         "first_joint": f"{angle[0]:.2f}",
         "last_joint": f"{angle[-1]:.2f}",
         "front": table(("N, let go", "tip angle, deg", "front at contact m", "η"), rows),

@@ -51,7 +51,7 @@ def numbers() -> dict[str, str]:
         both = [cut(0.81, 0.70, depth) for cut in (nf.annular_sector, nf.annular_segment)]
         moments = [float(one.second_moment_weak) for one in both]
         less = 100.0 * (1.0 - moments[1] / moments[0])
-        sections.append((f"{depth:.2f}", *(f"{one:.5f}" for one in moments), f"{less:.0f} %"))
+        sections.append((f"{depth:.2f}", *(f"{one:.6f}" for one in moments), f"{less:.0f} %"))
     for name in WRISTS:
         found = nf.closing(robot(name))
         order = np.argsort(found.tension, kind="stable") + 1

@@ -152,4 +152,4 @@ def test_loads_and_refinement_reach_the_solver_and_the_head_of_the_table(call, t
 def test_refinement_is_a_small_whole_number(call, value):
     code, _, err = call(*LOOP, "--refinement", value)
     assert code == 2
-    assert "refinement" in err
+    assert f"--refinement {value}: give a whole number from 0 to 3" in err

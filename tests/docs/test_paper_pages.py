@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -16,7 +17,7 @@ NAMES = sorted(path.stem for path in PAPERS.glob("*.md"))
 
 
 @pytest.fixture
-def script(monkeypatch) -> ModuleType:
+def script(monkeypatch) -> Iterator[ModuleType]:
     """The module that reads and writes pages; scripts beside it can be imported too."""
     monkeypatch.syspath_prepend(str(PAPERS))
     yield importlib.import_module("page")

@@ -30,6 +30,7 @@ from notchflex.cli.options import (
     robot_files,
 )
 from notchflex.cli.spec import load_columns, parse_vector
+from notchflex.errors import InputError
 from notchflex.results.files import (
     STANDARD_OUTPUT,
     check_distinct,
@@ -84,12 +85,13 @@ def simulate(
     gravity: Gravity = None,
     following: Following = False,
     refinement: Annotated[
-        int,
+        str,
         Parameter(
+            allow_leading_hyphen=True,
             help="0 to 3: more strain modes in every notch. A result that stays the same can be "
             "trusted.",
         ),
-    ] = 0,
+    ] = "0",
     settings: Settings = (),
     from_state: Annotated[
         str | None,
@@ -130,6 +132,7 @@ def simulate(
         tensions = strokes = np.full((1, chosen.number_of_tendons), np.nan)
     else:
         tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
+    finer = _refinement(refinement)
     turn = np.zeros(3)
     if base_rotation is not None:
         turn = np.radians(parse_vector(base_rotation, "--base-rotation", "angles in deg"))
@@ -142,7 +145,7 @@ def simulate(
         start = None if from_state is None else statics.State.load(from_state)
         pulled = statics.LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
         path = statics.simulate(
-            chosen, put_on(pulled, loads), from_state=start, refinement=refinement
+            chosen, put_on(pulled, loads), from_state=start, refinement=finer
         )
     _write(path, json=json, csv=csv, plot=plot, save_state=save_state)
     if STANDARD_OUTPUT not in (json, csv):
@@ -150,6 +153,12 @@ def simulate(
 
         print_path(path)
     return _say_what_matters(path)
+
+
+def _refinement(text: str) -> int:
+    if text not in ("0", "1", "2", "3"):
+        raise InputError(f"--refinement {text}: give a whole number from 0 to 3.")
+    return int(text)
 
 
 def _write(
