@@ -144,9 +144,7 @@ def simulate(
         use_compile_cache()
         start = None if from_state is None else statics.State.load(from_state)
         pulled = statics.LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
-        path = statics.simulate(
-            chosen, put_on(pulled, loads), from_state=start, refinement=finer
-        )
+        path = statics.simulate(chosen, put_on(pulled, loads), from_state=start, refinement=finer)
     _write(path, json=json, csv=csv, plot=plot, save_state=save_state)
     if STANDARD_OUTPUT not in (json, csv):
         from notchflex.cli.path_table import print_path

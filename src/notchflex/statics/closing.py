@@ -14,6 +14,7 @@ from notchflex.chain import Chain, assemble
 from notchflex.contact import closing_travel, free_angle
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
+from notchflex.statics.edge_closing import edge_closing
 from notchflex.statics.newton import Settings
 from notchflex.statics.run import lips
 from notchflex.statics.stepping import at_rest
@@ -22,8 +23,6 @@ from notchflex.statics.stepping import at_rest
 # it is said not to close.
 _BEYOND_LINEAR = 64.0
 _PRECISION = 1e-11  # relative, of the tension
-# The same two where edges of bodies meet, not lips opposite a spine.
-_EDGES = (4.0, 1e-6)
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,10 @@ def closing(robot: Robot) -> Closing:
     arm = moment_arms(chain)
     tendon = np.argmax(arm, axis=1)
     longest = arm[np.arange(len(arm)), tendon]
-    tension, met = _tensions(chain, tendon, longest, travel, robot.tube.outer_radius)
+    if np.isfinite(travel).all():
+        tension, met = _tensions(chain, tendon, longest, travel), travel
+    else:
+        tension, met = edge_closing(chain, tendon, longest)
     has_spine = np.isfinite(travel)
     elastic = np.where(has_spine, travel / height, np.nan)
     return Closing(
@@ -103,18 +105,16 @@ def _tensions(
     tendon: np.ndarray,
     arm: Float[np.ndarray, " n"],
     travel: Float[np.ndarray, " n"],
-    outer_radius: float,
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Base tension that closes every notch, pulling its own tendon, and the notch's angle then."""
-    found, met = np.full(chain.flexures, np.nan), np.full(chain.flexures, np.nan)
+) -> Float[np.ndarray, " n"]:
+    """Base tension that closes every notch against its spine, pulling its own tendon."""
+    found = np.full(chain.flexures, np.nan)
     notches = np.flatnonzero((arm > 0.0) & (travel > 0.0))
     if len(notches) == 0:
-        return found, met
+        return found
     stiffness = np.asarray(chain.lip_stiffness)
     rest = at_rest(chain)
-    settings = Settings() if np.isfinite(travel).all() else Settings(max_load_steps=8)
 
-    def states(tension: Float[np.ndarray, " m"], notch: np.ndarray) -> tuple[np.ndarray, ...]:
+    def pressed(tension: Float[np.ndarray, " m"], notch: Float[np.ndarray, " m"]) -> np.ndarray:
         # Always as many rows as notches, whichever are still searched: one compiled program.
         which = np.resize(notch.astype(int), chain.flexures)
         rows = np.arange(chain.flexures)
@@ -122,36 +122,22 @@ def _tensions(
         value[rows, tendon[which]] = np.resize(tension, chain.flexures)
         by_stroke = np.zeros(value.shape, bool)
         commands = Command(constant(value), cast("Array", by_stroke), None)
-        force, gap, angle, converged = lips(chain, commands, rest, settings)
+        force, gap, converged = lips(chain, commands, rest, Settings())
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
-        every = (np.where(converged, overlap, np.nan), angle, force, gap)
-        return tuple(
-            (value if value.ndim == 1 else value[rows, which])[: len(notch)] for value in every
-        )
+        return np.where(converged, overlap, np.nan)[: len(notch)]
 
-    def pressed(tension: Float[np.ndarray, " m"], notch: Float[np.ndarray, " m"]) -> np.ndarray:
-        return states(tension, notch)[0]
-
-    # The tension that would close a linear notch that is alone with it.
-    force, gap = states(np.zeros(len(notches)), notches.astype(float))[2:]
-    lever = np.where(np.isfinite(travel), chain.rods.lip[:, 0], 0.5 * outer_radius)[notches]
-    linear = (stiffness[notches] * (gap - force) * lever) / arm[notches]
-    # Contacts between bodies ask for far more work, and so for less patience.
-    spines = bool(np.isfinite(travel).all())
-    most, precision = (_BEYOND_LINEAR, _PRECISION) if spines else _EDGES
-    low, high = np.zeros_like(linear), linear.copy()
-    for _ in range(int(np.log2(most)) + 1):
+    linear = np.asarray(chain.stiffness)[notches, 0] * travel[notches] / arm[notches]
+    high = linear.copy()
+    for _ in range(int(np.log2(_BEYOND_LINEAR)) + 1):
         short = ~(pressed(high, notches.astype(float)) > 0.0)
         if not short.any():
             break
-        low, high = np.where(short, high, low), np.where(short, 2.0 * high, high)
+        high = np.where(short, 2.0 * high, high)
     root = elementwise.find_root(
         pressed,
-        (low, high),
+        (np.zeros_like(high), high),
         args=(notches.astype(float),),
-        tolerances={"xatol": 0.0, "xrtol": precision, "fatol": 0.0, "frtol": 0.0},
+        tolerances={"xatol": 0.0, "xrtol": _PRECISION, "fatol": 0.0, "frtol": 0.0},
     )
     found[notches] = np.where(root.success, root.x, np.nan)
-    angle = states(np.where(root.success, root.x, 0.0), notches.astype(float))[1]
-    met[notches] = np.where(root.success, angle, np.nan)
-    return found, met
+    return found

@@ -14,16 +14,9 @@ from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jit, jnp
 from notchflex.chain import Chain
-from notchflex.flexure import relative_pose
 from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
-from notchflex.statics.quantities import (
-    Quantities,
-    body_poses,
-    notch_angles,
-    notch_lips,
-    quantities,
-)
+from notchflex.statics.quantities import Quantities, notch_lips, quantities
 from notchflex.statics.stability import held_stiffness
 from notchflex.statics.stepping import Advance, Solved, advance
 from notchflex.statics.walk import evaluate
@@ -96,32 +89,31 @@ def stability(chain: Chain, commands: Command, solved: Solved) -> tuple[np.ndarr
 
 def lips(
     chain: Chain, commands: Command, start: Solved, settings: Settings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Contact forces (N), gaps (mm) and angles (rad) of all notches, each load from one state.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Contact forces (N) and gaps (mm) of all notches, each load from the same state.
 
     A small program beside `run`, for questions that are asked again and again: only whether the
     notches are closed, and no other quantity.
 
     Returns:
-        Contact forces, gaps and angles, loads by notches, and which loads converged.
+        Contact forces and gaps, loads by notches, and which loads converged.
     """
-    force, gap, angle, converged = _lips(chain, commands, start, settings)
-    return np.asarray(force), np.asarray(gap), np.asarray(angle), np.asarray(converged)
+    force, gap, converged = _lips(chain, commands, start, settings)
+    return np.asarray(force), np.asarray(gap), np.asarray(converged)
 
 
 @jit
 def _lips(
     chain: Chain, commands: Command, start: Solved, settings: Settings
-) -> tuple[Array, Array, Array, Array]:
-    def at_lips(command: Command) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array]:
+    def at_lips(command: Command) -> tuple[Array, Array, Array]:
         came = advance(chain, command, start, settings)
         point = came.solved.point
         at = evaluate(
             chain, point.unknowns, came.solved.memory, point.base_tension, came.solved.applied
         )
         force, gap = notch_lips(chain, point.unknowns, at)
-        bodies = body_poses(jax.vmap(relative_pose)(chain.rods, point.unknowns.modes))
-        return force, gap, notch_angles(bodies, chain), came.converged
+        return force, gap, came.converged
 
     return jax.lax.map(at_lips, commands)
 

@@ -95,7 +95,8 @@ def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -
         "present": present,
         "visits": visits,
         "ends": ends,
-        "body_length": visits * (line.leaves - line.enters),
+        # A cable may end at an edge beyond the axial length of the last piece.
+        "body_length": visits * np.maximum(line.leaves - line.enters, 0.0),
     }
 
 

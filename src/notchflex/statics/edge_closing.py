@@ -1,0 +1,85 @@
+"""When do notches close whose edges belong to rigid pieces, as slots and triangular notches do?
+
+The tendon is pulled in steps from rest; between the two steps where an edge comes to touch, the
+tension is found by false position on the solver itself.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import constant
+from notchflex.chain import Chain
+from notchflex.statics.actuation import Command
+from notchflex.statics.newton import Settings
+from notchflex.statics.run import run
+from notchflex.statics.stepping import at_rest
+
+# Steps of the first pull, up to so many times the tension that would close the softest notch if it
+# were linear and alone; what does not close by then is said not to close.
+_STEPS, _BEYOND_LINEAR = 40, 2.0
+# Rounds of false position; each gains one to two digits.
+_ROUNDS = 4
+
+
+def edge_closing(
+    chain: Chain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Tension (N) that closes every notch, and its angle then (rad); NaN where none does.
+
+    Args:
+        chain: The chain.
+        tendon: Which tendon is pulled for each notch, from 0.
+        arm: Its lever about the notch, mm.
+    """
+    tension, angle = (np.full(chain.flexures, np.nan) for _ in range(2))
+    for number in np.unique(tendon):
+        own = np.flatnonzero((tendon == number) & (arm > 0.0))
+        if len(own):
+            tension[own], angle[own] = _by_one_tendon(chain, int(number), own)
+    return tension, angle
+
+
+def _by_one_tendon(
+    chain: Chain, tendon: int, own: np.ndarray
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+    free, _ = _pull(chain, tendon, np.zeros(1))
+    reach = -free[0, own]  # the gap at rest: an edge so far from closing
+    # Tendon and edges are about as far from the axis.
+    linear = np.asarray(chain.lip_stiffness)[own] * reach
+    steps = np.linspace(0.0, _BEYOND_LINEAR * linear.max(), _STEPS + 1)
+    overlap, angle = _pull(chain, tendon, steps)
+    touching = overlap[:, own] > 0.0
+    closes = touching.any(axis=0)
+    after = np.where(closes, touching.argmax(axis=0), 1)
+    column = np.arange(len(own))
+    low, high = steps[after - 1], steps[after]
+    at_low, at_high = (overlap[:, own][step, column] for step in (after - 1, after))
+    guess, found_angle = high, angle[:, own][after, column]
+    for _ in range(_ROUNDS if closes.any() else 0):
+        guess = np.where(closes, high - at_high * (high - low) / (at_high - at_low), steps[-1])
+        order = np.argsort(guess)
+        pressed, angle = _pull(chain, tendon, guess[order])
+        here = pressed[np.argsort(order), own]
+        found_angle = angle[np.argsort(order), own]
+        over = here > 0.0
+        low, at_low = np.where(over, low, guess), np.where(over, at_low, here)
+        high, at_high = np.where(over, guess, high), np.where(over, here, at_high)
+    return np.where(closes, guess, np.nan), np.where(closes, found_angle, np.nan)
+
+
+def _pull(
+    chain: Chain, tendon: int, tensions: Float[np.ndarray, " s"]
+) -> tuple[Float[np.ndarray, "s n"], Float[np.ndarray, "s n"]]:
+    """Overlap of every notch's edges (contact force / stiffness - gap, mm) and its angle (rad)."""
+    value = np.zeros((len(tensions), chain.tendons))
+    value[:, tendon] = tensions
+    commands = Command(constant(value), cast("Array", np.zeros(value.shape, bool)), None)
+    came = run(chain, commands, at_rest(chain), Settings(), each_from_start=False)
+    state = came.quantities
+    overlap = np.asarray(state.contact_force) / np.asarray(chain.lip_stiffness) - state.gap
+    good = np.asarray(came.converged)[:, None]
+    return np.where(good, overlap, np.nan), np.where(good, state.notch_angle, np.nan)
