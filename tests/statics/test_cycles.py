@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -33,7 +35,7 @@ def run(robot: nf.Robot, first, force) -> nf.Path:
 
 def ramp(*turns: float, steps: int = 12) -> np.ndarray:
     """From turn to turn in equal steps."""
-    parts = [np.linspace(a, b, steps + 1)[1:] for a, b in zip(turns, turns[1:], strict=False)]
+    parts = [np.linspace(a, b, steps + 1)[1:] for a, b in pairwise(turns)]
     return np.concatenate([[turns[0]], *parts])
 
 

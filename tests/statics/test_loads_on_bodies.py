@@ -1,4 +1,4 @@
-"""Loads beside the tendons against closed forms; loads that no shape can bear; going on from states."""
+"""Loads beside the tendons: closed forms, loads that no shape bears, going on from states."""
 
 from __future__ import annotations
 
@@ -27,9 +27,7 @@ def one_strip() -> nf.Robot:
 @pytest.mark.parametrize("following", [False, True])
 def test_force_on_the_end_of_a_strip_is_the_elastica(one_strip, force, following, margin) -> None:
     """The strip's free end lies 4 mm beside the axis and 1.5 mm below the tip."""
-    load = nf.Load(
-        tip_force=(0.0, 0.0, -force), tip_point=(4.0, 0.0, -1.5), following=following
-    )
+    load = nf.Load(tip_force=(0.0, 0.0, -force), tip_point=(4.0, 0.0, -1.5), following=following)
     state = nf.solve(one_strip, load).raise_if_failed()
     reading = {"follower" if following else "clamp_angle": 0.5 * np.pi}
     beam = nf.elastica(force, LENGTH, STIFFNESS, **reading)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import jnp
+from notchflex._jax import constant, jnp
 from notchflex.contact.lip import LipGroup, Touch
 from notchflex.flexure import FlexureState, Rod, fibre_stretch
 
@@ -56,7 +56,7 @@ def closing_travel(rods: Rod) -> Float[np.ndarray, " n"]:
     It is where the first mode, whose amplitude is that angle, leaves no length between the lips;
     for an arc h / (r_o + ybar) less the precurvature.
     """
-    lip = fibre_stretch(np.asarray(rods.lip))
+    lip = fibre_stretch(constant(rods.lip))
     free = np.einsum("nc,nic,ni->n", lip, rods.reference_strain, rods.length)
     slope = np.einsum("nc,nic,ni->n", lip, np.asarray(rods.basis)[..., 0], rods.length)
     spine = np.asarray(rods.lip_closes) > 0.0

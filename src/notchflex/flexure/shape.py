@@ -7,7 +7,7 @@ from functools import reduce
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, jax
+from notchflex._jax import array_module, constant, jax
 from notchflex.flexure.rod import Rod
 from notchflex.motion import Motion, bracket, exponential, identity, skew
 
@@ -131,4 +131,4 @@ def _up_to_nodes(count: int) -> Float[np.ndarray, "nodes nodes"]:
     return integrals @ np.linalg.inv(points[:, None] ** (powers - 1))
 
 
-_UP_TO_NODE = {count: _up_to_nodes(count) for count in (1, 3)}
+_UP_TO_NODE = {count: constant(_up_to_nodes(count)) for count in (1, 3)}

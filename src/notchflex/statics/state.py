@@ -99,8 +99,7 @@ class State:
             raise _damaged(path, "the name of its robot or its numbers are missing")
         level, loaded = content.get("level"), content.get("loaded")
         refinement = content.get("refinement")
-        kept = isinstance(loaded, bool) and isinstance(refinement, int)
-        if level not in LEVELS or not kept:
+        if level not in LEVELS or not isinstance(loaded, bool) or not isinstance(refinement, int):
             raise _damaged(path, "what loads it is for is missing")
         return SavedState(robot, arrays, level, loaded, refinement, str(path))
 

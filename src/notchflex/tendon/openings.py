@@ -31,7 +31,7 @@ class Passage(NamedTuple):
     closes: Float[np.ndarray, " n"]
     enters: Float[np.ndarray, " n"]
     leaves: Float[np.ndarray, " n"]
-    base_leaves: float
+    base_leaves: Float[np.ndarray, ""]
 
 
 def passage(
@@ -53,7 +53,7 @@ def passage(
         closes[body - 1] = opening.faces(direction_deg)
         leaves[last] += opening.leaves
         last = body
-    return Passage(visits, closes, enters, leaves[1:], float(leaves[0]))
+    return Passage(visits, closes, enters, leaves[1:], leaves[0])
 
 
 def passages(
