@@ -144,7 +144,7 @@ def _walls(robot: Robot, body_length: tuple[float, ...], side_deg: float) -> Wal
     from notchflex.tendon.openings import passage
 
     line = passage(robot.notches, constant(body_length), side_deg)
-    walls: Walls = [(-HELD * robot.tube.outer_radius, line.base_leaves)]
+    walls: Walls = [(-HELD * robot.tube.outer_radius, float(line.base_leaves))]
     for visits, *ends in zip(line.visits, line.enters, line.leaves, strict=True):
         # What is fixed in the last body may enter it beyond its far face.
         walls.append((float(min(ends)), float(max(ends))) if visits else None)

@@ -122,7 +122,6 @@ def newton(
     largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
     growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
     tolerance = settings.tolerance * growth
-    closing_force = jnp.mean(chain.lip_stiffness * jnp.sum(chain.rods.length, axis=-1))
 
     def searching(search: _Search) -> Bool[Array, ""]:
         return ~search.over & (search.best.iterations <= settings.max_iterations)
@@ -154,34 +153,17 @@ def newton(
             turn = jnp.max(jnp.abs(step.unknowns.modes))
             logs = [jnp.max(jnp.abs(leaf), initial=0.0) for leaf in step.unknowns.log_ratio]
             log_ratio = jnp.max(jnp.array([0.0, *logs]))
-            whole = jnp.minimum(_LARGEST_TURN / turn, _LARGEST_LOG_RATIO / log_ratio)
-            part = jnp.minimum(1.0, whole)
-            # While the tensions of tendons drawn by stroke are still to be found, every contact
-            # is put where its tension would leave it, not where a linear step does; and stuck
-            # contacts, which make a tendon very stiff, must not throw its tension about.
+            by_turn = jnp.minimum(1.0, _LARGEST_TURN / turn)
+            whole = jnp.minimum(by_turn, _LARGEST_LOG_RATIO / log_ratio)
             early = (
                 jnp.any(command.by_stroke) & (best.iterations < _PLAYED) & (largest > _PLAYED_ABOVE)
             )
-            tension = point.base_tension + jnp.where(early, part, 1.0) * step.base_tension
-            moderate = jnp.clip(
-                tension, 0.5 * point.base_tension, 2.0 * point.base_tension + closing_force
+            limits = memory._replace(bound=at.result.bound)
+            put = _contacts_put(chain, command, limits, before, point, step, whole)
+            step = jax.tree.map(
+                lambda own, other: jnp.where(early, other / by_turn, own), step, put
             )
-            tension = jnp.where(early & command.by_stroke, moderate, tension)
-            put = played(chain, before, tension, memory._replace(bound=at.result.bound))
-            there = jax.tree.map(jnp.subtract, put, point.unknowns.log_ratio)
-            turn_part = jnp.minimum(1.0, _LARGEST_TURN / turn)
-            part = jnp.where(early, turn_part, part)
-            step = Step(
-                step.unknowns._replace(
-                    log_ratio=jax.tree.map(
-                        lambda own, other: jnp.where(early, other / part, own),
-                        step.unknowns.log_ratio,
-                        there,
-                    )
-                ),
-                jnp.where(early, (tension - point.base_tension) / part, step.base_tension),
-            )
-            return Point(step.unknowns, step.base_tension), part
+            return Point(step.unknowns, step.base_tension), jnp.where(early, by_turn, whole)
 
         step, part = jax.lax.cond(taken & ~solved, again, lambda: (search.step, 0.5 * search.part))
         return _Search(
@@ -211,3 +193,32 @@ def newton(
         over=jnp.array(False),
     )
     return jax.lax.while_loop(searching, iterate, search).best
+
+
+def _contacts_put(
+    chain: Chain,
+    command: Command,
+    memory: Memory,
+    before: Float[Array, " t"],
+    point: Point,
+    step: Step,
+    part: Float[Array, ""],
+) -> Step:
+    """A step whose contacts go where their tension would leave them, not where a linear step does.
+
+    It serves while the tensions of tendons drawn by stroke are still to be found. Stuck contacts,
+    which make a tendon very stiff, must not throw its tension about: it stays moderate. The modes
+    of the step are left as they are.
+    """
+    closing_force = jnp.mean(chain.lip_stiffness * jnp.sum(chain.rods.length, axis=-1))
+    tension = point.base_tension + part * step.base_tension
+    moderate = jnp.clip(tension, 0.5 * point.base_tension, 2.0 * point.base_tension + closing_force)
+    tension = jnp.where(command.by_stroke, moderate, tension)
+    put = played(chain, before, tension, memory)
+    by_turn = jnp.minimum(1.0, _LARGEST_TURN / jnp.max(jnp.abs(step.unknowns.modes)))
+    unknowns = Unknowns(
+        modes=by_turn * step.unknowns.modes,
+        lip_force=tuple(by_turn * force for force in step.unknowns.lip_force),
+        log_ratio=jax.tree.map(jnp.subtract, put, point.unknowns.log_ratio),
+    )
+    return Step(unknowns, tension - point.base_tension)
