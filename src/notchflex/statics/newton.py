@@ -25,12 +25,15 @@ class Settings(eqx.Module):
         max_iterations: Newton iterations for one load step.
         max_load_steps: Parts a load may be cut into before the solver gives up.
         smallest_load_step: Smallest such part, of the whole load.
+        max_all_iterations: Newton iterations for a load, all its parts together: a load that no
+            shape can bear is given up after a while.
     """
 
     tolerance: float = 1e-13
     max_iterations: int = 40
     max_load_steps: int = 200
     smallest_load_step: float = 1e-5
+    max_all_iterations: int = 800
 
 
 class Point(NamedTuple):
@@ -206,9 +209,9 @@ def _contacts_put(
 ) -> Step:
     """A step whose contacts go where their tension would leave them, not where a linear step does.
 
-    It serves while the tensions of tendons drawn by stroke are still to be found. Stuck contacts,
-    which make a tendon very stiff, must not throw its tension about: it stays moderate. The modes
-    of the step are left as they are.
+    It serves while the tensions of tendons drawn by stroke are still to be found, and concerns only
+    these. Stuck contacts, which make a tendon very stiff, must not throw its tension about: it
+    stays moderate.
     """
     closing_force = jnp.mean(chain.lip_stiffness * jnp.sum(chain.rods.length, axis=-1))
     tension = point.base_tension + part * step.base_tension
@@ -216,9 +219,15 @@ def _contacts_put(
     tension = jnp.where(command.by_stroke, moderate, tension)
     put = played(chain, before, tension, memory)
     by_turn = jnp.minimum(1.0, _LARGEST_TURN / jnp.max(jnp.abs(step.unknowns.modes)))
+    logs = []
+    for group, there, here, own in zip(
+        chain.groups, put, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True
+    ):
+        sought = command.by_stroke[jnp.array(group.numbers)][None, :, None]
+        logs.append(jnp.where(sought, there - here, part * own))
     unknowns = Unknowns(
         modes=by_turn * step.unknowns.modes,
         lip_force=tuple(by_turn * force for force in step.unknowns.lip_force),
-        log_ratio=jax.tree.map(jnp.subtract, put, point.unknowns.log_ratio),
+        log_ratio=tuple(logs),
     )
     return Step(unknowns, tension - point.base_tension)

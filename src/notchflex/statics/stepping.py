@@ -123,6 +123,7 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
             ~advanced.converged
             & (part >= settings.smallest_load_step)
             & (tries < settings.max_load_steps)
+            & (advanced.iterations < settings.max_all_iterations)
         )
 
     def follow(state: tuple[Advance, Array, Array]) -> tuple[Advance, Array, Array]:
