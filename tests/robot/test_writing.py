@@ -183,10 +183,10 @@ notches = st.builds(
 strips = st.builds(
     nf.StripNotch,
     height=lengths,
-    strip_thickness=lengths,
+    strip_thickness=st.floats(0.001, 0.4),
     depth=st.floats(1.001, 1.999),
-    strip_length=st.none() | lengths,
-    wall_width=st.none() | lengths,
+    strip_length=st.none() | st.floats(0.5, 2.0),
+    wall_width=st.none() | st.floats(0.001, 2.0),
     deflection=st.sampled_from(["large", "small"]),
     repeat=st.integers(1, 9),
 )

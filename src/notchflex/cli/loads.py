@@ -68,6 +68,9 @@ Following = Annotated[
     ),
 ]
 
+# More digits than any number of a body has.
+_DIGITS = 9
+
 
 def parse_loads(
     *,
@@ -139,7 +142,7 @@ def parse_body_force(text: str, following: bool = False) -> dict[str, Any]:
     option = "--body-force"
     body, colon, rest = text.partition(":")
     force, at, point = rest.partition("@")
-    if not colon or not body.strip().isdecimal():
+    if not colon or not body.strip().isdecimal() or len(body) > _DIGITS:
         raise InputError(f"{option} {text}: give {_BODY}.")
     loads: dict[str, Any] = {"body": int(body)}
     for name, given, what, words in (

@@ -92,6 +92,25 @@ class StripNotch(Notch):
                 f"{tube.outer_radius} mm, so that the two cuts leave a strip between them, and "
                 f"less than the outer diameter, {tube.outer_diameter} mm.",
             )
+        length, width = self.strip_length_in(tube), self.wall_width_in(tube)
+        if length > tube.outer_diameter:
+            yield (
+                "strip_length",
+                f"is {length} mm; a strip across the tube is at most as long as the outer "
+                f"diameter, {tube.outer_diameter} mm.",
+            )
+        if width > tube.outer_diameter:
+            yield (
+                "wall_width",
+                f"is {width} mm; both walls together are at most as wide as the outer diameter, "
+                f"{tube.outer_diameter} mm.",
+            )
+        if self.strip_thickness >= length:
+            yield (
+                "strip_thickness",
+                f"is {self.strip_thickness} mm; a strip must be thinner than it is long, "
+                f"{length:.4g} mm.",
+            )
         if self.precurvature_deg:
             yield (
                 "precurvature_deg",

@@ -22,6 +22,9 @@ _SECTIONS: dict[str, type] = {
 _PATH = re.compile(r"(?P<section>\w+)(?:\[(?P<index>\*|\d+)\])?(?:\.(?P<key>\w+))?")
 _EXAMPLES = "write it like material.elastic_modulus, notch[2].depth or notch[*].depth"
 
+# More digits than the number of any notch has.
+_DIGITS = 9
+
 
 class Changed(NamedTuple):
     """A robot with new values, and the keys that a change of kind dropped."""
@@ -129,6 +132,8 @@ def _parse(path: str) -> _Target:
         raise InputError(f"`{path}` names no single value; {_EXAMPLES}.")
     if index is not None and section not in ("notch", "tendon"):
         raise InputError(f"`{path}` has a number, but there is one {section}: `{section}.{key}`.")
+    if index is not None and len(index) > _DIGITS:
+        raise InputError(f"there is no {section} of that number; {_EXAMPLES}.")
     return _Target(path, section, None if index in (None, "*") else int(index), key)
 
 

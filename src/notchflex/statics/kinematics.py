@@ -40,7 +40,7 @@ def bodies_from_angles(
     Example:
         >>> from notchflex import load_robot
         >>> position, _ = bodies_from_angles(load_robot("pacheco2021-a"), np.zeros((1, 5)))
-        >>> position[0, :, 2].tolist()
+        >>> position[0, :, 2].round(9).tolist()
         [0.0, 0.8, 2.8, 4.8, 6.8, 8.8]
     """
     angles = np.atleast_2d(np.asarray(notch_angle, float))

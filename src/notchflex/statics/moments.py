@@ -19,6 +19,9 @@ from notchflex.statics.element import Unknowns
 from notchflex.statics.walk import Evaluation
 from notchflex.tendon.wall_arc import WallArc
 
+# Moments below this part of the stiffest mode's stiffness (per rad).
+_NOTHING = 1e-12
+
 
 def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, ""]:
     """Largest imbalance of bending moment at any node, over the largest moment."""
@@ -31,7 +34,9 @@ def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Arra
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
     error = jnp.max(jnp.abs(internal - required[..., bending]) * counts * carried)
     largest = jnp.max(jnp.abs(required[..., bending]) * counts)
-    return jnp.where(largest > 0.0, error / jnp.where(largest > 0.0, largest, 1.0), 0.0)
+    # Moments that bend nothing are rounding.
+    counts = largest > _NOTHING * jnp.max(chain.stiffness)
+    return jnp.where(counts, error / jnp.where(counts, largest, 1.0), 0.0)
 
 
 def _required(

@@ -29,6 +29,8 @@ class ConvergenceError(RuntimeError):
 # A stroke is followed up to the last good state before the last notch closes, which leaves it
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
+# A state whose moments are off by this part of the largest is none.
+_MODES_FAIL = 0.5
 # Log ratios this close to their bound are on it.
 _NEAR_BOUND = 1e-9
 
@@ -308,9 +310,10 @@ class Path:
 
     @property
     def converged(self) -> np.ndarray:
-        """Whether a step was solved, and within what its friction law holds for, (s,)."""
+        """Whether a step was solved, within what friction law and strain modes hold for, (s,)."""
         solved = np.asarray(self.run.converged)
-        return solved & (self._of("friction_holds") | ~solved)
+        holds = self._of("friction_holds") & (self.moment_error < _MODES_FAIL)
+        return solved & (holds | ~solved)
 
     @property
     def residual(self) -> np.ndarray:
@@ -334,6 +337,12 @@ class Path:
             failed = int(np.argmin(self.converged))
             return f"not tried, because step {failed + 1} of the path did not converge"
         state = self.run.quantities
+        if self.run.converged[step] and self._of("friction_holds")[step]:
+            return (
+                "the strain modes miss the moment of the loads by "
+                f"{100 * self.moment_error[step]:.0f} % of the largest: the robot is bent beyond "
+                "what this model is for; take smaller loads, or a refinement of 1, 2 or 3"
+            )
         if self.run.converged[step]:
             return (
                 "a tendon turns so sharply at an edge that its friction would hold any pull "
