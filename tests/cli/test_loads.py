@@ -79,3 +79,8 @@ def test_bad_body_forces_are_told(text):
 def test_bad_loads_are_told(options, words):
     with pytest.raises(InputError, match=words):
         parse_loads(**options)
+
+
+def test_a_body_of_thousands_of_digits_is_told():
+    with pytest.raises(InputError, match="--body-force"):
+        parse_body_force(f"{'9' * 5000}:0,1,0")

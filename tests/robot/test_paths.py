@@ -5,6 +5,7 @@ import itertools
 import pytest
 
 import notchflex as nf
+from notchflex.errors import InputError
 from notchflex.robot import parse_assignment, set_values
 
 
@@ -151,3 +152,8 @@ def test_assignments(text: str, value: object):
 def test_no_assignment(text: str):
     with pytest.raises(nf.InputError, match="sets nothing"):
         parse_assignment(text)
+
+
+def test_a_number_of_thousands_of_digits_is_told():
+    with pytest.raises(InputError, match="no notch of that number"):
+        nf.load_robot("pacheco2021-a").with_value(f"notch[{'9' * 5000}].depth", 1.0)

@@ -111,3 +111,11 @@ def test_both_tendons_pulled_at_once() -> None:
     assert path.total_angle[-1] < 0.0
     # The left tendon runs through 14 pieces, the right one through 14 as well.
     assert (~np.isnan(path.span_tension[0])).sum(axis=-1).tolist() == [28, 28]
+
+
+def test_what_the_modes_cannot_follow_is_no_result() -> None:
+    """A load a thousand times too large finds a balance of the few modes, but no shape."""
+    state = nf.solve(nf.load_robot("pacheco2021-a"), nf.Load(tip_force=(1000.0, 0.0, 0.0)))
+    assert not state.converged
+    assert state.reason
+    assert np.isfinite(state.tip_position).all()

@@ -165,7 +165,8 @@ def _arrow(axes: Axes, start: Any, end: Any, colour: str, zorder: int, bend: flo
 def load_label(path: Path, step: int) -> str:
     """Return what tells a step apart in a legend: its tensions and its total angle."""
     tensions = ", ".join(f"{value:.3g}" for value in path.tension[step])
-    return f"{tensions} N, {np.degrees(path.total_angle[step]):.1f}°"
+    angle = round(float(np.degrees(path.total_angle[step])), 1) + 0.0  # no minus before a zero
+    return f"{tensions} N, {angle:.1f}°"
 
 
 def _draw(axes: Axes, shape: Outline, colour: tuple[float, ...], label: str, level: int) -> None:
