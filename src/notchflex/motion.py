@@ -49,6 +49,10 @@ class Motion(NamedTuple):
         """Inner coordinates of a point of the outer frame (mm)."""
         return (outside - self.translation) @ self.rotation
 
+    def points_inside(self, outside: Float[Array, "k 3"]) -> Float[Array, "k 3"]:
+        """Inner coordinates of several points of the outer frame (mm)."""
+        return (outside - self.translation[None]) @ self.rotation
+
     def wrench(self, inside: Float[Array, " 6"]) -> Float[Array, " 6"]:
         """A wrench (moment, force) about the inner origin, about and along the outer frame."""
         force = self.rotation @ inside[3:]
@@ -120,6 +124,12 @@ def bracket(first: Float[Array, " 6"], second: Float[Array, " 6"]) -> Float[Arra
     other_turn, other_move = second[:3], second[3:]
     moved = cross(turn, other_move) - cross(other_turn, move)
     return array_module(first, second).concatenate([cross(turn, other_turn), moved])
+
+
+def wrenches_at(points: Float[Array, "k 3"], forces: Float[Array, "k 3"]) -> Float[Array, "k 6"]:
+    """Forces at points as wrenches (moment, force) about the origin."""
+    xp = array_module(points, forces)
+    return xp.concatenate([xp.cross(points, forces), forces], axis=-1)
 
 
 def adjoint(motion: Motion) -> Float[Array, "6 6"]:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._jax import constant, jax, jnp
-from notchflex.chain.mass import body_masses
+from notchflex.chain.mass import body_lengths, body_masses
 from notchflex.contact import LipGroup, lay_lips
 from notchflex.flexure import (
     FlexureState,
@@ -143,13 +143,7 @@ def assemble(
         for notch in dict.fromkeys(notches)
     }
     rods = stack([unlike[notch] for notch in notches])
-    following = [*notches[1:], None]
-    body_length = constant(
-        [
-            robot.tube.base_length,
-            *(one.spacing(behind) for one, behind in zip(notches, following, strict=True)),
-        ]
-    )
+    body_length = constant(body_lengths(robot))
     lead = body_length[:-1, None] * _UP
     rods = eqx.tree_at(lambda rods: rods.start_offset, rods, rods.start_offset + lead)
     body_mass, body_centre = body_masses(robot, rods)

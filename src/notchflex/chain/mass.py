@@ -12,6 +12,14 @@ from notchflex.robot import Robot
 _GRAMS = 1e-6
 
 
+def body_lengths(robot: Robot) -> Float[np.ndarray, " bodies"]:
+    """Length of each rigid piece on the tube axis, base first, mm."""
+    notches = robot.notches
+    following = (*notches[1:], None)
+    behind = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
+    return np.array([robot.tube.base_length, *behind])
+
+
 def body_masses(
     robot: Robot, rods: Rod
 ) -> tuple[Float[np.ndarray, " bodies"], Float[np.ndarray, "bodies 3"]]:
@@ -36,13 +44,7 @@ def body_masses(
     density = robot.material.density
     if density is None:
         return np.zeros(len(centre)), centre
-    following = (*notches[1:], None)
-    length = np.array(
-        [
-            robot.tube.base_length,
-            *(notch.spacing(behind) for notch, behind in zip(notches, following, strict=True)),
-        ]
-    )
+    length = body_lengths(robot)
     wall = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2)
     piece = wall * length
     half = 0.5 * np.sum(np.asarray(rods.section.area) * np.asarray(rods.length), axis=-1)

@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 from notchflex._jax import jnp
 from notchflex.contact.lip import LipGroup, Touch
 from notchflex.flexure import FlexureState, Rod
+from notchflex.motion import wrenches_at
 
 
 class Face(NamedTuple):
@@ -62,12 +63,12 @@ class Edges(LipGroup):
         del rod
         pose = flexure.pose
         assert pose is not None  # acts_on_bodies asks for it
-        point = (carried.point - pose.translation[None]) @ pose.rotation
+        point = pose.points_inside(carried.point)
         normal = carried.normal @ pose.rotation
         along = jnp.broadcast_to(_ALONG, self.leaves.shape)
         visits = self.visits[:, None]
         pressed = (force * self.closes)[:, None] * normal
-        on_edge = jnp.concatenate([jnp.cross(self.enters, pressed), pressed], axis=-1)
+        on_edge = wrenches_at(self.enters, pressed)
         # Where a piece ends here, what comes back from beyond acts on it.
         wrench = jnp.sum(on_edge + visits * reaction, axis=0)
         back = jnp.where(visits > 0.0, -on_edge, reaction)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -29,6 +29,12 @@ class Command(NamedTuple):
     value: Float[Array, " t"]
     by_stroke: Bool[Array, " t"]
     applied: Applied | None
+
+
+def tensions_alone(value: Float[np.ndarray, "s t"]) -> Command:
+    """Tensions of every tendon (N), loads as leading axis, and nothing else."""
+    by_stroke = cast("Array", np.zeros(value.shape, bool))
+    return Command(constant(value), by_stroke, None)
 
 
 def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Beyond) -> Float[Array, " t"]:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from scipy.optimize import elementwise
 
-from notchflex._jax import constant
 from notchflex.chain import Chain, assemble
 from notchflex.contact import closing_travel, free_angle
 from notchflex.robot import Robot
-from notchflex.statics.actuation import Command
+from notchflex.statics.actuation import tensions_alone
 from notchflex.statics.edge_closing import edge_closing
 from notchflex.statics.newton import Settings
 from notchflex.statics.run import lips
@@ -120,9 +118,7 @@ def _tensions(
         rows = np.arange(chain.flexures)
         value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[which]] = np.resize(tension, chain.flexures)
-        by_stroke = np.zeros(value.shape, bool)
-        commands = Command(constant(value), cast("Array", by_stroke), None)
-        force, gap, converged = lips(chain, commands, rest, Settings())
+        force, gap, converged = lips(chain, tensions_alone(value), rest, Settings())
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
         return np.where(converged, overlap, np.nan)[: len(notch)]
 

@@ -6,14 +6,11 @@ tension is found by false position on the solver itself.
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from notchflex._jax import constant
 from notchflex.chain import Chain
-from notchflex.statics.actuation import Command
+from notchflex.statics.actuation import tensions_alone
 from notchflex.statics.newton import Settings
 from notchflex.statics.run import run
 from notchflex.statics.stepping import at_rest
@@ -46,7 +43,8 @@ def edge_closing(
 def _by_one_tendon(
     chain: Chain, tendon: int, own: np.ndarray
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
-    free, _ = _pull(chain, tendon, np.zeros(1))
+    # Two steps where one would do: one alone is another program to compile.
+    free, _ = _pull(chain, tendon, np.zeros(2))
     reach = -free[0, own]  # the gap at rest: an edge so far from closing
     # Tendon and edges are about as far from the axis.
     linear = np.asarray(chain.lip_stiffness)[own] * reach
@@ -77,8 +75,7 @@ def _pull(
     """Overlap of every notch's edges (contact force / stiffness - gap, mm) and its angle (rad)."""
     value = np.zeros((len(tensions), chain.tendons))
     value[:, tendon] = tensions
-    commands = Command(constant(value), cast("Array", np.zeros(value.shape, bool)), None)
-    came = run(chain, commands, at_rest(chain), Settings(), each_from_start=False)
+    came = run(chain, tensions_alone(value), at_rest(chain), Settings(), each_from_start=False)
     state = came.quantities
     overlap = np.asarray(state.contact_force) / np.asarray(chain.lip_stiffness) - state.gap
     good = np.asarray(came.converged)[:, None]

@@ -162,11 +162,13 @@ def newton(
                 jnp.any(command.by_stroke) & (best.iterations < _PLAYED) & (largest > _PLAYED_ABOVE)
             )
             limits = memory._replace(bound=at.result.bound)
-            put = _contacts_put(chain, command, limits, before, point, step, whole)
-            step = jax.tree.map(
-                lambda own, other: jnp.where(early, other / by_turn, own), step, put
-            )
-            return Point(step.unknowns, step.base_tension), jnp.where(early, by_turn, whole)
+
+            def contacts_put() -> Step:
+                return _contacts_put(chain, command, limits, before, point, step, whole, by_turn)
+
+            chosen = jax.lax.cond(early, contacts_put, lambda: step)
+            part = jnp.where(early, by_turn, whole)
+            return Point(chosen.unknowns, chosen.base_tension), part
 
         step, part = jax.lax.cond(taken & ~solved, again, lambda: (search.step, 0.5 * search.part))
         return _Search(
@@ -205,29 +207,28 @@ def _contacts_put(
     before: Float[Array, " t"],
     point: Point,
     step: Step,
+    whole: Float[Array, ""],
     part: Float[Array, ""],
 ) -> Step:
     """A step whose contacts go where their tension would leave them, not where a linear step does.
 
     It serves while the tensions of tendons drawn by stroke are still to be found, and concerns only
     these. Stuck contacts, which make a tendon very stiff, must not throw its tension about: it
-    stays moderate.
+    stays moderate. Of the step that is returned `part` is to be taken, of the linear one it would
+    have been `whole`.
     """
     closing_force = jnp.mean(chain.lip_stiffness * jnp.sum(chain.rods.length, axis=-1))
-    tension = point.base_tension + part * step.base_tension
+    tension = point.base_tension + whole * step.base_tension
     moderate = jnp.clip(tension, 0.5 * point.base_tension, 2.0 * point.base_tension + closing_force)
     tension = jnp.where(command.by_stroke, moderate, tension)
     put = played(chain, before, tension, memory)
-    by_turn = jnp.minimum(1.0, _LARGEST_TURN / jnp.max(jnp.abs(step.unknowns.modes)))
     logs = []
     for group, there, here, own in zip(
         chain.groups, put, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True
     ):
         sought = command.by_stroke[jnp.array(group.numbers)][None, :, None]
-        logs.append(jnp.where(sought, there - here, part * own))
-    unknowns = Unknowns(
-        modes=by_turn * step.unknowns.modes,
-        lip_force=tuple(by_turn * force for force in step.unknowns.lip_force),
-        log_ratio=tuple(logs),
+        logs.append(jnp.where(sought, there - here, whole * own) / part)
+    return Step(
+        step.unknowns._replace(log_ratio=tuple(logs)),
+        (tension - point.base_tension) / part,
     )
-    return Step(unknowns, tension - point.base_tension)

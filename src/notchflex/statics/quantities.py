@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
 from notchflex.flexure import FlexureState, relative_pose
-from notchflex.motion import Motion, identity
+from notchflex.motion import Motion, identity, wrenches_at
 from notchflex.statics.applied import Applied, body_wrench
 from notchflex.statics.element import Unknowns, at_bound
 from notchflex.statics.moments import moment_error
@@ -60,7 +60,10 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
     point = solved.point
     at = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
     flexure, crossings = at.flexure, at.result.crossings
-    bodies = body_poses(jax.vmap(relative_pose)(chain.rods, point.unknowns.modes))
+    relative = flexure.pose  # None where the balance did not ask for it
+    if relative is None:
+        relative = jax.vmap(relative_pose)(chain.rods, point.unknowns.modes)
+    bodies = body_poses(relative)
     last = jax.tree.map(lambda leaf: leaf[-1], bodies)
     gap_tension, body_tension = _edges(chain, crossings, "gap_tension", "body_tension")
     visited = per_tendon(chain, tuple(group.visits for group in chain.groups)) > 0.0
@@ -149,9 +152,9 @@ def base_wrench(
     if applied is not None:
         on_base = jax.tree.map(lambda leaf: leaf[0], applied)
         acting = acting + body_wrench(jnp.eye(3), on_base)
+    # What the drives pull on the tendons with.
     pulled = base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
-    drives = jnp.concatenate([jnp.cross(chain.tendon_place, pulled), pulled], axis=-1)
-    return -acting - jnp.sum(drives, axis=0)
+    return -acting - jnp.sum(wrenches_at(chain.tendon_place, pulled), axis=0)
 
 
 def notch_angles(bodies: Motion, chain: Chain) -> Float[Array, " n"]:

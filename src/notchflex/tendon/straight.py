@@ -18,6 +18,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jnp
 from notchflex.flexure import FlexureState, Rod
+from notchflex.motion import wrenches_at
 from notchflex.tendon.crossing import Crossing, TendonGroup, fall, guarded_norm
 
 
@@ -80,7 +81,7 @@ class Straight(TendonGroup):
         del rod
         pose = flexure.pose
         assert pose is not None  # acts_on_bodies asks for it
-        point = (carried.point - pose.translation[None]) @ pose.rotation
+        point = pose.points_inside(carried.point)
         direction = carried.direction @ pose.rotation
         span = self.entry - point
         length = guarded_norm(span)
@@ -89,7 +90,7 @@ class Straight(TendonGroup):
         body_tension = self.visits * fall(gap_tension, log_ratios[:, 1])
         pulled = {"gap": along, "dead": direction, "follower": self.channel}[self.pulls]
         force = -gap_tension[:, None] * pulled
-        on_entry = jnp.concatenate([jnp.cross(self.entry, force), force], axis=-1)
+        on_entry = wrenches_at(self.entry, force)
         visited = self.visits[:, None] > 0.0
         going_on = self.visits == 0.0
         back = jnp.where(visited, -on_entry, reaction)
