@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from notchflex import load_robot
-from notchflex.chain import prepared
+from notchflex.chain import assemble
 from notchflex.statics.external import NOTHING
 
 CENTROID = 0.6865  # mm, of the section of wrist A
@@ -40,7 +40,7 @@ class FakePath:
     @property
     def chain(self) -> Any:
         """The real chain: pictures and tables take the bodies and contacts from it."""
-        return prepared(self.robot)
+        return assemble(self.robot)
 
     @property
     def run(self) -> Any:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import notchflex as nf
-from notchflex.chain import prepared
 from notchflex.statics.load import load_path
 from notchflex.statics.newton import Settings
 from notchflex.statics.path import Path, command
+from notchflex.statics.prepare import prepared
 from notchflex.statics.run import run
-from notchflex.statics.state import fitted
 
 
 def simulate_at(robot: nf.Robot, loads, level: str, *, loaded: bool = False) -> Path:
     """`nf.simulate` with modes for "tendons" alone, loads in the "plane", or "space"."""
     load = load_path(loads, robot.number_of_tendons)
-    chain = prepared(robot, level, loaded=loaded)
-    commands = command(load, robot, chain)
-    came = run(chain, commands, fitted(None, chain), Settings(), each_from_start=False)
-    return Path(robot, load, chain, came)
+    ready = prepared(robot, level, loaded=loaded)
+    commands = command(load, robot, ready.chain)
+    came = run(ready, commands, ready.rest, Settings(), each_from_start=False)
+    return Path(robot, load, ready, came)

@@ -36,6 +36,7 @@ _HOME = {
     **dict.fromkeys(("Elastica", "elastica", "modulus_from_single_notch"), "notchflex.flexure"),
     **dict.fromkeys(
         (
+            "Batch",
             "BodyForce",
             "Closing",
             "ConvergenceError",
@@ -52,7 +53,9 @@ _HOME = {
             "equal_stroke",
             "pull",
             "simulate",
+            "simulate_batch",
             "solve",
+            "solve_batch",
             "solve_each",
             "tip_from_angles",
         ),

@@ -21,6 +21,7 @@ from notchflex.robot import save_robot as save_robot
 from notchflex.section import Section as Section
 from notchflex.section import annular_sector as annular_sector
 from notchflex.section import annular_segment as annular_segment
+from notchflex.statics import Batch as Batch
 from notchflex.statics import BodyForce as BodyForce
 from notchflex.statics import Closing as Closing
 from notchflex.statics import ConvergenceError as ConvergenceError
@@ -37,7 +38,9 @@ from notchflex.statics import draw as draw
 from notchflex.statics import equal_stroke as equal_stroke
 from notchflex.statics import pull as pull
 from notchflex.statics import simulate as simulate
+from notchflex.statics import simulate_batch as simulate_batch
 from notchflex.statics import solve as solve
+from notchflex.statics import solve_batch as solve_batch
 from notchflex.statics import solve_each as solve_each
 from notchflex.statics import tip_from_angles as tip_from_angles
 

@@ -16,9 +16,12 @@ jax.config.update("jax_enable_x64", True)
 
 import jax.numpy as jnp  # noqa: E402
 
-# The chain is many small steps one after the other. XLA's newer fusion on the CPU compiles them
-# in 7 s rather than 4 s (jax 0.10.1); later versions have no other.
-_OPTIONS = {"xla_cpu_use_fusion_emitters": False} if jax.__version_info__ < (0, 11) else None
+# The chain is many small steps one after the other, each far too small for several threads. XLA's
+# newer fusion on the CPU compiles them in 7 s rather than 4 s (jax 0.10.1); later versions have no
+# other.
+_OPTIONS = {"xla_cpu_multi_thread_eigen": False}
+if jax.__version_info__ < (0, 11):
+    _OPTIONS["xla_cpu_use_fusion_emitters"] = False
 jit = partial(jax.jit, compiler_options=_OPTIONS)
 
 

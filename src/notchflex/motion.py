@@ -1,38 +1,41 @@
-"""Rigid motions of space: the exponential of a twist, products, and wrenches carried along.
+"""Rigid motions of space or of a plane: exponential of a twist, products, wrenches carried along.
 
 A motion is a `Motion(rotation, translation)`: it takes coordinates of the inner frame to the
-outer one, `outer = rotation @ inner + translation`. A twist is (angular 3, linear 3), a wrench
-(moment 3, force 3), so that their dot product is a power.
+outer one, `outer = rotation @ inner + translation`. A twist is (angular, linear), a wrench
+(moment, force), so that their dot product is a power.
+
+Everything is written once for both groups; the shapes tell which it is. Space has three angular and
+three linear components. The plane is that of x and z, its angular component is about y: twists and
+wrenches have three numbers, `PLANE` of the six of space, and points two, `IN_PLANE` of three. A
+"rotation" of the plane may also mirror x, as a frame does that is turned by half a turn about z.
 """
 
 from __future__ import annotations
 
 from math import factorial
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, constant
+from notchflex._jax import array_module, constant, jnp
+
+PLANE, IN_PLANE = np.array([1, 3, 5]), np.array([0, 2])
 
 # Coefficients of sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 as polynomials in a^2, used for
-# angles up to two radians: with sixteen terms the first one left out is below 1e-27 there. The
+# angles up to one radian: with eleven terms the first one left out is below 1e-22 there. The
 # closed forms, used above, would lose digits near zero, and have no derivative at it.
-_SERIES_BELOW = 4.0  # of the squared angle
-_TERMS = 16
-_SERIES = np.array(
-    [[(-1.0) ** k / factorial(2 * k + start) for k in range(_TERMS)] for start in (1, 2, 3)]
-)
-_CROSS = np.zeros((3, 3, 3))
-for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-    _CROSS[_i, _k, _j], _CROSS[_k, _i, _j] = 1.0, -1.0
+_SERIES_BELOW = 1.0  # of the squared angle
+_TERMS = 11
+_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(_TERMS)] for start in (1, 2, 3)]
+_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
 class Motion(NamedTuple):
     """A rigid motion, from an inner frame to the outer one (translation in mm)."""
 
-    rotation: Float[Array, "... 3 3"]
-    translation: Float[Array, "... 3"]
+    rotation: Float[Array, "... d d"]
+    translation: Float[Array, "... d"]
 
     def then(self, inner: Motion) -> Motion:
         """Product: this motion, and inside its frame another."""
@@ -41,53 +44,91 @@ class Motion(NamedTuple):
             self.rotation @ inner.translation + self.translation,
         )
 
-    def point(self, inside: Float[Array, " 3"]) -> Float[Array, " 3"]:
+    def point(self, inside: Float[Array, " d"]) -> Float[Array, " d"]:
         """Outer coordinates of a point of the inner frame (mm)."""
         return self.rotation @ inside + self.translation
 
-    def point_inside(self, outside: Float[Array, " 3"]) -> Float[Array, " 3"]:
+    def point_inside(self, outside: Float[Array, " d"]) -> Float[Array, " d"]:
         """Inner coordinates of a point of the outer frame (mm)."""
         return (outside - self.translation) @ self.rotation
 
-    def points_inside(self, outside: Float[Array, "k 3"]) -> Float[Array, "k 3"]:
-        """Inner coordinates of several points of the outer frame (mm)."""
-        return (outside - self.translation[None]) @ self.rotation
-
-    def wrench(self, inside: Float[Array, " 6"]) -> Float[Array, " 6"]:
+    def wrench(self, inside: Float[Array, " w"]) -> Float[Array, " w"]:
         """A wrench (moment, force) about the inner origin, about and along the outer frame."""
-        force = self.rotation @ inside[3:]
-        moment = self.rotation @ inside[:3] + skew(self.translation) @ force
-        return array_module(inside).concatenate([moment, force])
+        axes = angular(inside)
+        force = self.rotation @ inside[axes:]
+        moment = turned(self.rotation, inside[:axes]) + moment_of(self.translation, force)
+        return array_module(inside, force).concatenate([moment, force])
 
-    def wrenches(self, inside: Float[Array, "k 6"]) -> Float[Array, "k 6"]:
-        """Several wrenches about the inner origin, about and along the outer frame."""
-        xp = array_module(inside)
-        force = inside[:, 3:] @ self.rotation.T
-        moment = inside[:, :3] @ self.rotation.T + force @ skew(self.translation).T
-        return xp.concatenate([moment, force], axis=-1)
+    def wrench_inside(self, outside: Float[Array, " w"]) -> Float[Array, " w"]:
+        """A wrench about the outer origin, about the inner origin and along the inner frame."""
+        axes = angular(outside)
+        force = outside[axes:]
+        moment = outside[:axes] - moment_of(self.translation, force)
+        inside = turned(self.rotation.T, moment)
+        return array_module(outside, inside).concatenate([inside, force @ self.rotation])
+
+    def twist_inside(self, outside: Float[Array, " w"]) -> Float[Array, " w"]:
+        """A twist at the outer origin, at and along the inner frame."""
+        axes = angular(outside)
+        moved = outside[axes:] + cross(outside[:axes], self.translation)
+        turn = turned(self.rotation.T, outside[:axes])
+        return array_module(outside, moved).concatenate([turn, moved @ self.rotation])
 
 
-def identity() -> Motion:
-    """The motion that moves nothing."""
-    return Motion(constant(np.eye(3)), constant(np.zeros(3)))
+def angular(twist: Float[Array, " w"]) -> int:
+    """Number of angular components of a twist or wrench: 3 in space, 1 in the plane."""
+    return 3 if twist.shape[0] == 6 else 1
 
 
-def skew(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:
-    """Matrix of the cross product: `skew(a) @ b = a x b`."""
+def identity(dimensions: int = 3) -> Motion:
+    """The motion of space, or of the plane, that moves nothing."""
+    return Motion(constant(np.eye(dimensions)), constant(np.zeros(dimensions)))
+
+
+def turned(rotation: Float[Array, "d d"], axis: Float[Array, " a"]) -> Float[Array, " a"]:
+    """An angular vector along the outer frame; in the plane a mirror changes its sign."""
+    if axis.shape[0] == 3:
+        return rotation @ axis
+    return (rotation[0, 0] * rotation[1, 1] - rotation[0, 1] * rotation[1, 0]) * axis
+
+
+def skew(vector: Float[Array, " a"]) -> Float[Array, "d d"]:
+    """Matrix of the cross product with an angular vector: `skew(a) @ b = a x b`."""
     xp = array_module(vector)
+    if vector.shape[0] == 1:
+        return vector[0] * _TURN
     x, y, z, nothing = vector[0], vector[1], vector[2], xp.zeros_like(vector[0])
     return xp.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing]).reshape(3, 3)
 
 
-def cross(first: Float[Array, " 3"], second: Float[Array, " 3"]) -> Float[Array, " 3"]:
-    """Cross product, written out: it is compiled and run faster so than as a matrix."""
+def cross(first: Float[Array, " a"], second: Float[Array, " d"]) -> Float[Array, " d"]:
+    """Cross product of an angular vector and a linear one (in space, of any two).
+
+    Written out: it is compiled and run faster so than as a matrix.
+    """
+    xp = array_module(first, second)
+    if first.shape[0] == 1:
+        return xp.stack([first[0] * second[1], -first[0] * second[0]])
     (a, b, c), (x, y, z) = first, second
-    return array_module(first, second).stack([b * z - c * y, c * x - a * z, a * y - b * x])
+    return xp.stack([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
-def unskew(matrix: Float[Array, "3 3"]) -> Float[Array, " 3"]:
+def moment_of(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " a"]:
+    """Moment about the origin of a force at a point, or of any two linear vectors."""
+    if point.shape[0] == 3:
+        return cross(point, force)
+    xp = array_module(point, force)
+    return xp.stack([point[1] * force[0] - point[0] * force[1]])
+
+
+def unskew(matrix: Float[Array, "d d"]) -> Float[Array, " a"]:
     """Vector of the skew part of a matrix, the inverse of `skew`."""
-    return 0.5 * array_module(matrix).tensordot(matrix, _CROSS, 2)
+    xp = array_module(matrix)
+    if matrix.shape[0] == 2:
+        return 0.5 * xp.stack([matrix[0, 1] - matrix[1, 0]])
+    return 0.5 * xp.stack(
+        [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]]
+    )
 
 
 def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
@@ -95,51 +136,116 @@ def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
     xp = array_module(squared)
     small = squared < _SERIES_BELOW
     near = xp.where(small, squared, 0.0)
-    square = near * near
-    low = xp.stack([xp.ones_like(near), near, square, near * square])
-    fourth = square * square
-    eighth = fourth * fourth
-    high = xp.stack([xp.ones_like(near), fourth, eighth, fourth * eighth])
-    series = _SERIES @ (high[:, None] * low[None]).ravel()
     angle = xp.sqrt(xp.where(small, _SERIES_BELOW, squared))
-    sine, versine = xp.sin(angle), 2.0 * xp.sin(0.5 * angle) ** 2
-    far = (sine / angle, versine / angle**2, (angle - sine) / angle**3)
-    first, second, third = (xp.where(small, series[i], far[i]) for i in range(3))
+    sine, cosine = sine_cosine(angle)
+    far = (sine / angle, (1.0 - cosine) / angle**2, (angle - sine) / angle**3)
+    first, second, third = (
+        xp.where(small, _polynomial(series, near), closed)
+        for series, closed in zip(_SERIES, far, strict=True)
+    )
     return first, second, third
 
 
-def exponential(twist: Float[Array, " 6"]) -> Motion:
+def _polynomial(coefficients: list[float], at: Float[Array, ""]) -> Float[Array, ""]:
+    value = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        value = value * at + coefficient
+    return cast("Array", value)
+
+
+def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
+    """Sine and cosine, right to rounding.
+
+    Compiled, those of the C library are taken number by number: this is several times as fast. The
+    angle is brought to within half a turn, a quarter of it put into the series, and doubled twice.
+    """
+    if array_module(angle) is np:
+        return cast("tuple[Array, Array]", (np.sin(angle), np.cos(angle)))
+    quarter = 0.25 * (angle - _WHOLE_TURN * jnp.round(angle / _WHOLE_TURN))
+    squared = quarter * quarter
+    sine, versine = quarter * _polynomial(_SINE, squared), squared * _polynomial(_VERSINE, squared)
+    cosine = 1.0 - versine
+    sine, cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+    return 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+
+
+_WHOLE_TURN = 2.0 * np.pi
+_SINE = [(-1.0) ** k / factorial(2 * k + 1) for k in range(9)]
+_VERSINE = [(-1.0) ** k / factorial(2 * k + 2) for k in range(9)]
+
+
+def exponential(twist: Float[Array, " w"]) -> Motion:
     """Motion reached by following a constant twist (angular, linear) for one unit of length."""
-    angular, linear = twist[:3], twist[3:]
-    first, second, third = _coefficients(angular @ angular)
-    cross = skew(angular)
-    cross_twice = cross @ cross
-    rotation = constant(np.eye(3)) + first * cross + second * cross_twice
-    return Motion(rotation, linear + second * (cross @ linear) + third * (cross_twice @ linear))
+    xp = array_module(twist)
+    axes = angular(twist)
+    turn, linear = twist[:axes], twist[axes:]
+    first, second, third = _coefficients(turn @ turn)
+    if axes == 1:
+        sine, versine = first * turn[0], second * turn[0] * turn[0]
+        rotation = xp.stack([1.0 - versine, sine, -sine, 1.0 - versine]).reshape(2, 2)
+        return Motion(rotation, first * linear + second * cross(turn, linear))
+    matrix = skew(turn)
+    twice = matrix @ matrix
+    rotation = constant(np.eye(3)) + first * matrix + second * twice
+    return Motion(rotation, linear + second * (matrix @ linear) + third * (twice @ linear))
 
 
-def bracket(first: Float[Array, " 6"], second: Float[Array, " 6"]) -> Float[Array, " 6"]:
+def bracket(first: Float[Array, " w"], second: Float[Array, " w"]) -> Float[Array, " w"]:
     """Lie bracket of two twists: how far following one and then the other depends on the order."""
-    turn, move = first[:3], first[3:]
-    other_turn, other_move = second[:3], second[3:]
+    xp = array_module(first, second)
+    axes = angular(first)
+    turn, move = first[:axes], first[axes:]
+    other_turn, other_move = second[:axes], second[axes:]
     moved = cross(turn, other_move) - cross(other_turn, move)
-    return array_module(first, second).concatenate([cross(turn, other_turn), moved])
+    both = cross(turn, other_turn) if axes == 3 else xp.zeros_like(turn)
+    return xp.concatenate([both, moved])
 
 
-def wrenches_at(points: Float[Array, "k 3"], forces: Float[Array, "k 3"]) -> Float[Array, "k 6"]:
-    """Forces at points as wrenches (moment, force) about the origin."""
-    xp = array_module(points, forces)
-    return xp.concatenate([xp.cross(points, forces), forces], axis=-1)
+def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " w"]:
+    """A force at a point as a wrench (moment, force) about the origin."""
+    return array_module(point, force).concatenate([moment_of(point, force), force])
 
 
-def adjoint(motion: Motion) -> Float[Array, "6 6"]:
+def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
+    """How a wrench that goes along with a frame changes, per unit of the frame's own twist.
+
+    With moment m and force f, a twist (omega, v) changes it by (omega x m + v x f, omega x f).
+    """
+    axes = angular(wrench)
+    units = constant(np.eye(len(wrench)))
+    xp = array_module(wrench)
+    moment, force = wrench[:axes], wrench[axes:]
+    columns = []
+    for unit in units:
+        turn, move = unit[:axes], unit[axes:]
+        about = moment_of(move, force)
+        if axes == 3:
+            about = about + cross(turn, moment)
+        columns.append(xp.concatenate([about, cross(turn, force)]))
+    return xp.stack(columns, axis=1)
+
+
+def adjoint(motion: Motion) -> Float[Array, "w w"]:
     """Matrix that takes a twist of the inner frame to the outer one."""
     xp = array_module(motion.rotation)
+    if motion.rotation.shape[-1] == 2:
+        x, z = motion.translation[0], motion.translation[1]
+        turn = turned(motion.rotation, xp.ones_like(motion.translation[:1]))
+        moved = xp.stack([-z, x])[:, None] * turn
+        top = xp.concatenate([turn, xp.zeros_like(motion.translation)])[None]
+        return xp.concatenate([top, xp.concatenate([moved, motion.rotation], axis=1)])
     moved = skew(motion.translation) @ motion.rotation
     return xp.block([[motion.rotation, xp.zeros((3, 3))], [moved, motion.rotation]])
 
 
-def rotation_about(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:
+def rotation_about(vector: Float[Array, " a"]) -> Float[Array, "d d"]:
     """Rotation matrix of a rotation vector (rad)."""
     xp = array_module(vector)
-    return exponential(xp.concatenate([vector, xp.zeros(3)])).rotation
+    return exponential(xp.concatenate([vector, xp.zeros(3 if len(vector) == 3 else 2)])).rotation
+
+
+def left_slope(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:
+    """How the rotation of a rotation vector turns on, along the outer axes, per change of it."""
+    _, second, third = _coefficients(vector @ vector)
+    matrix = skew(vector)
+    return constant(np.eye(3)) + second * matrix + third * (matrix @ matrix)

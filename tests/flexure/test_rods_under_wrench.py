@@ -102,13 +102,13 @@ def strip_errors(table: np.ndarray, shape: Rod, steps: int) -> np.ndarray:
 def test_strip_converges_with_its_modes(margin):
     table = reference("liu_single_beam.csv")
     worst = []
-    for modes, intervals in ((2, 4), (4, 4), (6, 8), (8, 12), (10, 16)):
-        errors = strip_errors(table, strip_rod(STRIP, LIU, modes, intervals), steps=6)
+    for modes, nodes in ((2, 6), (4, 10), (6, 16), (8, 20), (10, 24)):
+        errors = strip_errors(table, strip_rod(STRIP, LIU, modes, nodes), steps=6)
         told = [
             f"up to F l²/EI = {most:g}: {errors[table[:, 2] <= most].max():.1e}"
             for most in (0.5, 1.0, 2.0, 5.0, 10.0)
         ]
-        margin.note(f"{modes} modes, {intervals} intervals, {', '.join(told)}")
+        margin.note(f"{modes} modes, {nodes} nodes, {', '.join(told)}")
         worst.append(errors.max())
     assert np.all(np.diff(worst) < 0.0)
     margin.within("10 modes, every load", worst[-1], 1e-8)
@@ -188,9 +188,9 @@ def test_link_by_default(side, margin):
 
 
 def test_link_converges_with_its_modes(margin):
-    pose, moment = link_errors("away", lambda notch: u_link_rod(notch, GAO, 4, 2, (2, 2)))
+    pose, moment = link_errors("away", lambda notch: u_link_rod(notch, GAO, 4, 2, (6, 4)))
     margin.note(f"4 moment modes and 2 pairs of force modes: {np.abs(pose).max():.1e} mm, rad")
-    pose, moment = link_errors("away", lambda notch: u_link_rod(notch, GAO, 6, 3, (4, 4)))
+    pose, moment = link_errors("away", lambda notch: u_link_rod(notch, GAO, 6, 3, (12, 8)))
     margin.within("6 + 6 modes, pose", pose, 2e-8, "mm, rad")
     margin.within("6 + 6 modes, moment, relative", moment, 2e-8)
 
@@ -255,7 +255,7 @@ def flexibility(side: str, nodes: int = 60) -> np.ndarray:
 @pytest.mark.parametrize("side", ["away", "toward"])
 def test_link_is_flexible_in_all_directions_as_castigliano_has_it(side, margin):
     # Nodes enough for the modes to show that they are exact; the default ones give 4e-6.
-    shape = u_link_rod(nf.ULink(0.275, 0.70, 2.0, side), GAO, intervals=(5, 3))
+    shape = u_link_rod(nf.ULink(0.275, 0.70, 2.0, side), GAO, nodes=(12, 8))
     stiffness = jax.jacfwd(
         lambda modes: flexure_state(shape, NITINOL, (), modes, with_pose=False).internal
     )(jnp.zeros(9))

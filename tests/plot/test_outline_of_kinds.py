@@ -74,9 +74,9 @@ def test_tendons_go_through_their_true_points(angle):
     line = shape.tendon(0)
     assert len(line) == 2 * (1 + 14)  # the base and the 14 pieces on its side
     group = shape.chain.groups[0]
-    body = 1 + int(np.flatnonzero(np.asarray(group.visits)[:, 0])[3])
-    for point, place in ((line[8], group.entry), (line[9], group.exit)):
-        np.testing.assert_allclose(point, shape.on_body(body, place[body - 1, 0]), atol=1e-12)
+    own, following = np.flatnonzero(np.asarray(group.visits)[:, 0])[3:5]
+    for point, place in ((line[8], group.enters[own, 0]), (line[9], group.leaves[following, 0])):
+        np.testing.assert_allclose(point, shape.on_body(1 + int(own), place), atol=1e-12)
 
 
 def test_a_bent_link_still_ends_at_its_bodies():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fake_path import CLOSING, fake_path
+from notchflex.chain import assemble
 from notchflex.errors import InputError
 from notchflex.plot import path_figure, save
 from notchflex.plot.bent import bent, bent_at
@@ -223,8 +224,9 @@ def test_picture_does_not_turn_with_the_base():
     path = fake_path(3)
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     modes = path.run.solved.point.unknowns.modes[2]
+    chain = assemble(path.robot, path.chain.level, flat=False)
     position, rotation = path.body_position[2] @ turn.T, turn @ path.body_rotation[2]
-    turned = outline(bent(path.robot, path.chain, modes, position, rotation), 0.0)
+    turned = outline(bent(path.robot, chain, modes, position, rotation), 0.0)
     straight = outline_at(path, 2)
     for one, other in zip(turned.bodies, straight.bodies, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-12)

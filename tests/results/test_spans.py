@@ -6,7 +6,7 @@ import pytest
 
 import notchflex as nf
 from fake_path import fake_path
-from notchflex.chain import prepared
+from notchflex.chain import assemble
 from notchflex.results.quantities import QUANTITIES
 from notchflex.results.spans import holds, spans_of
 
@@ -15,13 +15,13 @@ from notchflex.results.spans import holds, spans_of
     ("name", "spans"), [("gao2017", [28]), ("liu2022", [14, 14]), ("two-axis-wrist", [16] * 4)]
 )
 def test_two_spans_for_each_body_that_a_tendon_runs_through(name, spans):
-    path = SimpleNamespace(chain=prepared(nf.load_robot(name)))
+    path = SimpleNamespace(chain=assemble(nf.load_robot(name)))
     assert [spans_of(path, tendon) for tendon in range(len(spans))] == spans
 
 
 def test_a_tendon_that_ends_earlier_has_fewer():
     robot = nf.load_robot("liu2022").with_value("tendon[2].end_body", 3)
-    path = SimpleNamespace(chain=prepared(robot))
+    path = SimpleNamespace(chain=assemble(robot))
     assert [spans_of(path, tendon) for tendon in (0, 1)] == [14, 6]
 
 

@@ -103,7 +103,7 @@ def test_base_turned_upside_down_turns_gravity(margin):
 
 def test_own_weight_is_that_of_the_tube_less_the_cuts(margin):
     robot = ROBOT.with_value("material.density", 6450.0).with_value("tube.base_length", 3.0)
-    mass, centre = body_masses(robot, assemble(robot).rods)
+    mass, centre = body_masses(robot, assemble(robot, flat=False).rods)
     wall = np.pi / 4.0 * (1.62**2 - 1.40**2)
     notch = robot.notches[0]
     left = nf.annular_sector(0.81, 0.70, notch.depth)
@@ -130,7 +130,7 @@ def test_own_weight_is_that_of_the_tube_less_the_cuts(margin):
 
 def test_no_density_no_weight():
     robot = ROBOT.replace(material=nf.Linear(7510.0))
-    mass, _ = body_masses(robot, assemble(robot).rods)
+    mass, _ = body_masses(robot, assemble(robot, flat=False).rods)
     assert not mass.any()
     with pytest.raises(InputError, match=r"give material\.density \(kg/m3\) or a tip_mass \(g\)"):
         sums(nf.Load(gravity=(0.0, 0.0, -9.81)), robot=robot)

@@ -116,11 +116,11 @@ def test_wrists_under_tension_are_stable(wrist: nf.Robot) -> None:
 
 def test_a_new_load_or_robot_of_the_same_shape_compiles_nothing(wrist: nf.Robot) -> None:
     nf.simulate(wrist, nf.pull(0.0, 1.0, steps=5))
-    compiled = run_module._run._cache_size()
+    compiled = run_module._follow._cache_size()
     nf.simulate(wrist, nf.pull(0.0, 2.0, steps=17).release())
     nf.simulate(nf.load_robot("pacheco2021-b-specimen"), nf.draw(0.0, 1.0, steps=40))
     nf.simulate(wrist.with_value("notch[2].depth", 1.3), nf.pull(0.0, 2.0, steps=3))
-    assert run_module._run._cache_size() == compiled
+    assert run_module._follow._cache_size() == compiled
 
 
 def test_huge_and_tiny_loads(wrist: nf.Robot) -> None:
@@ -201,3 +201,22 @@ def test_the_base_stretches_too(wrist: nf.Robot) -> None:
 def test_precurvature_past_closing_is_refused(wrist: nf.Robot) -> None:
     with pytest.raises(nf.InputError, match=r"closes at 30\.63 deg"):
         nf.solve(wrist.with_value("notch.precurvature_deg", 40.0), nf.Load(tension=1.0))
+
+
+def test_modes_that_fill_up_are_no_modes_of_the_robot() -> None:
+    # Arcs have fewer modes than strips; what holds the missing ones has a stiffness of 1.
+    strip = nf.StripNotch(height=3.5, strip_thickness=1.5, depth=6.9)
+    arc = nf.ArcNotch("on-axis", 5.0, 4.0, uncut_length=4.0)
+    robot = nf.load_robot("liu2022").replace(
+        notch=(strip, arc), tendon=(nf.Tendon(4.0, path="straight"),), friction=nf.Frictionless()
+    )
+    path = nf.simulate(robot, nf.Load(tension=0.0))
+    chain = path.chain
+    real = [
+        stiffness[np.ix_(idle == 0.0, idle == 0.0)]
+        for stiffness, idle in zip(chain.elastic, chain.rods.idle, strict=True)
+    ]
+    assert (np.asarray(chain.rods.idle) > 0.0).any()
+    smallest = min(np.linalg.eigvalsh(stiffness).min() for stiffness in real)
+    assert smallest > 2.0
+    assert path.smallest_eigenvalue[0] == pytest.approx(smallest, rel=1e-9)

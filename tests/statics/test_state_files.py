@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.chain import prepared
+from notchflex.chain import assemble
 from notchflex.errors import InputError
 from notchflex.statics.state import State
 from notchflex.statics.stepping import at_rest
@@ -14,7 +14,7 @@ from notchflex.statics.stepping import at_rest
 
 @pytest.fixture(scope="module")
 def chain():
-    return prepared(nf.load_robot("pacheco2021-a"))
+    return assemble(nf.load_robot("pacheco2021-a"))
 
 
 @pytest.fixture
@@ -62,6 +62,6 @@ def test_missing_parts_are_damage(file, key):
 
 def test_another_robot_is_told(file):
     robot = nf.load_robot("pacheco2021-a")
-    two = prepared(robot.replace(tendon=robot.tendon * 2))
+    two = assemble(robot.replace(tendon=robot.tendon * 2))
     with pytest.raises(InputError, match="other notches or tendons"):
         State.load(file).fitted(two)

@@ -1,5 +1,12 @@
 """The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
 
-from notchflex.chain.chain import Chain, assemble, flexure_states, prepared
+from notchflex.chain.chain import Chain, assemble, flexure_states
+from notchflex.chain.plane import bending_normal, tendons_in_plane
 
-__all__ = ["Chain", "assemble", "flexure_states", "prepared"]
+__all__ = [
+    "Chain",
+    "assemble",
+    "bending_normal",
+    "flexure_states",
+    "tendons_in_plane",
+]

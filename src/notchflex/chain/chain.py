@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+import dataclasses
+from functools import partial
 from typing import Any, cast
 
 import equinox as eqx
@@ -11,17 +12,20 @@ from jaxtyping import Array, Float, Int
 
 from notchflex._jax import constant, jax, jnp
 from notchflex.chain.mass import body_lengths, body_masses
+from notchflex.chain.plane import bending_normal, tendons_in_plane
 from notchflex.contact import LipGroup, lay_lips
 from notchflex.flexure import (
     FlexureState,
     Rod,
     fibre_stretch,
+    flattened,
     flexure_state,
     relative_pose,
     rod,
     stack,
     with_level,
 )
+from notchflex.flexure.plane import planar_points
 from notchflex.friction import FrictionLaw, friction_law
 from notchflex.material import SectionLaw, section_law
 from notchflex.motion import Motion, rotation_about
@@ -53,7 +57,11 @@ class Chain(eqx.Module):
         body_mass: Mass of each body, g; 0 where the material has no density.
         body_centre: Its centre, in its frame, mm.
         stiffness: Stiffness of each mode in the free robot, N mm; the scale of residuals.
+        elastic: Stiffness of the modes of each flexure against each other, N mm, where the
+            material is linear; None where the law of the material must be asked.
         lip_stiffness: Stiffness of each notch at its lips in the free robot, N/mm.
+        frame: Rotation from the frame in which flexures, tendons and lips are given to that of the
+            base: x and z span the plane of bending of a flat chain. None in space.
         notch_frame: Rotation from the frame of every notch, turned by its direction, to the tube.
         tendon_place: Where each tendon enters the base, mm.
         contacts: For every tendon, at which edges of which gaps it meets the wall: indices into
@@ -61,6 +69,7 @@ class Chain(eqx.Module):
         level: For which loads the flexures have modes enough.
         loaded: Whether loads other than the tendons' act.
         refinement: How many more modes the flexures have than for usual loads.
+        window: Over how many flexures a span or an opening reaches at most.
     """
 
     rods: Rod
@@ -75,13 +84,16 @@ class Chain(eqx.Module):
     body_mass: Float[Array, " bodies"]
     body_centre: Float[Array, "bodies 3"]
     stiffness: Float[Array, "n modes"]
+    elastic: Float[Array, "n modes modes"] | None
     lip_stiffness: Float[Array, " n"]
+    frame: Float[Array, "3 3"] | None
     notch_frame: Float[Array, "n 3 3"]
     tendon_place: Float[Array, "t 3"]
     contacts: Int[Array, "t edges"]
     level: str = eqx.field(static=True)
     loaded: bool = eqx.field(static=True)
     refinement: int = eqx.field(static=True)
+    window: int = eqx.field(static=True)
 
     @property
     def flexures(self) -> int:
@@ -106,19 +118,13 @@ class Chain(eqx.Module):
         return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS * closing)
 
 
-@lru_cache(maxsize=64)
-def prepared(
-    robot: Robot, level: str = "tendons", *, loaded: bool = False, refinement: int = 0
-) -> Chain:
-    """The chain of a robot, kept where compiled programs take it from without copying.
-
-    The last robots asked for are remembered: a control loop solves the same one again and again.
-    """
-    return jax.device_put(assemble(robot, level, loaded=loaded, refinement=refinement))
-
-
 def assemble(
-    robot: Robot, level: str = "tendons", *, loaded: bool = False, refinement: int = 0
+    robot: Robot,
+    level: str = "tendons",
+    *,
+    loaded: bool = False,
+    refinement: int = 0,
+    flat: bool = True,
 ) -> Chain:
     """Turn the description of a robot into the arrays of its chain.
 
@@ -128,6 +134,7 @@ def assemble(
             More modes of the flexures are kept the more is asked for.
         loaded: Whether loads other than the tendons' act.
         refinement: How many times more modes than the flexures need for usual loads.
+        flat: Whether a robot that stays in a plane, under such loads, is given as one of the plane.
 
     Returns:
         Its chain.
@@ -148,12 +155,13 @@ def assemble(
     rods = eqx.tree_at(lambda rods: rods.start_offset, rods, rods.start_offset + lead)
     body_mass, body_centre = body_masses(robot, rods)
     law = section_law(robot.material)
-    stiffness = _mode_stiffness(rods, law)
+    elastic = _elastic(rods, law)
+    stiffness = np.einsum("nmm->nm", elastic)
     tendons = robot.tendon
     chord = getattr(robot.friction, "turning", None) == "chord"
     ground = Ground(notches, rods, _free_poses(rods), body_length, turns_with_chord=chord)
     laid = route(tendons, ground)
-    return Chain(
+    chain = Chain(
         rods=rods,
         memory=(),
         law=law,
@@ -166,7 +174,9 @@ def assemble(
         body_mass=constant(body_mass),
         body_centre=constant(body_centre),
         stiffness=constant(stiffness),
+        elastic=constant(elastic) if law.is_linear else None,
         lip_stiffness=constant(_lip_stiffness(rods, stiffness, robot.tube.outer_radius)),
+        frame=None,
         notch_frame=constant(
             [rotation_about(_UP * np.radians(notch.direction_deg)) for notch in notches]
         ),
@@ -175,6 +185,30 @@ def assemble(
         level=level,
         loaded=loaded,
         refinement=refinement,
+        window=1,
+    )
+    parts = (*chain.groups, *chain.lips)
+    chain = dataclasses.replace(chain, window=max((int(np.max(p.back)) for p in parts), default=1))
+    normal = bending_normal(robot)
+    if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
+        return chain
+    return _flat(chain, np.stack([np.cross(normal, _UP), normal, _UP], axis=1))
+
+
+def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
+    """A chain of the plane that x and z of a frame span, from one of space that stays in it."""
+
+    def planar(part: Any) -> Any:
+        points = [name for name in ("leaves", "enters", "along", "normal") if hasattr(part, name)]
+        turned = {name: planar_points(getattr(part, name) @ frame) for name in points}
+        return dataclasses.replace(part, **turned)
+
+    return dataclasses.replace(
+        chain,
+        rods=flattened(chain.rods, frame),
+        groups=tuple(planar(group) for group in chain.groups),
+        lips=tuple(planar(group) for group in chain.lips),
+        frame=constant(frame),
     )
 
 
@@ -196,8 +230,8 @@ def _free_poses(rods: Rod) -> Motion:
     return jax.tree.map(lambda *leaves: np.stack(leaves), *poses)
 
 
-def _mode_stiffness(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes"]:
-    """Diagonal of every flexure's stiffness in the free robot; 1 for modes that fill up."""
+def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
+    """Stiffness of every flexure in the free robot; 1 for modes that fill up."""
     stiffness = []
     for rod_of_one in _each(rods):
         sections = [
@@ -206,8 +240,9 @@ def _mode_stiffness(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes"]:
         ]
         of_section = np.stack([law.stiffness(section) for section in sections])
         basis = rod_of_one.basis
-        stiffness.append(np.einsum("i,iam,iab,ibm->m", rod_of_one.length, basis, of_section, basis))
-    return np.stack(stiffness) + rods.idle
+        own = np.einsum("i,iam,iab,ibk->mk", rod_of_one.length, basis, of_section, basis)
+        stiffness.append(own + np.diag(rod_of_one.idle))
+    return np.stack(stiffness)
 
 
 def _lip_stiffness(
@@ -219,9 +254,7 @@ def _lip_stiffness(
     tube axis times the turn of the distal body.
     """
     fibre = np.einsum("nc,nicm,ni->nm", fibre_stretch(rods.lip), rods.basis, rods.length)
-    turn = np.einsum(
-        "nab,nibm,ni->nam", rods.start_rotation, rods.followed_basis[:, :, :3], rods.length
-    )
+    turn = rods.start_rotation @ rods.turn[:, -1, :, 1:]
     edge = outer_radius * np.linalg.norm(turn[:, :2], axis=1)
     slope = np.where(rods.lip_closes[:, None] > 0.0, fibre, edge)
     return 1.0 / np.sum(slope**2 * (1.0 - rods.idle) / stiffness, axis=-1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -30,25 +31,30 @@ def lay_lips(
     """
     groups: list[LipGroup] = []
     if np.any(rods.lip_closes):
-        groups.append(SpineLips(rods.lip_closes[:, None]))
+        closes = rods.lip_closes[:, None]
+        groups.append(SpineLips(closes, cast("Array", np.ones(closes.shape, int))))
     sides = sorted({side % 360.0 for side in _sides(notches)})
     if sides:
         line = passages(notches, body_length, sides)
         angle = np.radians(sides)
         across = tube.outer_radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
         along = np.array([0.0, 0.0, 1.0])
+        # As many lips as close at one flexure, whichever sides they are on.
+        count = int(line.closes.sum(axis=1).max(initial=1.0))
+        chosen = np.argsort(-line.closes, axis=1, kind="stable")[:, :count]
+
+        def own(values: np.ndarray) -> np.ndarray:
+            index = chosen.reshape(*chosen.shape, *(1,) * (values.ndim - 2))
+            return np.take_along_axis(values, index, axis=1)
+
+        closes = own(line.closes)
         groups.append(
             Edges(
-                closes=constant(line.closes),
-                visits=constant(line.visits),
-                enters=constant(across + line.enters[..., None] * along),
-                leaves=constant(across + line.leaves[..., None] * along),
-                base_leaves=constant(
-                    np.broadcast_to(
-                        across + np.asarray(line.base_leaves)[:, None] * along,
-                        (len(notches), *across.shape),
-                    )
-                ),
+                closes=constant(closes),
+                back=cast("Array", np.where(closes > 0.0, own(line.back), 1)),
+                leaves=constant(own(across + line.left[..., None] * along)),
+                enters=constant(own(across + line.enters[..., None] * along)),
+                normal=constant(np.broadcast_to(along, (*closes.shape, 3))),
             )
         )
     return tuple(groups)

@@ -1,37 +1,35 @@
 """How the lips of a notch meet: what they leave open, and what their contact force does.
 
-As with the tendons the chain is walked twice: from base to tip every kind of lips carries along
-what a later body may close against, from tip to base it hands back the force on it.
+Like a tendon's span, an opening lies between an anchor, the body with the face that may be closed
+against, and the body whose edge comes to it. What it leaves open depends on the pose of the one
+seen from the other, or on the flexure's strains alone.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from notchflex.flexure import FlexureState, Rod
+from notchflex.motion import Motion
 
 
 class Touch(NamedTuple):
-    """Lips of one kind at one flexure (mm, N).
+    """Lips of one kind at one flexure (mm).
 
     Attributes:
         gap: What is left of the opening, >= 0 in a solved state.
-        pull: What the contact forces add to the balance of the flexure's modes.
-        wrench: Moment and force of the contact on the distal body, about and along its frame;
-            None for lips that act on the modes alone.
-        carried: What goes on to the next flexure.
-        reaction: What is handed back to the proximal body.
+        wrench: Moment and force on the distal body per unit of contact force, about and along its
+            frame; its opposite acts on the anchor. None for lips that act on the modes alone.
+        slope: Change of the gap per unit of mode; None for lips that act on bodies.
     """
 
     gap: Float[Array, " l"]
-    pull: Float[Array, " modes"]
-    wrench: Float[Array, " 6"] | None
-    carried: Any
-    reaction: Any
+    wrench: Float[Array, "l w"] | None
+    slope: Float[Array, "l modes"] | None
 
 
 class LipGroup(eqx.Module):
@@ -40,34 +38,20 @@ class LipGroup(eqx.Module):
     Attributes:
         acts_on_bodies: Whether the contact is a force on bodies.
         closes: 1 where there are such lips at a flexure.
+        back: How many bodies before the distal one their anchor is.
     """
 
     acts_on_bodies: ClassVar[bool]
     closes: eqx.AbstractVar[Float[Array, "*n l"]]
+    back: eqx.AbstractVar[Int[Array, "*n l"]]
 
     @abstractmethod
-    def leave_base(self) -> Any:
-        """What is carried from the base on."""
-
-    @abstractmethod
-    def no_reaction(self) -> Any:
-        """What comes back from beyond the tip: nothing."""
-
-    @abstractmethod
-    def touch(
-        self,
-        rod: Rod,
-        flexure: FlexureState,
-        force: Float[Array, " l"],
-        carried: Any,
-        reaction: Any,
-    ) -> Touch:
+    def touch(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Touch:
         """Lips at one flexure (of a group without its leading axis).
 
         Args:
             rod: The flexure.
             flexure: Its state.
-            force: Contact forces.
-            carried: What was carried from the base side.
-            reaction: What is handed back from beyond.
+            anchors: Pose of the distal body seen from the anchor of each, lips as leading axis;
+                None where nothing acts on bodies.
         """

@@ -3,10 +3,18 @@
 from notchflex._packages import import_all
 from notchflex.flexure.build import LEVELS, stack, with_level
 from notchflex.flexure.elastica import Elastica, elastica, modulus_from_single_notch
+from notchflex.flexure.plane import flattened
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
-from notchflex.flexure.shape import relative_pose, rod_end
-from notchflex.flexure.state import FlexureState, fibre_stretch, flexure_state
+from notchflex.flexure.shape import pull_change, relative_pose, rod_end
+from notchflex.flexure.state import (
+    FlexureState,
+    fibre_slope,
+    fibre_stretch,
+    flexure_state,
+    in_space,
+    of_rod,
+)
 
 import_all(__name__, __path__)
 
@@ -16,9 +24,14 @@ __all__ = [
     "FlexureState",
     "Rod",
     "elastica",
+    "fibre_slope",
     "fibre_stretch",
+    "flattened",
     "flexure_state",
+    "in_space",
     "modulus_from_single_notch",
+    "of_rod",
+    "pull_change",
     "relative_pose",
     "rod",
     "rod_end",

@@ -17,10 +17,11 @@ from numpy.polynomial.legendre import legvander
 
 from notchflex._jax import constant, jax
 from notchflex.errors import InputError
-from notchflex.flexure.build import gauss_nodes
+from notchflex.flexure.places import Places
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
 from notchflex.material import FibreSection
+from notchflex.motion import identity
 from notchflex.robot import ArcNotch, Tube
 from notchflex.section import annular_sector, annular_segment
 
@@ -50,35 +51,33 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0) -> Rod:
     cosine, sine = np.cos(np.radians(notch.direction_deg)), np.sin(np.radians(notch.direction_deg))
     turned = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     neutral_axis = np.array([-1.0, 0.0, 0.0]) * left.centroid
-    place, length = gauss_nodes(np.linspace(0.0, notch.height, 3 + refinement).tolist())
-    basis = _modes(2.0 * place / notch.height - 1.0, float(section.shear_centre), refinement)
-    basis = basis / notch.height
+    # Smooth all along: one piece, with a node in its middle. With six nodes a notch that bends by a
+    # radian in its plane is right to 1e-15; the turns of one that also bends sideways and twists
+    # need ten for 3e-8.
+    nodes = (7 + 4 * refinement,)
+    places = Places((0.0, notch.height), nodes, (10 + 3 * refinement,))
+    place = 2.0 * places.every / notch.height - 1.0
+    basis = _modes(place, float(section.shear_centre), refinement) / notch.height
     straight = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     reference = straight + np.radians(notch.precurvature_deg) * basis[..., 0]
-    # The followed curve is a point: under a tendon alone the strain is the same all along, and
-    # then its exponential is exact.
+    count = nodes[0]
     return Rod(
+        # The followed curve is a point.
+        **places.fields([identity()] * len(place), basis, reference),
         start_rotation=constant(turned),
         start_offset=constant(turned @ neutral_axis),
         curve_rotation=constant(np.eye(3)),
         curve_offset=constant(np.zeros(3)),
         end_rotation=constant(turned.T),
         end_offset=constant(-neutral_axis),
-        length=constant(length),
-        reference_strain=constant(reference),
-        basis=constant(basis),
-        followed_reference=constant(reference),
-        followed_basis=constant(basis),
-        node_rotation=constant(np.broadcast_to(np.eye(3), (len(place), 3, 3))),
-        node_offset=constant(np.zeros((len(place), 3))),
-        section=jax.tree.map(lambda value: constant(np.full(len(place), value)), section),
+        reference_strain=constant(reference[:count]),
+        section=jax.tree.map(lambda value: constant(np.full(count, value)), section),
         lip=constant([0.5 * tube.outer_diameter + float(left.centroid), 0.0]),
         lip_closes=constant(1.0),
         small=constant(0.0),
         chord=constant(0.0),
         idle=constant(np.zeros(basis.shape[-1])),
         levels=(1, 2 + refinement, basis.shape[-1]),
-        nodes_per_interval=3,
     )
 
 

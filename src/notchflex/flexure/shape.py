@@ -1,134 +1,259 @@
-"""From the strains of a rod to its pose: Magnus's series on the group of rigid motions."""
+"""From the strains of a rod to its pose, and how the pose answers the strains.
+
+Beside the followed curve a rod turns and steps. The turn up to each of Gauss's nodes is an integral
+of the strains, so it is linear in the modes q, exactly in the plane; in space, where the order of
+turns matters, it goes from node to node by Magnus's series (second term included: Blanes, Casas,
+Oteo and Ros 2009, eq. 42). The end is the sum of all steps, each turned by where its node is.
+
+Whatever is asked of the pose is asked of these turns and steps: its slope by the modes, and the
+slope of that, are written out. (Differentiated by JAX they cost ten times as much, to run and to
+compile.)
+"""
 
 from __future__ import annotations
 
-from functools import reduce
+from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, constant, jax
+from notchflex._jax import array_module, constant, jax, jnp
 from notchflex.flexure.rod import Rod
-from notchflex.motion import Motion, bracket, exponential, identity, skew
+from notchflex.motion import Motion, cross, left_slope, rotation_about, sine_cosine, unskew
 
 
-def magnus(twists: Float[Array, "nodes 6"], lengths: Float[Array, " nodes"]) -> Float[Array, " 6"]:
-    """Twist whose exponential is the motion along one interval.
+class Bent(NamedTuple):
+    """A rod beside its curve; places are the nodes of the pose and then the end.
 
-    With one node the twist is constant. With Gauss's three nodes the error falls with the sixth
-    power of the interval (Blanes, Casas, Oteo and Ros 2009, eq. 253, with the brackets turned
-    round because the motion is followed in the moving frame).
-
-    Args:
-        twists: Twist at each node.
-        lengths: Length that each node stands for.
-
-    Returns:
-        The twist times length of the whole interval.
+    Attributes:
+        rotation: Rotation at every place.
+        turn: Turn at every place per unit of mode, along the axes of the start.
+        step: The turned steps at the nodes.
+        stepped: The turned steps per unit of mode.
     """
-    if twists.shape[0] == 1:
-        return lengths[0] * twists[0]
-    whole = lengths.sum()
-    first = whole * twists[1]
-    second = (np.sqrt(15.0) / 3.0) * whole * (twists[2] - twists[0])
-    third = (10.0 / 3.0) * whole * (twists[2] - 2.0 * twists[1] + twists[0])
-    turned = bracket(second, first)
-    inner = second - bracket(2.0 * third + turned, first) / 60.0
-    return first + third / 12.0 + bracket(inner, -20.0 * first - third + turned) / 240.0
+
+    rotation: Float[Array, "places d d"]
+    turn: Float[Array, "places a modes"]
+    step: Float[Array, "gauss d"]
+    stepped: Float[Array, "gauss d modes"]
+
+    @property
+    def end(self) -> Motion:
+        """Pose of the end."""
+        return Motion(self.rotation[-1], self.step.sum(axis=0))
 
 
-def followed_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Motion from where the followed curve would end to where the rod ends."""
-    twists = rod.followed_reference + rod.followed_basis @ modes
-    large = _product(*_by_interval(rod, twists))
-    if rod.small is None:
-        return large
-    small, is_small = _small_motion(rod, rod.length @ twists), rod.small > 0.0
+def bent(rod: Rod, modes: Float[Array, " modes"]) -> Bent:
+    """Turns and steps of a rod under given modes."""
     xp = array_module(modes)
-    return jax.tree.map(lambda one, other: xp.where(is_small, other, one), large, small)
+    hat = xp.concatenate([np.ones(1), modes])
+    if rod.turn_pair is None:
+        rotation, turn = _in_plane(rod.turn[:, 0] @ hat), rod.turn[..., 1:]
+    else:
+        turns, slope = _turns(rod, hat)
+        parts = xp.stack([rotation_about(one) for one in turns]) if xp is np else _about(turns)
+        rotation = _products(parts)
+        turn = xp.cumsum(_before(rotation) @ _left_slopes(turns) @ slope, axis=0)
+    at_nodes = rotation[:-1]
+    stepped = (at_nodes[..., None] * rod.step[:, None]).sum(axis=-2)
+    return Bent(rotation, turn, stepped @ hat, stepped[..., 1:])
 
 
-def _along(twists: Float[Array, "nodes 6"], lengths: Float[Array, " nodes"]) -> Motion:
-    return exponential(magnus(twists, lengths))
+def _in_plane(angle: Float[Array, " places"]) -> Float[Array, "places 2 2"]:
+    xp = array_module(angle)
+    sine, cosine = sine_cosine(angle)
+    return xp.stack([xp.stack([cosine, sine], -1), xp.stack([-sine, cosine], -1)], -2)
 
 
-def _product(
-    twists: Float[Array, "intervals nodes 6"], lengths: Float[Array, "intervals nodes"]
-) -> Motion:
-    """Motion along all intervals, one after the other."""
-    if len(twists) == 1:
-        return _along(twists[0], lengths[0])
-    if array_module(twists) is np:
-        return reduce(Motion.then, map(_along, twists, lengths))
-
-    def onward(pose: Motion, interval: tuple[Array, Array]) -> tuple[Motion, None]:
-        return pose.then(_along(*interval)), None
-
-    # A loop, for a program that is compiled in a quarter of the time.
-    whole, _ = jax.lax.scan(onward, identity(), (twists, lengths))
-    return whole
+def _turns(
+    rod: Rod, hat: Float[Array, " hat"]
+) -> tuple[Float[Array, "places 3"], Float[Array, "places 3 modes"]]:
+    """Rotation vectors from place to place, and their slopes by the modes."""
+    xp = array_module(hat)
+    parts = xp.concatenate([rod.turn[:1], rod.turn[1:] - rod.turn[:-1]])
+    by_pair = xp.einsum("kcab,b->kca", rod.turn_pair, hat)
+    return (parts + by_pair) @ hat, parts[..., 1:] + 2.0 * by_pair[..., 1:]
 
 
-def _by_interval(
-    rod: Rod, twists: Float[Array, "nodes 6"]
-) -> tuple[Float[Array, "intervals nodes 6"], Float[Array, "intervals nodes"]]:
-    step = rod.nodes_per_interval
-    return twists.reshape(-1, step, 6), rod.length.reshape(-1, step)
+def _about(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
+    return jax.vmap(rotation_about)(turns)
 
 
-def _small_motion(rod: Rod, twist: Float[Array, " 6"]) -> Motion:
+def _left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
+    if array_module(turns) is np:
+        return constant([left_slope(one) for one in turns])
+    return jax.vmap(left_slope)(turns)
+
+
+def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
+    """Products of all rotations up to each."""
+    if array_module(parts) is np:
+        return constant(list(accumulate(parts, np.matmul)))
+    return jax.lax.associative_scan(jnp.matmul, parts)
+
+
+def _before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
+    """Rotation at the place before each; none before the first."""
+    return array_module(values).concatenate([np.eye(3)[None], values[:-1]])
+
+
+def _small_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     """Rotation by the sum of the curvatures; the rod's end is displaced in proportion to them."""
-    turned, moved = twist[:3], twist[3:]
-    xp = array_module(twist)
-    rotation = exponential(xp.concatenate([turned, xp.zeros(3)])).rotation
-    end = rod.curve_offset
-    return Motion(rotation, end + skew(turned) @ end + moved - rotation @ end)
+    xp = array_module(modes)
+    hat = xp.concatenate([np.ones(1), modes])
+    turn, moved = rod.turn[-1] @ hat, rod.step.sum(axis=0) @ hat
+    rotation, end = rotation_about(turn), rod.curve_offset
+    return Motion(rotation, end + cross(turn, end) + moved - rotation @ end)
+
+
+def _beside(rod: Rod, modes: Float[Array, " modes"], own: Bent) -> Motion:
+    """Motion from where the followed curve would end to where the rod ends."""
+    if rod.small is None:
+        return own.end
+    xp, is_small = array_module(modes), rod.small > 0.0
+    pairs = zip(_small_motion(rod, modes), own.end, strict=True)
+    return Motion(*(xp.where(is_small, small, large) for small, large in pairs))
 
 
 def rod_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     """Pose of the rod's last section as seen from its first."""
-    return followed_motion(rod, modes).then(Motion(rod.curve_rotation, rod.curve_offset))
+    return _beside(rod, modes, bent(rod, modes)).then(Motion(rod.curve_rotation, rod.curve_offset))
 
 
-def relative_pose(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Pose of the distal body as seen from the proximal one."""
-    return (
-        Motion(rod.start_rotation, rod.start_offset)
-        .then(rod_end(rod, modes))
-        .then(Motion(rod.end_rotation, rod.end_offset))
+def _tail(rod: Rod) -> Motion:
+    """The distal body as seen from where the motion beside the curve ends."""
+    return Motion(rod.curve_rotation, rod.curve_offset).then(
+        Motion(rod.end_rotation, rod.end_offset)
     )
 
 
-def node_poses(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Poses of the sections at the nodes, in the frame of the proximal body, nodes leading.
+def relative_pose(rod: Rod, modes: Float[Array, " modes"], own: Bent | None = None) -> Motion:
+    """Pose of the distal body as seen from the proximal one."""
+    beside = _beside(rod, modes, bent(rod, modes) if own is None else own)
+    return Motion(rod.start_rotation, rod.start_offset).then(beside).then(_tail(rod))
 
-    Within an interval by the sums of a collocation rule, which is right to a few parts in a
-    thousand of what the interval bends: enough to judge a result by, not to compute it.
+
+def twist_slope(rod: Rod, modes: Float[Array, " modes"], own: Bent) -> Float[Array, "w modes"]:
+    """Twist (angular, linear) of the distal body, in its own frame, per unit of mode."""
+    end = own.rotation[-1]
+    turn = own.turn[-1] if len(end) == 2 else end.T @ own.turn[-1]
+    twist = jnp.concatenate([turn, end.T @ _moved(own)])
+    if rod.small is not None:
+        twist = jnp.where(rod.small > 0.0, _small_twist(rod, modes), twist)
+    return jax.vmap(_tail(rod).twist_inside, in_axes=1, out_axes=1)(twist)
+
+
+def _moved(own: Bent) -> Float[Array, "d modes"]:
+    """Displacement of the end per unit of mode, along the axes of the start."""
+    return jnp.sum(own.stepped + _crossed(own.turn[:-1], own.step[..., None]), axis=0)
+
+
+def _crossed(turn: Array, vector: Array) -> Array:
+    """Cross products of turns (places, a, modes) and vectors (places, d, 1 or modes)."""
+    if turn.shape[1] == 1:
+        return jnp.concatenate([turn * vector[:, 1:], -turn * vector[:, :1]], axis=1)
+    return jnp.cross(turn, jnp.broadcast_to(vector, turn.shape), axis=1)
+
+
+def pull_change(
+    rod: Rod, modes: Float[Array, " modes"], own: Bent, wrench: Float[Array, " w"]
+) -> Float[Array, "modes modes"]:
+    """How what a wrench on the distal body does to each mode changes with the modes.
+
+    It is the derivative of twist_slope^T wrench, the wrench going along with the body; rows are the
+    modes that it acts on. With F the force and M the moment about the end, along the axes of the
+    start, the wrench does M . turn + F . (sum of the moved steps) to each mode.
     """
-    twists = rod.followed_reference + rod.followed_basis @ modes
-    inside = _UP_TO_NODE[rod.nodes_per_interval]
+    axes = own.turn.shape[1]
+    at_end = _tail(rod).wrench(wrench)
+    end = own.rotation[-1]
+    force = end @ at_end[axes:]
+    arms = _moments(own.stepped, force)
+    turn = own.turn[:-1]
+    mixed = jnp.einsum("gci,gcj->ij", arms, turn)
+    along = own.step @ force
+    twice = jnp.einsum("g,gci,gcj->ij", along, turn, turn)
+    leaving = _moments(_moved(own)[None], force)[0].T @ own.turn[-1]
+    change = mixed + mixed.T - twice - leaving
+    if axes == 3:
+        change = change + _order_of_turns(rod, modes, own, at_end)
+    if rod.small is not None:
+        small = jax.jacfwd(lambda varied: _small_twist(rod, varied).T @ at_end)(modes)
+        change = jnp.where(rod.small > 0.0, small, change)
+    return change
 
-    def onward(start: Motion, interval: tuple[Array, Array, Motion]) -> tuple[Motion, Motion]:
-        own, lengths, curve = interval
 
-        def at_node(parts: Array, free: Motion) -> Motion:
-            return start.then(exponential(lengths.sum() * (parts @ own))).then(free)
+def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:
+    """Moments of one force at points (places, d, modes) about the start."""
+    if len(force) == 2:
+        return points[:, 1:] * force[0] - points[:, :1] * force[1]
+    return jnp.cross(points, jnp.broadcast_to(force[:, None], points.shape), axis=1)
 
-        return start.then(_along(own, lengths)), jax.vmap(at_node)(inside, curve)
 
-    step = rod.nodes_per_interval
-    curve = Motion(rod.node_rotation.reshape(-1, step, 3, 3), rod.node_offset.reshape(-1, step, 3))
+def _order_of_turns(
+    rod: Rod, modes: Float[Array, " modes"], own: Bent, at_end: Float[Array, " 6"]
+) -> Float[Array, "modes modes"]:
+    """What `pull_change` has in space alone, where a turn after another is not the other after it.
+
+    The slopes of the turns change with the modes: from place to place by those before, within each
+    step by the slope of the exponential and by the pairs of Magnus's series.
+    """
+    end = own.rotation[-1]
+    moment, force = end @ at_end[:3], end @ at_end[3:]
+    hat = jnp.concatenate([jnp.ones(1), modes])
+    turns, slope = _turns(rod, hat)
+    nodes = own.turn[:-1]
+    # Each place's share of the wrench, then that of all places from it on.
+    shares = jnp.cross(own.step, jnp.broadcast_to(force, own.step.shape))
+    shares = jnp.concatenate([shares, moment[None]])
+    onward = jnp.cumsum(shares[::-1], axis=0)[::-1]
+    before = _before(own.rotation)
+    increments = before @ _left_slopes(turns) @ slope
+    turned_before = jnp.concatenate([jnp.zeros_like(own.turn[:1]), own.turn[:-1]])
+    lever = jnp.cross(increments, jnp.broadcast_to(onward[..., None], increments.shape), axis=1)
+    change = jnp.einsum("kci,kcj->ij", lever, turned_before)
+    inside = jnp.einsum("kdc,kd->kc", before, onward)
+
+    def answered(vector: Array, share: Array) -> Array:
+        return left_slope(vector).T @ share
+
+    bending = jax.vmap(jax.jacfwd(answered))(turns, inside)
+    change = change + jnp.einsum("kci,kcd,kdj->ij", slope, bending, slope)
+    answers = jax.vmap(answered)(turns, inside)
+    assert rod.turn_pair is not None
+    change = change + 2.0 * jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
+    # The first node's wrench is turned by the end, and steps lean out of their turns' plane.
+    last = own.turn[-1]
+    change = change + jnp.einsum("ci,cj->ij", last, jnp.cross(last, moment[:, None], axis=0))
+    by_force = jnp.einsum("gcj,c->gj", nodes, force)
+    return change + jnp.einsum("gci,gc,gj->ij", nodes, own.step, by_force)
+
+
+def _small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w modes"]:
+    """Twist of the end beside the curve, in its frame, per unit of mode, of a small deflection."""
+    motion = _small_motion(rod, modes)
+    slope: Motion = jax.jacfwd(lambda varied: _small_motion(rod, varied))(modes)
+    turned = jnp.einsum("ji,jkm->ikm", motion.rotation, slope.rotation)
+    turn = jax.vmap(unskew, in_axes=-1, out_axes=-1)(turned)
+    return jnp.concatenate([turn, motion.rotation.T @ slope.translation])
+
+
+def node_poses(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
+    """Poses of the sections at the nodes of the strains, in the frame of the proximal body.
+
+    Between the places of the turn its order is left out, and steps are summed up by the polynomials
+    through their nodes: enough to judge a result by, not to compute it.
+    """
+    own = bent(rod, modes)
     start = Motion(rod.start_rotation, rod.start_offset)
-    _, found = jax.lax.scan(onward, start, (*_by_interval(rod, twists), curve))
-    return Motion(found.rotation.reshape(-1, 3, 3), found.translation.reshape(-1, 3))
+    turns = jnp.concatenate([jnp.zeros_like(rod.turn[:1]), rod.turn])
+    onward = (rod.node_turn - turns[rod.node_place]) @ jnp.concatenate([jnp.ones(1), modes])
+    unturned = jnp.eye(len(own.rotation[0]))[None]
+    before = jnp.concatenate([unturned, own.rotation])[rod.node_place]
 
+    def at_node(turned: Array, turn: Array, moved: Array, free: Motion) -> Motion:
+        return start.then(Motion(turned @ rotation_about(turn), moved)).then(free)
 
-def _up_to_nodes(count: int) -> Float[np.ndarray, "nodes nodes"]:
-    """Integrals from 0 to each of Gauss's nodes on (0, 1) of the polynomials through them."""
-    points = 0.5 * (1.0 + np.polynomial.legendre.leggauss(count)[0])
-    powers = np.arange(1, count + 1)
-    integrals = points[:, None] ** powers / powers
-    return integrals @ np.linalg.inv(points[:, None] ** (powers - 1))
-
-
-_UP_TO_NODE = {count: constant(_up_to_nodes(count)) for count in (1, 3)}
+    free = Motion(rod.node_rotation, rod.node_offset)
+    return jax.vmap(at_node)(before, onward, rod.node_reach @ own.step, free)

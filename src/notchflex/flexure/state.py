@@ -10,40 +10,37 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.flexure.rod import Rod
-from notchflex.flexure.shape import relative_pose, rod_end
+from notchflex.flexure.shape import Bent, bent, relative_pose, rod_end, twist_slope
 from notchflex.material import SectionLaw
-from notchflex.motion import Motion, rotation_about, unskew
+from notchflex.motion import PLANE, Motion, angular, rotation_about
 
 
 class FlexureState(eqx.Module):
     """One flexure under given modes (mm, N, rad), in the frame of its proximal body.
 
     Attributes:
+        bent: Turns and steps of the rod; None where nobody asked for its pose.
         pose: From the proximal body to the distal one; None where nobody asked.
         twist: Twist (angular, linear) of the distal body, in its own frame, per unit of mode;
             None where nobody asked.
         resultants: Internal moments and forces of each interval, in the rod's frame.
         strain: Strain of each interval beyond that of the free tube.
         internal: Generalised internal force of each mode, N mm per unit of mode.
-        bend: Bending of the whole rod about x and y of its frame, rad.
+        bend: Bending of the whole rod about x and y of its frame, of a plane about y, rad.
         chord_turn: Rotation, in the proximal body's frame, by which the chord from the rod's
             start to its end has turned in the plane of bending; None where nobody asked.
         chord_angle: Its angle, rad; None where nobody asked.
     """
 
+    bent: Bent | None
     pose: Motion | None
-    twist: Float[Array, "6 modes"] | None
-    resultants: Float[Array, "intervals 6"]
-    strain: Float[Array, "intervals 6"]
+    twist: Float[Array, "w modes"] | None
+    resultants: Float[Array, "intervals w"]
+    strain: Float[Array, "intervals w"]
     internal: Float[Array, " modes"]
-    bend: Float[Array, " 2"]
-    chord_turn: Float[Array, "3 3"] | None
+    bend: Float[Array, " axes"]
+    chord_turn: Float[Array, "d d"] | None
     chord_angle: Float[Array, ""] | None
-
-
-def strain(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "intervals 6"]:
-    """Strain of every interval of a rod."""
-    return rod.reference_strain + rod.basis @ modes
 
 
 def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
@@ -61,15 +58,19 @@ _ALONG = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 _ACROSS = np.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
 
 
-def pose_and_twist(
-    rod: Rod, modes: Float[Array, " modes"]
-) -> tuple[Motion, Float[Array, "6 modes"]]:
-    """Relative pose, and the distal body's twist in its own frame per unit of mode."""
-    pose = relative_pose(rod, modes)
-    moved: Motion = jax.jacfwd(lambda varied: relative_pose(rod, varied))(modes)
-    turned = jnp.einsum("ji,jkm->ikm", pose.rotation, moved.rotation)
-    angular = jax.vmap(unskew, in_axes=-1, out_axes=-1)(turned)
-    return pose, jnp.concatenate([angular, pose.rotation.T @ moved.translation])
+def of_rod(rod: Rod, values: Float[Array, "*shape 6"]) -> Float[Array, "*shape w"]:
+    """Those of six components, last axis, that a rod of space or of a plane has."""
+    return values if rod.basis.shape[-2] == 6 else values[..., PLANE]
+
+
+def in_space(values: Float[Array, "*shape w"]) -> Float[Array, "*shape 6"]:
+    """All six components, last axis, of what may be of a plane."""
+    return values if values.shape[-1] == 6 else values @ np.eye(6)[PLANE]
+
+
+def fibre_slope(rod: Rod, weights: Float[Array, "t w"]) -> Float[Array, "t modes"]:
+    """Change of the length of fibres, by their weights on the strains, per unit of mode."""
+    return weights @ jnp.einsum("icm,i->cm", rod.basis, rod.length)
 
 
 def flexure_state(
@@ -93,33 +94,40 @@ def flexure_state(
     Returns:
         Its state.
     """
-    pose, twist = pose_and_twist(rod, modes) if with_pose else (None, None)
-    every_strain = strain(rod, modes)
-    elastic = every_strain - rod.reference_strain
-    response = jax.vmap(law.respond)(elastic, rod.section, memory)
+    own, pose, twist = None, None, None
+    if with_pose:
+        own = bent(rod, modes)
+        pose, twist = relative_pose(rod, modes, own), twist_slope(rod, modes, own)
+    elastic = rod.basis @ modes
+    respond = jax.vmap(law.respond)
+    resultants = of_rod(rod, respond(in_space(elastic), rod.section, memory).resultants)
     # A mode that only fills up the arrays is held by a stiffness of 1.
-    internal = jnp.einsum("i,ic,icm->m", rod.length, response.resultants, rod.basis)
+    internal = jnp.einsum("i,ic,icm->m", rod.length, resultants, rod.basis)
     has_chord = with_pose and rod.chord is not None
     chord_turn, chord_angle = chord(rod, modes) if has_chord else (None, None)
+    axes = angular(elastic[0])
     return FlexureState(
+        bent=own,
         pose=pose,
         twist=twist,
-        resultants=response.resultants,
+        resultants=resultants,
         strain=elastic,
         internal=internal + rod.idle * modes,
-        bend=rod.length @ every_strain[:, :2],
+        # About x and y of the section's frame; the third axis of space is that of torsion.
+        bend=rod.length @ (rod.reference_strain + elastic)[:, : min(axes, 2)],
         chord_turn=chord_turn,
         chord_angle=chord_angle,
     )
 
 
-def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "3 3"], Float[Array, ""]]:
+def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"], Float[Array, ""]]:
     """How far the chord of a rod has turned in its plane of bending (Liu 2022, eq. 19).
 
     The chord is the straight line from the rod's start to its end; for a strip this is the angle
     that the paper calls bending angle, about two thirds of the slope at the end.
     """
     end, free = rod_end(rod, modes).translation, rod.curve_offset
-    angle = jnp.atan2(end[0] * free[2] - end[2] * free[0], end[0] * free[0] + end[2] * free[2])
-    turn = rotation_about(angle * jnp.array([0.0, 1.0, 0.0]))
+    about_y = np.eye(3)[1] if len(end) == 3 else np.ones(1)
+    angle = jnp.atan2(end[0] * free[-1] - end[-1] * free[0], end[0] * free[0] + end[-1] * free[-1])
+    turn = rotation_about(angle * about_y)
     return rod.start_rotation @ turn @ rod.start_rotation.T, angle

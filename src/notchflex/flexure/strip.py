@@ -17,7 +17,7 @@ from numpy.polynomial.legendre import legvander
 from numpy.typing import ArrayLike
 
 from notchflex._jax import constant, jax
-from notchflex.flexure.build import followed, gauss_nodes
+from notchflex.flexure.places import Places
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
 from notchflex.material import FibreSection
@@ -33,14 +33,14 @@ _LYING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 @rod.register
 def _(notch: StripNotch, tube: Tube, refinement: int = 0) -> Rod:
-    return strip_rod(notch, tube, 5 + refinement, 5 + 3 * refinement, refinement)
+    return strip_rod(notch, tube, 5 + refinement, 10 + 3 * refinement, refinement)
 
 
 def strip_rod(
     notch: StripNotch,
     tube: Tube,
     bending_modes: int = 5,
-    intervals: int = 5,
+    nodes: int = 10,
     more_sideways: int = 0,
 ) -> Rod:
     """Build the rod of a strip.
@@ -49,7 +49,7 @@ def strip_rod(
         notch: The notch.
         tube: The tube that it is cut into.
         bending_modes: Legendre polynomials of the curvature in the plane of bending.
-        intervals: Intervals of three Gauss nodes along the strip.
+        nodes: Gauss's nodes along the strip.
         more_sideways: Polynomials of sideways bending and of twist beyond the usual ones.
 
     Returns:
@@ -60,10 +60,9 @@ def strip_rod(
         (5, 5, 10)
     """
     length = notch.strip_length_in(tube)
-    place, weight = gauss_nodes(np.linspace(0.0, length, intervals + 1).tolist())
-    basis = _modes(2.0 * place / length - 1.0, bending_modes, more_sideways) / length
-    straight = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(place), 1))
-    along = [Motion(constant(np.eye(3)), constant([0.0, 0.0, at])) for at in place]
+    places = Places((0.0, length), (nodes,), (nodes,))
+    basis = _modes(2.0 * places.every / length - 1.0, bending_modes, more_sideways) / length
+    along = [Motion(constant(np.eye(3)), constant([0.0, 0.0, at])) for at in places.every]
     turned = rotation_about(constant([0.0, 0.0, np.radians(notch.direction_deg)]))
     return Rod(
         start_rotation=constant(turned @ _LYING),
@@ -72,21 +71,15 @@ def strip_rod(
         curve_offset=constant([0.0, 0.0, length]),
         end_rotation=constant((turned @ _LYING).T),
         end_offset=constant([0.0, 0.0, -0.5 * length]),
-        length=constant(weight),
-        reference_strain=constant(straight),
-        basis=constant(basis),
-        followed_reference=constant(np.zeros_like(straight)),
-        followed_basis=constant(followed(along, basis)),
-        node_rotation=constant(np.stack([pose.rotation for pose in along])),
-        node_offset=constant(np.stack([pose.translation for pose in along])),
-        section=_section(notch, tube, len(place)),
+        **places.fields(along, basis),
+        reference_strain=constant(np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (nodes, 1))),
+        section=_section(notch, tube, nodes),
         lip=constant(np.zeros(2)),
         lip_closes=constant(0.0),
         small=constant(float(notch.deflection == "small")),
         chord=constant(1.0),
         idle=constant(np.zeros(basis.shape[-1])),
         levels=(bending_modes, bending_modes, basis.shape[-1]),
-        nodes_per_interval=3,
     )
 
 

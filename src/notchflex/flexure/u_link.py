@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex._jax import constant
-from notchflex.flexure.build import followed, gauss_nodes
+from notchflex._jax import constant, jax
+from notchflex.flexure.places import Places
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
 from notchflex.flexure.u_link_geometry import Link
@@ -28,7 +28,7 @@ POISSON_RATIO = 0.33
 
 @rod.register
 def _(notch: ULink, tube: Tube, refinement: int = 0) -> Rod:
-    more = (3 + 3 * refinement, 1 + 2 * refinement, (2 + 2 * refinement, 2 + 2 * refinement))
+    more = (3 + 3 * refinement, 1 + 2 * refinement, (6 + 3 * refinement, 6 + 3 * refinement))
     return u_link_rod(notch, tube, *more)
 
 
@@ -37,7 +37,7 @@ def u_link_rod(
     tube: Tube,
     moment_modes: int = 3,
     force_modes: int = 1,
-    intervals: tuple[int, int] = (2, 2),
+    nodes: tuple[int, int] = (6, 6),
     poisson_ratio: float = POISSON_RATIO,
 ) -> Rod:
     """Build the rod of a link.
@@ -47,7 +47,7 @@ def u_link_rod(
         tube: The tube that it is cut into.
         moment_modes: Modes of the moment in the plane, 3 or more, see `wrench_modes`.
         force_modes: Pairs of modes of the force in the plane, 1 or more.
-        intervals: Intervals of three Gauss nodes in each curved end, and in the straight part.
+        nodes: Gauss's nodes in each curved end, and in the straight part.
         poisson_ratio: Poisson's ratio for the shape of the modes.
 
     Returns:
@@ -59,14 +59,10 @@ def u_link_rod(
     """
     link = Link(notch.slot_radius, notch.strip_thickness, notch.strip_length)
     curved = link.length - link.strip_length
-    ends = np.concatenate(
-        [
-            np.linspace(0.0, 0.5 * curved, intervals[0] + 1),
-            0.5 * curved + np.linspace(0.0, link.strip_length, intervals[1] + 1)[1:],
-            np.linspace(link.length - 0.5 * curved, link.length, intervals[0] + 1)[1:],
-        ]
-    )
-    place, weight = gauss_nodes(ends.tolist())
+    ends = (0.0, 0.5 * curved, link.length - 0.5 * curved, link.length)
+    counts = (nodes[0], nodes[1], nodes[0])
+    places = Places(ends, counts, counts)
+    place = places.every
     section = _section(link, tube, place, poisson_ratio)
     # A slot cut from the side away from the bend leaves the wall on the bend's side, where the
     # link then begins; over the slot that follows stands its mirror image.
@@ -74,12 +70,13 @@ def u_link_rod(
     # The strip lies above its proximal slot, whose lower edge is the proximal face.
     middle = np.array([0.0, 0.0, 2.0 * notch.slot_radius + 0.5 * notch.strip_thickness])
     start, *poses, end = _poses(link, middle, hand, np.array([0.0, *place, link.length]))
-    free = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(place), 1))
-    free[:, 1] = hand * link.curvature(place)
+    count = sum(counts)
+    free = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (count, 1))
+    free[:, 1] = hand * link.curvature(place[:count])
     basis = wrench_modes(
         poses,
         2.0 * place / link.length - 1.0,
-        weight,
+        places.weight,
         section,
         middle,
         moment_modes,
@@ -100,21 +97,15 @@ def u_link_rod(
         curve_offset=constant(whole.translation),
         end_rotation=constant(last.rotation @ turned.T),
         end_offset=constant(last.translation),
-        length=constant(weight),
+        **places.fields(from_start, basis),
         reference_strain=constant(free),
-        basis=constant(basis),
-        followed_reference=constant(np.zeros_like(free)),
-        followed_basis=constant(followed(from_start, basis)),
-        node_rotation=constant(np.stack([pose.rotation for pose in from_start])),
-        node_offset=constant(np.stack([pose.translation for pose in from_start])),
-        section=section,
+        section=jax.tree.map(lambda leaf: leaf[:count], section),
         lip=constant(np.zeros(2)),
         lip_closes=constant(0.0),
         small=constant(0.0),
         chord=constant(0.0),
         idle=constant(np.zeros(basis.shape[-1])),
         levels=(in_plane, in_plane, basis.shape[-1]),
-        nodes_per_interval=3,
     )
 
 

@@ -42,7 +42,7 @@ def wrench_modes(
     Args:
         poses: Pose of the free rod at every node, base to tip.
         part: Place of every node along the rod, from -1 to 1.
-        length: Length that each node stands for, mm.
+        length: Length that each node stands for, mm; 0 where it does not count.
         section: Its section at every node, with the shear centre in the centroid.
         middle: Point from which levers are counted, mm.
         moment_modes: Modes of the moment in the plane, 3 or more.

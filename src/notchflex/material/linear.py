@@ -15,6 +15,7 @@ from notchflex.robot import Linear
 class LinearLaw(SectionLaw):
     """Hooke's law. Moduli in MPa."""
 
+    is_linear = True
     elastic_modulus: Float[Array, ""]
     shear_modulus: Float[Array, ""]
 

@@ -8,7 +8,7 @@ two laws of today have none and hand it back untouched.
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import numpy as np
@@ -54,7 +54,13 @@ class Response(NamedTuple):
 
 
 class SectionLaw(eqx.Module):
-    """A material as the chain sees it. Tangents come from the resultants by differentiation."""
+    """A material as the chain sees it. Tangents come from the resultants by differentiation.
+
+    Attributes:
+        is_linear: Whether `stiffness` says all: what modes resist with is then summed up once.
+    """
+
+    is_linear: ClassVar[bool] = False
 
     @abstractmethod
     def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:

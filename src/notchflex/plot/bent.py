@@ -202,17 +202,25 @@ def bent(
 
 def bent_at(path: Path, step: int) -> Bent:
     """Return the robot of a path at one of its steps."""
-    modes = path.run.solved.point.unknowns.modes[step]
-    return bent(path.robot, path.chain, modes, path.body_position[step], path.body_rotation[step])
+    modes, own = path.run.solved.point.unknowns.modes[step], path.chain
+    chain = _of_space(path.robot, own.level, own.refinement)
+    return bent(path.robot, chain, modes, path.body_position[step], path.body_rotation[step])
+
+
+@lru_cache(maxsize=16)
+def _of_space(robot: Robot, level: str, refinement: int) -> Chain:
+    """The robot's chain with its flexures in space, whose modes are those of the flat one."""
+    from notchflex.chain import assemble
+
+    return assemble(robot, level, refinement=refinement, flat=False)
 
 
 def bent_by_angles(robot: Robot, notch_angle: Points) -> Bent:
     """Return a robot whose notches have given angles [rad], (n,), as measured ones have."""
-    from notchflex.chain import prepared
     from notchflex.contact import free_angle
     from notchflex.statics import bodies_from_angles
 
-    chain = prepared(robot)
+    chain = _of_space(robot, "tendons", 0)
     modes = np.zeros(np.shape(chain.stiffness))
     modes[:, 0] = notch_angle - free_angle(chain.rods)
     position, rotation = bodies_from_angles(robot, notch_angle[None])

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.chain import prepared
+from notchflex.chain import assemble
 from notchflex.flexure import rod
 from notchflex.results.quantities import DEGREES
 from notchflex.robot import Robot
@@ -40,7 +40,7 @@ def notch_table(robot: Robot) -> list[dict[str, Any]]:
         (30.63, 1.387)
     """
     table = closing(robot)
-    arms = moment_arms(prepared(robot))
+    arms = moment_arms(assemble(robot, flat=False))
     described = {notch: _description(notch, robot) for notch in dict.fromkeys(robot.notches)}
     return [
         {

@@ -1,5 +1,6 @@
 """Statics: loads, balance, Newton's method, states with memory."""
 
+from notchflex.statics.batch import Batch, simulate_batch, solve_batch
 from notchflex.statics.closing import Closing, closing
 from notchflex.statics.external import BodyForce, ExternalLoad
 from notchflex.statics.kinematics import (
@@ -16,6 +17,7 @@ from notchflex.statics.solve import simulate, solve, solve_each
 from notchflex.statics.state import SavedState, State
 
 __all__ = [
+    "Batch",
     "BodyForce",
     "Closing",
     "ConvergenceError",
@@ -34,7 +36,9 @@ __all__ = [
     "equal_stroke",
     "pull",
     "simulate",
+    "simulate_batch",
     "solve",
+    "solve_batch",
     "solve_each",
     "tip_from_angles",
 ]

@@ -10,10 +10,9 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import constant, jax, jnp
 from notchflex.chain import Chain
 from notchflex.contact import closing_travel
-from notchflex.flexure import fibre_stretch
+from notchflex.flexure import fibre_stretch, of_rod
 from notchflex.statics.applied import Applied
-from notchflex.statics.element import Beyond
-from notchflex.statics.walk import per_tendon
+from notchflex.statics.walk import Base
 from notchflex.tendon.wall_arc import WallArc
 
 
@@ -37,10 +36,10 @@ def tensions_alone(value: Float[np.ndarray, "s t"]) -> Command:
     return Command(constant(value), by_stroke, None)
 
 
-def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Beyond) -> Float[Array, " t"]:
+def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Base) -> Float[Array, " t"]:
     """Tendon drawn out at the base since the free robot (mm), with the file's stiffness."""
-    stretch = per_tendon(chain, base.stretch) + base_tension * chain.free_length
-    return per_tendon(chain, base.drawn) + stretch / chain.axial_stiffness
+    stretch = base.stretch + base_tension * chain.free_length
+    return base.drawn + stretch / chain.axial_stiffness
 
 
 def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
@@ -56,7 +55,7 @@ def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
         return reach
     for group in chain.groups:
         if isinstance(group, WallArc):
-            weights = fibre_stretch(constant(group.across))
+            weights = of_rod(chain.rods, fibre_stretch(constant(group.across)))
             slope = np.einsum("ntc,nic,ni->nt", weights, rods.basis[..., 0], rods.length)
             loss = np.asarray(group.present) * np.maximum(-slope * travel[:, None], 0.0)
             reach[list(group.numbers)] = loss.sum(axis=0)
@@ -69,7 +68,7 @@ def stroke_scale(chain: Chain) -> Float[Array, ""]:
 
 
 def command_residual(
-    chain: Chain, command: Command, base_tension: Float[Array, " t"], base: Beyond
+    chain: Chain, command: Command, base_tension: Float[Array, " t"], base: Base
 ) -> Float[Array, " t"]:
     """How far the tendons are from what is demanded, scaled to be comparable with angles.
 

@@ -15,8 +15,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import array_module, constant
+from notchflex.chain import bending_normal
 from notchflex.errors import InputError
-from notchflex.motion import rotation_about, unskew
+from notchflex.motion import IN_PLANE, PLANE, rotation_about, turned, unskew
 from notchflex.robot import Robot
 from notchflex.statics.external import BodyForce, ExternalLoad
 from notchflex.statics.load import LoadPath
@@ -36,10 +37,10 @@ class Applied(NamedTuple):
         following: Moment and force of what turns with a body, about its origin, in its frame.
     """
 
-    dead_force: Float[Array, "*s bodies 3"]
-    dead_moment: Float[Array, "*s bodies 3"]
-    dead_arm: Float[Array, "*s bodies 3 3"]
-    following: Float[Array, "*s bodies 6"]
+    dead_force: Float[Array, "*s bodies d"]
+    dead_moment: Float[Array, "*s bodies a"]
+    dead_arm: Float[Array, "*s bodies d d"]
+    following: Float[Array, "*s bodies w"]
 
 
 def applied(
@@ -79,7 +80,37 @@ def applied(
     return Applied(*(constant(np.stack(field)[step]) for field in zip(*sums, strict=True)))
 
 
-def body_wrench(rotation: Float[Array, "3 3"], one: Applied) -> Float[Array, " 6"]:
+def in_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
+    """Loads of space as those of the plane that x and z of a frame span."""
+    turn = np.asarray(frame)
+    arm = np.einsum("ia,...ij,jb->...ab", turn, loads.dead_arm, turn)
+    following = [np.asarray(loads.following)[..., part] @ turn for part in (_FIRST, _LAST)]
+    return Applied(
+        dead_force=constant((np.asarray(loads.dead_force) @ turn)[..., IN_PLANE]),
+        dead_moment=constant((np.asarray(loads.dead_moment) @ turn)[..., 1:2]),
+        dead_arm=constant(arm[..., IN_PLANE, :][..., IN_PLANE]),
+        following=constant(np.concatenate(following, axis=-1)[..., PLANE]),
+    )
+
+
+def out_of_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
+    """Loads of the plane that x and z of a frame span as those of space."""
+    turn = np.asarray(frame)
+    plane, about = turn[:, IN_PLANE], turn[:, 1]
+    following = np.asarray(loads.following) @ np.eye(6)[PLANE]
+    turned = [following[..., part] @ turn.T for part in (_FIRST, _LAST)]
+    return Applied(
+        dead_force=constant(np.asarray(loads.dead_force) @ plane.T),
+        dead_moment=constant(np.asarray(loads.dead_moment) * about),
+        dead_arm=constant(plane @ np.asarray(loads.dead_arm) @ plane.T),
+        following=constant(np.concatenate(turned, axis=-1)),
+    )
+
+
+_FIRST, _LAST = slice(0, 3), slice(3, 6)
+
+
+def body_wrench(rotation: Float[Array, "d d"], one: Applied) -> Float[Array, " w"]:
     """Wrench (moment, force) of the loads on one body, about its origin, in its frame.
 
     Args:
@@ -96,21 +127,13 @@ def body_wrench(rotation: Float[Array, "3 3"], one: Applied) -> Float[Array, " 6
     """
     xp = array_module(rotation, *one)
     # The vector of the skew part of p f^T is minus half of p x f.
-    moment = one.dead_moment @ rotation - 2.0 * unskew(one.dead_arm @ rotation)
+    moment = turned(rotation.T, one.dead_moment) - 2.0 * unskew(one.dead_arm @ rotation)
     return xp.concatenate([moment, one.dead_force @ rotation]) + one.following
 
 
 def is_unloaded(load_path: LoadPath) -> bool:
     """Whether nothing acts from outside in any step."""
     return all(external.is_nothing for external in dict.fromkeys(load_path.external))
-
-
-def bending_normal(robot: Robot) -> Float[np.ndarray, " 3"] | None:
-    """Normal of the plane in which all notches bend, in the base frame; None if there is none."""
-    direction = np.radians([notch.direction_deg for notch in robot.notches])
-    if (np.abs(np.sin(direction - direction[0])) > _ROUNDING).any():
-        return None
-    return np.array([-np.sin(direction[0]), np.cos(direction[0]), 0.0])
 
 
 def is_planar(load_path: LoadPath, robot: Robot) -> bool:
@@ -208,4 +231,4 @@ def _on_bodies(
     return sums
 
 
-__all__ = ["Applied", "applied", "bending_normal", "body_wrench", "is_planar", "is_unloaded"]
+__all__ = ["Applied", "applied", "body_wrench", "is_planar", "is_unloaded"]

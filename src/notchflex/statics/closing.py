@@ -14,8 +14,8 @@ from notchflex.robot import Robot
 from notchflex.statics.actuation import tensions_alone
 from notchflex.statics.edge_closing import edge_closing
 from notchflex.statics.newton import Settings
+from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import lips
-from notchflex.statics.stepping import at_rest
 
 # Where a tension of this many times the one that would close a linear notch does not close it,
 # it is said not to close.
@@ -60,7 +60,7 @@ def closing(robot: Robot) -> Closing:
         >>> print(f"{np.degrees(table.angle[0]):.2f} deg, {table.tension[0]:.3f} N")
         30.63 deg, 1.615 N
     """
-    chain = assemble(robot)
+    chain = assemble(robot, flat=False)
     rods = chain.rods
     travel, free = closing_travel(rods), free_angle(rods)
     height = np.asarray(rods.length.sum(-1))
@@ -70,9 +70,9 @@ def closing(robot: Robot) -> Closing:
     tendon = np.argmax(arm, axis=1)
     longest = arm[np.arange(len(arm)), tendon]
     if np.isfinite(travel).all():
-        tension, met = _tensions(chain, tendon, longest, travel), travel
+        tension, met = _tensions(prepared(robot), tendon, longest, travel), travel
     else:
-        tension, met = edge_closing(chain, tendon, longest)
+        tension, met = edge_closing(prepared(robot), tendon, longest)
     has_spine = np.isfinite(travel)
     elastic = np.where(has_spine, travel / height, np.nan)
     return Closing(
@@ -87,6 +87,8 @@ def closing(robot: Robot) -> Closing:
 def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
     """Lever of every tendon about the neutral axis of every notch in the free robot, mm.
 
+    The chain is one of space.
+
     Positive where it bends the notch toward its direction; 0 where it does not go.
     """
     place = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_place)[..., 0]
@@ -99,18 +101,18 @@ def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
 
 
 def _tensions(
-    chain: Chain,
+    ready: Prepared,
     tendon: np.ndarray,
     arm: Float[np.ndarray, " n"],
     travel: Float[np.ndarray, " n"],
 ) -> Float[np.ndarray, " n"]:
     """Base tension that closes every notch against its spine, pulling its own tendon."""
+    chain = ready.chain
     found = np.full(chain.flexures, np.nan)
     notches = np.flatnonzero((arm > 0.0) & (travel > 0.0))
     if len(notches) == 0:
         return found
     stiffness = np.asarray(chain.lip_stiffness)
-    rest = at_rest(chain)
 
     def pressed(tension: Float[np.ndarray, " m"], notch: Float[np.ndarray, " m"]) -> np.ndarray:
         # Always as many rows as notches, whichever are still searched: one compiled program.
@@ -118,7 +120,7 @@ def _tensions(
         rows = np.arange(chain.flexures)
         value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[which]] = np.resize(tension, chain.flexures)
-        force, gap, converged = lips(chain, tensions_alone(value), rest, Settings())
+        force, gap, converged = lips(ready, tensions_alone(value), ready.rest, Settings())
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
         return np.where(converged, overlap, np.nan)[: len(notch)]
 

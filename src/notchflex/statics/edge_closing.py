@@ -9,11 +9,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.chain import Chain
 from notchflex.statics.actuation import tensions_alone
 from notchflex.statics.newton import Settings
+from notchflex.statics.prepare import Prepared
 from notchflex.statics.run import run
-from notchflex.statics.stepping import at_rest
 
 # Steps of the first pull, up to so many times the tension that would close the softest notch if it
 # were linear and alone; what does not close by then is said not to close.
@@ -23,33 +22,33 @@ _ROUNDS = 4
 
 
 def edge_closing(
-    chain: Chain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
+    ready: Prepared, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Tension (N) that closes every notch, and its angle then (rad); NaN where none does.
 
     Args:
-        chain: The chain.
+        ready: The robot.
         tendon: Which tendon is pulled for each notch, from 0.
         arm: Its lever about the notch, mm.
     """
-    tension, angle = (np.full(chain.flexures, np.nan) for _ in range(2))
+    tension, angle = (np.full(ready.chain.flexures, np.nan) for _ in range(2))
     for number in np.unique(tendon):
         own = np.flatnonzero((tendon == number) & (arm > 0.0))
         if len(own):
-            tension[own], angle[own] = _by_one_tendon(chain, int(number), own)
+            tension[own], angle[own] = _by_one_tendon(ready, int(number), own)
     return tension, angle
 
 
 def _by_one_tendon(
-    chain: Chain, tendon: int, own: np.ndarray
+    ready: Prepared, tendon: int, own: np.ndarray
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
     # Two steps where one would do: one alone is another program to compile.
-    free, _ = _pull(chain, tendon, np.zeros(2))
+    free, _ = _pull(ready, tendon, np.zeros(2))
     reach = -free[0, own]  # the gap at rest: an edge so far from closing
     # Tendon and edges are about as far from the axis.
-    linear = np.asarray(chain.lip_stiffness)[own] * reach
+    linear = np.asarray(ready.chain.lip_stiffness)[own] * reach
     steps = np.linspace(0.0, _BEYOND_LINEAR * linear.max(), _STEPS + 1)
-    overlap, angle = _pull(chain, tendon, steps)
+    overlap, angle = _pull(ready, tendon, steps)
     touching = overlap[:, own] > 0.0
     closes = touching.any(axis=0)
     after = np.where(closes, touching.argmax(axis=0), 1)
@@ -60,7 +59,7 @@ def _by_one_tendon(
     for _ in range(_ROUNDS if closes.any() else 0):
         guess = np.where(closes, high - at_high * (high - low) / (at_high - at_low), steps[-1])
         order = np.argsort(guess)
-        pressed, angle = _pull(chain, tendon, guess[order])
+        pressed, angle = _pull(ready, tendon, guess[order])
         here = pressed[np.argsort(order), own]
         found_angle = angle[np.argsort(order), own]
         over = here > 0.0
@@ -70,13 +69,14 @@ def _by_one_tendon(
 
 
 def _pull(
-    chain: Chain, tendon: int, tensions: Float[np.ndarray, " s"]
+    ready: Prepared, tendon: int, tensions: Float[np.ndarray, " s"]
 ) -> tuple[Float[np.ndarray, "s n"], Float[np.ndarray, "s n"]]:
     """Overlap of every notch's edges (contact force / stiffness - gap, mm) and its angle (rad)."""
-    value = np.zeros((len(tensions), chain.tendons))
+    value = np.zeros((len(tensions), ready.chain.tendons))
     value[:, tendon] = tensions
-    came = run(chain, tensions_alone(value), at_rest(chain), Settings(), each_from_start=False)
-    state = came.quantities
-    overlap = np.asarray(state.contact_force) / np.asarray(chain.lip_stiffness) - state.gap
-    good = np.asarray(came.converged)[:, None]
-    return np.where(good, overlap, np.nan), np.where(good, state.notch_angle, np.nan)
+    came = run(ready, tensions_alone(value), ready.rest, Settings(), each_from_start=False)
+    stiffness = np.asarray(ready.chain.lip_stiffness)
+    overlap = came.quantity("contact_force") / stiffness - came.quantity("gap")
+    good = came.converged[:, None]
+    angle = came.quantity("notch_angle")
+    return np.where(good, overlap, np.nan), np.where(good, angle, np.nan)

@@ -9,13 +9,14 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from notchflex._jax import jax, jit, jnp
-from notchflex.chain import Chain, assemble, prepared
+from notchflex.chain import Chain, assemble
 from notchflex.contact import closing_travel, free_angle
 from notchflex.errors import InputError
 from notchflex.flexure import relative_pose
 from notchflex.motion import Motion
 from notchflex.robot import Robot
-from notchflex.statics.quantities import body_poses
+from notchflex.statics.prepare import prepared
+from notchflex.statics.walk import body_poses
 from notchflex.tendon.wall_arc import WallArc
 
 
@@ -51,7 +52,7 @@ def bodies_from_angles(
         )
     if not np.isfinite(angles).all():
         raise InputError("a notch angle is not finite; give angles in rad")
-    position, rotation = _bodies(prepared(robot), angles)
+    position, rotation = _bodies(prepared(robot, flat=False).chain, angles)
     return np.asarray(position), np.asarray(rotation)
 
 
@@ -74,7 +75,7 @@ def tip_from_angles(
     Example:
         >>> from notchflex import load_robot
         >>> position, _ = tip_from_angles(load_robot("pacheco2021-a"), np.zeros((1, 5)))
-        >>> position.tolist()
+        >>> position.round(9).tolist()
         [[0.0, 0.0, 10.0]]
     """
     position, rotation = bodies_from_angles(robot, notch_angle)
@@ -135,7 +136,7 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
     drawn = np.atleast_1d(np.asarray(stroke, float))
     if not np.isfinite(drawn).all():
         raise InputError("a stroke is not finite; give strokes in mm")
-    chain = assemble(robot)
+    chain = assemble(robot, flat=False)
     first = next(
         (g for g in chain.groups if isinstance(g, WallArc) and 0 in g.numbers),
         None,

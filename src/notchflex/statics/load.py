@@ -14,6 +14,8 @@ from notchflex.statics.given import number, shown, table, vector
 
 _FORM = "a number, or one entry per tendon with None where nothing is commanded"
 _TURN = "rotation vector, rad"
+_BASE_TURN = ("base_rotation", _TURN)
+_NO_TURN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,7 +50,7 @@ class Load(ExternalLoad):
 
     tension: float | Sequence[float | None] | None = None
     stroke: float | Sequence[float | None] | None = None
-    base_rotation: Sequence[float] = (0.0, 0.0, 0.0)
+    base_rotation: Sequence[float] = _NO_TURN
 
     def __repr__(self) -> str:
         """What is given, and nothing of what is not; tendons first."""
@@ -86,6 +88,12 @@ class LoadPath:
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
                 f"got {tension.shape} and {stroke.shape}"
             )
+        object.__setattr__(self, "tension", tension)
+        object.__setattr__(self, "stroke", stroke)
+        object.__setattr__(self, "base_rotation", base_rotation)
+        object.__setattr__(self, "external", _for_steps(self.external, len(tension)))
+        if tension.size and np.isnan(stroke).all() and 0.0 <= tension.min() < np.inf:
+            return  # nothing but tensions that a tendon can have
         if len(tension) == 0:
             raise InputError("a load path needs at least one step; got none")
         if np.isinf(tension).any() or np.isinf(stroke).any():
@@ -98,10 +106,6 @@ class LoadPath:
             raise InputError(
                 "tension and stroke are both given for one tendon in one step; give one of them"
             )
-        object.__setattr__(self, "tension", tension)
-        object.__setattr__(self, "stroke", stroke)
-        object.__setattr__(self, "base_rotation", base_rotation)
-        object.__setattr__(self, "external", _for_steps(self.external, len(tension)))
 
     def __len__(self) -> int:
         """Number of steps."""
@@ -144,6 +148,13 @@ class LoadPath:
             tension=np.concatenate([first.tension, second.tension]),
             stroke=np.concatenate([first.stroke, second.stroke]),
             external=self.external + following.external,
+        )
+
+    def part(self, start: int, steps: int) -> LoadPath:
+        """Some of its steps, from one on."""
+        own = slice(start, start + steps)
+        return replace(
+            self, tension=self.tension[own], stroke=self.stroke[own], external=self.external[own]
         )
 
     def loaded(
@@ -209,6 +220,22 @@ class LoadPath:
         )
 
 
+def joined_paths(paths: Sequence[LoadPath]) -> LoadPath:
+    """Paths for equally many tendons one after the other, as one.
+
+    Raises:
+        InputError: Their bases are turned differently.
+    """
+    if any((path.base_rotation != paths[0].base_rotation).any() for path in paths):
+        raise InputError("base_rotation must be the same for all paths of a batch")
+    return LoadPath(
+        np.concatenate([path.tension for path in paths]),
+        np.concatenate([path.stroke for path in paths]),
+        paths[0].base_rotation,
+        tuple(external for path in paths for external in path.external),
+    )
+
+
 def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     """Bring loads of any form to one path for a robot of so many tendons.
 
@@ -235,7 +262,10 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     for load in every:
         if not isinstance(load, Load):
             raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
-    turns = {vector(load.base_rotation, "base_rotation", _TURN) for load in every}
+    turns = {
+        _NO_TURN if load.base_rotation is _NO_TURN else vector(load.base_rotation, *_BASE_TURN)
+        for load in every
+    }
     if len(turns) > 1:
         raise InputError("base_rotation must be the same for all loads of a path")
     return LoadPath(
@@ -287,4 +317,4 @@ def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
     return entries
 
 
-__all__ = ["Load", "LoadPath", "load_path"]
+__all__ = ["Load", "LoadPath", "joined_paths", "load_path"]

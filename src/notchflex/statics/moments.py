@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
 from notchflex.contact.spine import SpineLips
-from notchflex.flexure import Rod, fibre_stretch
+from notchflex.flexure import Rod, fibre_stretch, of_rod
 from notchflex.flexure.shape import node_poses, relative_pose, rod_end
 from notchflex.motion import Motion
 from notchflex.statics.element import Unknowns
@@ -25,11 +25,12 @@ _NOTHING = 1e-12
 
 def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, ""]:
     """Largest imbalance of bending moment at any node, over the largest moment."""
-    bending = np.array([0, 1])
+    # Bending about x and y in space, about y in the plane.
+    bending = np.array([0, 1]) if chain.frame is None else np.array([0])
     internal = at.flexure.resultants[..., bending]
     required = _along_wall(chain, unknowns, at)
-    if at.result.wrench is not None:
-        required = required + jax.vmap(_required)(chain.rods, unknowns.modes, at.result.wrench)
+    if at.wrenches is not None:
+        required = required + jax.vmap(_required)(chain.rods, unknowns.modes, at.wrenches.whole)
     counts = (chain.rods.length > 0.0)[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
     error = jnp.max(jnp.abs(internal - required[..., bending]) * counts * carried)
@@ -40,8 +41,8 @@ def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Arra
 
 
 def _required(
-    rod: Rod, modes: Float[Array, " modes"], wrench: Float[Array, " 6"]
-) -> Float[Array, "nodes 6"]:
+    rod: Rod, modes: Float[Array, " modes"], wrench: Float[Array, " w"]
+) -> Float[Array, "nodes w"]:
     """Wrench on all that is beyond each node, about the node, along its section's axes."""
     body, nodes = relative_pose(rod, modes), node_poses(rod, modes)
     if rod.small is not None:
@@ -71,14 +72,15 @@ def _free_nodes(rod: Rod) -> Motion:
     return jax.vmap(start.then)(Motion(rod.node_rotation, rod.node_offset))
 
 
-def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, "n nodes 6"]:
+def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, "n nodes w"]:
     """What tendons and lips that act along the wall ask of every section."""
-    acting = jnp.zeros((chain.flexures, 6))
-    for group, crossing in zip(chain.groups, at.result.crossings, strict=True):
+    acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
+    for group, span in zip(chain.groups, at.spans, strict=True):
         if isinstance(group, WallArc):
-            weights = fibre_stretch(group.across)
-            acting = acting - jnp.einsum("nt,ntc->nc", crossing.gap_tension, weights)
+            weights = of_rod(chain.rods, fibre_stretch(group.across))
+            acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
     for group, force in zip(chain.lips, unknowns.lip_force, strict=True):
         if isinstance(group, SpineLips):
-            acting = acting + (force * group.closes) * fibre_stretch(chain.rods.lip)
+            lip = of_rod(chain.rods, fibre_stretch(chain.rods.lip))
+            acting = acting + (force * group.closes) * lip
     return jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import dataclasses
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 from jax.flatten_util import ravel_pytree
@@ -34,6 +35,16 @@ class Settings(eqx.Module):
     max_load_steps: int = 200
     smallest_load_step: float = 1e-5
     max_all_iterations: int = 800
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """All of them in order."""
+        return tuple(getattr(self, one.name) for one in dataclasses.fields(self))
+
+    @classmethod
+    def of(cls, numbers: Float[Array, " settings"]) -> Settings:
+        """Settings of a compiled program, from all numbers in order."""
+        return cls(*cast("list[Any]", [numbers[i] for i in range(len(numbers))]))
 
 
 class Point(NamedTuple):
@@ -134,7 +145,7 @@ def newton(
         point = jax.tree.map(lambda at, by: at + search.part * by, best.point, search.step)
         at = evaluate(chain, point.unknowns, memory, point.base_tension, command.applied)
         demand = command_residual(chain, command, point.base_tension, at.base)
-        residual = ravel_pytree((at.result.residual, demand))[0]
+        residual = ravel_pytree((at.residual, demand))[0]
         largest, size = jnp.max(jnp.abs(residual)), jnp.linalg.norm(residual)
         unlimited = (best.iterations < _UNLIMITED) & (best.residual >= _ROUNDING * tolerance)
         better = (size <= search.allowed) | (unlimited & jnp.isfinite(size))
@@ -143,8 +154,8 @@ def newton(
         solved = taken & (largest < tolerance)
         found = NewtonResult(
             point=point,
-            slid=at.result.slid,
-            bound=at.result.bound,
+            slid=tuple(span.slid for span in at.spans),
+            bound=tuple(span.bound for span in at.spans),
             stroke=stroke(chain, point.base_tension, at.base),
             residual=largest,
             iterations=best.iterations + 1,
@@ -161,7 +172,7 @@ def newton(
             early = (
                 jnp.any(command.by_stroke) & (best.iterations < _PLAYED) & (largest > _PLAYED_ABOVE)
             )
-            limits = memory._replace(bound=at.result.bound)
+            limits = memory._replace(bound=found.bound)
 
             def contacts_put() -> Step:
                 return _contacts_put(chain, command, limits, before, point, step, whole, by_turn)

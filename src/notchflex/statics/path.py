@@ -15,8 +15,9 @@ from notchflex.chain import Chain
 from notchflex.motion import rotation_about
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command, drawn_when_closed
-from notchflex.statics.applied import applied
+from notchflex.statics.applied import applied, in_frame, out_of_frame
 from notchflex.statics.load import LoadPath
+from notchflex.statics.prepare import Prepared
 from notchflex.statics.run import Run, stability
 from notchflex.statics.state import State
 from notchflex.statics.stepping import Solved
@@ -30,7 +31,7 @@ class ConvergenceError(RuntimeError):
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
 # A state whose moments are off by this part of the largest is none.
-_MODES_FAIL = 0.5
+MODES_FAIL = 0.5
 # Log ratios this close to their bound are on it.
 _NEAR_BOUND = 1e-9
 
@@ -46,16 +47,21 @@ class Path:
     Attributes:
         robot: The robot.
         load: The loads.
-        chain: The robot as arrays.
+        prepared: The robot as arrays.
         run: What the solver returned, as arrays.
         each_from_rest: Whether every state starts from the same one, not from its neighbour.
     """
 
     robot: Robot
     load: LoadPath
-    chain: Chain
+    prepared: Prepared
     run: Run
     each_from_rest: bool = False
+
+    @property
+    def chain(self) -> Chain:
+        """The robot as arrays."""
+        return self.prepared.chain
 
     def __len__(self) -> int:
         """Number of steps."""
@@ -84,7 +90,7 @@ class Path:
         return self.load.stroke
 
     def _of(self, name: str) -> np.ndarray:
-        return np.asarray(getattr(self.run.quantities, name))
+        return np.asarray(self.run.quantity(name))
 
     @property
     def tension(self) -> np.ndarray:
@@ -228,9 +234,13 @@ class Path:
         ratio, bound = self.contact_log_ratio, self.contact_bound
         there = ~np.isnan(ratio)
         rubs = there & (bound > 0.0)
-        # A contact without friction (a law may lay it all on one edge of a gap) is passed over.
+        # A contact without friction (a law may lay it all on one edge of a gap) is passed over, and
+        # one that hardly turns its tendon. Where none does more, all have gone the same way.
+        counts = rubs & (bound > _NEAR_BOUND)
         turned = (ratio < 0.0) & (ratio <= _NEAR_BOUND - bound)
-        waits = rubs & ~turned
+        let_go = np.nansum(ratio, axis=-1, keepdims=True) < 0.0
+        nothing = ~counts.any(axis=-1, keepdims=True)
+        waits = np.where(nothing, rubs & ~let_go, counts & ~turned)
         every = np.where(rubs.any(axis=-1), there.sum(axis=-1), 0)
         count = np.where(waits.any(axis=-1), waits.argmax(axis=-1), every)
         at_front = np.minimum(count, ratio.shape[-1] - 1)[..., None]
@@ -282,7 +292,7 @@ class Path:
         """Force integrated over length by the trapezoid rule, from the state before on."""
         pairs = []
         for name in (force, length):
-            after, first = self._of(name), np.asarray(getattr(self.run.before, name))[None]
+            after, first = self._of(name), self.run.before(name)[None]
             earlier = np.broadcast_to(first, after.shape)
             if not self.each_from_rest:
                 earlier = np.concatenate([first, after[:-1]])
@@ -312,7 +322,7 @@ class Path:
     def converged(self) -> np.ndarray:
         """Whether a step was solved, within what friction law and strain modes hold for, (s,)."""
         solved = np.asarray(self.run.converged)
-        holds = self._of("friction_holds") & (self.moment_error < _MODES_FAIL)
+        holds = self._of("friction_holds") & (self.moment_error < MODES_FAIL)
         return solved & (holds | ~solved)
 
     @property
@@ -336,7 +346,6 @@ class Path:
         if not self.run.tried[step]:
             failed = int(np.argmin(self.converged))
             return f"not tried, because step {failed + 1} of the path did not converge"
-        state = self.run.quantities
         if self.run.converged[step] and self._of("friction_holds")[step]:
             return (
                 "the strain modes miss the moment of the loads by "
@@ -348,8 +357,8 @@ class Path:
                 "a tendon turns so sharply at an edge that its friction would hold any pull "
                 "(coefficient * tan(turning / 2) is 1 or more), where the friction law says nothing"
             )
-        tension = ", ".join(f"{value:.4g}" for value in np.asarray(state.tension)[step])
-        drawn = ", ".join(f"{value:.4g}" for value in np.asarray(state.stroke)[step])
+        tension = ", ".join(f"{value:.4g}" for value in self.tension[step])
+        drawn = ", ".join(f"{value:.4g}" for value in self.stroke[step])
         last = f"the last good state has tension {tension} N and stroke {drawn} mm"
         opening = np.asarray(self.chain.rods.length).sum(axis=-1)
         all_closed = (self.gap[step] < _NEARLY_CLOSED * opening).all()
@@ -375,7 +384,7 @@ class Path:
     @cached_property
     def _stability(self) -> tuple[np.ndarray, np.ndarray]:
         value, sign = stability(
-            self.chain, command(self.load, self.robot, self.chain), self.run.solved
+            self.prepared, command(self.load, self.robot, self.chain), self.run.solved
         )
         return np.asarray(value), np.asarray(sign)
 
@@ -396,6 +405,8 @@ class Path:
         """State after a step (or the last good one before it), to save or continue from."""
         solved: Solved = tree_util.tree_map(lambda leaf: np.asarray(leaf)[step], self.run.solved)
         chain = self.chain
+        if solved.applied is not None and chain.frame is not None:
+            solved = solved._replace(applied=out_of_frame(solved.applied, chain.frame))
         return State(self.robot.name, solved, chain.level, chain.loaded, chain.refinement)
 
     @property
@@ -432,7 +443,7 @@ class Equilibrium:
 
     def __getattr__(self, name: str) -> Any:
         """A quantity of the path, at this step."""
-        if name.startswith("_") or name in {"run", "before", "chain", "load", "each_from_rest"}:
+        if name.startswith("_") or name in {"run", "prepared", "chain", "load", "each_from_rest"}:
             raise AttributeError(name)
         value = getattr(self._path, name)
         if isinstance(value, tuple):  # such as the friction front, m and eta
@@ -468,6 +479,8 @@ def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
             np.asarray(chain.body_centre),
             np.asarray(chain.body_length),
         )
+        if chain.frame is not None:
+            others = in_frame(others, chain.frame)
     return Command(constant(value), cast("Array", by_stroke), others)
 
 

@@ -4,35 +4,77 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
-from notchflex.flexure import FlexureState, relative_pose
-from notchflex.motion import Motion, identity, wrenches_at
+from notchflex.flexure import FlexureState, in_space, relative_pose
+from notchflex.motion import IN_PLANE, Motion, wrench_at
 from notchflex.statics.applied import Applied, body_wrench
 from notchflex.statics.element import Unknowns, at_bound
 from notchflex.statics.moments import moment_error
 from notchflex.statics.newton import Point
+from notchflex.statics.packing import Form
 from notchflex.statics.stepping import Solved
-from notchflex.statics.walk import Evaluation, evaluate, per_tendon
-from notchflex.tendon import Crossing
+from notchflex.statics.walk import Evaluation, body_poses, evaluate, per_tendon
 
 
-class Quantities(NamedTuple):
-    """One state, or with a leading axis many. Units mm, N, N mm, rad; t tendons, n flexures.
+class Shape(NamedTuple):
+    """The shape of one state and whether it may be believed, or with a leading axis of many.
 
-    Spans of a tendon are in the order proximal, gap 1, body 1, gap 2, ... of the gaps and bodies
-    that it runs through, contacts in the order of the edges between them; NaN beyond its end.
+    Units mm, N, rad; t tendons, n flexures; poses in the frame of the base.
     """
 
     tension: Float[Array, "*s t"]
     stroke: Float[Array, "*s t"]
     notch_angle: Float[Array, "*s n"]
-    chord_angle: Float[Array, "*s n"]
     body_position: Float[Array, "*s bodies 3"]
     body_rotation: Float[Array, "*s bodies 3 3"]
     tip_position: Float[Array, "*s 3"]
+    friction_holds: Bool[Array, "*s"]
+    moment_error: Float[Array, "*s"]
+
+    @staticmethod
+    def form(flexures: int, tendons: int) -> Form:
+        """How it is packed for a robot of so many flexures and tendons."""
+        bodies = flexures + 1
+        shapes = ((tendons,), (tendons,), (flexures,), (bodies, 3), (bodies, 3, 3), (3,), ())
+        numbers = [np.zeros(shape) for shape in shapes]
+        return Form.of(Shape(*numbers[:6], np.zeros((), bool), numbers[6]))  # pyright: ignore
+
+
+def shape(chain: Chain, solved: Solved) -> Shape:
+    """The shape of a solved state."""
+    point = solved.point
+    at = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
+    relative = at.flexure.pose  # None where the balance did not ask for it
+    if relative is None:
+        relative = jax.vmap(relative_pose)(chain.rods, point.unknowns.modes)
+    bodies = _in_space(chain, body_poses(relative))
+    last = jax.tree.map(lambda leaf: leaf[-1], bodies)
+    turning = _turning(chain, at)
+    return Shape(
+        tension=point.base_tension,
+        stroke=solved.stroke,
+        notch_angle=notch_angles(bodies, chain),
+        body_position=bodies.translation,
+        body_rotation=bodies.rotation,
+        tip_position=last.point(jnp.array([0.0, 0.0, 1.0]) * chain.body_length[-1]),
+        friction_holds=jnp.all(chain.friction.valid(turning[0], turning[1])),
+        moment_error=moment_error(chain, point.unknowns, at),
+    )
+
+
+class Quantities(NamedTuple):
+    """What else is told of one state, or with a leading axis of many.
+
+    Units mm, N, N mm, rad; t tendons, n flexures. Spans of a tendon are in the order proximal,
+    gap 1, body 1, gap 2, ... of the gaps and bodies that it runs through, contacts in the order of
+    the edges between them; NaN beyond its end.
+    """
+
+    chord_angle: Float[Array, "*s n"]
     span_tension: Float[Array, "*s t spans"]
     notch_moment: Float[Array, "*s n"]
     outer_strain: Float[Array, "*s n"]
@@ -44,62 +86,50 @@ class Quantities(NamedTuple):
     contact_bound: Float[Array, "*s t contacts"]
     contact_turning: Float[Array, "*s t contacts"]
     contact_state: Int[Array, "*s t contacts"]
-    friction_holds: Bool[Array, "*s"]
     base_force: Float[Array, "*s 3"]
     base_moment: Float[Array, "*s 3"]
-    moment_error: Float[Array, "*s"]
     stored_energy: Float[Array, "*s"]
 
 
+def _turning(chain: Chain, at: Evaluation) -> tuple[Array, Array]:
+    """Turning angles at both edges of all gaps; 0 where a tendon has no contact."""
+    visited = per_tendon(chain, tuple(group.visits for group in chain.groups)) > 0.0
+    angles = [(s.crossing.exit_turning, s.crossing.entry_turning) for s in at.spans]
+    first, second = _each(chain, angles)
+    return jnp.where(visited, first, 0.0), jnp.where(visited, second, 0.0)
+
+
 def quantities(chain: Chain, solved: Solved) -> Quantities:
-    """Everything that is reported of a solved state, in the frame of the base.
+    """Everything else that is reported of a solved state, in the frame of the base.
 
     Slid lengths, stroke and energy use the robot file's axial stiffness of the tendon; the
     finite one of the memory only decides what sticks.
     """
     point = solved.point
     at = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
-    flexure, crossings = at.flexure, at.result.crossings
-    relative = flexure.pose  # None where the balance did not ask for it
-    if relative is None:
-        relative = jax.vmap(relative_pose)(chain.rods, point.unknowns.modes)
-    bodies = body_poses(relative)
-    last = jax.tree.map(lambda leaf: leaf[-1], bodies)
-    gap_tension, body_tension = _edges(chain, crossings, "gap_tension", "body_tension")
-    visited = per_tendon(chain, tuple(group.visits for group in chain.groups)) > 0.0
-    turning = tuple(
-        jnp.where(visited, angle, 0.0)
-        for angle in _edges(chain, crossings, "exit_turning", "entry_turning")
-    )
+    flexure = at.flexure
+    gap_tension, body_tension = _each(chain, [(s.gap_tension, s.body_tension) for s in at.spans])
+    turning = _turning(chain, at)
     body_length = per_tendon(chain, tuple(group.body_length for group in chain.groups))
     compliance = jnp.broadcast_to(1.0 / chain.axial_stiffness, gap_tension.shape)
-    drawn = per_tendon(chain, at.beyond.drawn)
-    stretch = per_tendon(chain, at.beyond.stretch)
+    drawn, stretch = _each(chain, [(s.drawn, s.stretch) for s in at.spans])
+    drawn_behind, stretch_behind = _each(
+        chain, [(s.drawn_behind, s.stretch_behind) for s in at.spans]
+    )
     at_entry = drawn + (stretch + body_tension * body_length) * compliance
-    at_exit = (
-        per_tendon(chain, at.result.behind.drawn)
-        + per_tendon(chain, at.result.behind.stretch) * compliance
-    )
-    log_ratio, bound = (
-        [per_tendon(chain, tuple(leaf[..., edge] for leaf in grouped)) for edge in (0, 1)]
-        for grouped in (point.unknowns.log_ratio, at.result.bound)
-    )
+    at_exit = drawn_behind + stretch_behind * compliance
+    log_ratio = _each(chain, [(own[..., 0], own[..., 1]) for own in point.unknowns.log_ratio])
+    bound = _each(chain, [(s.bound[..., 0], s.bound[..., 1]) for s in at.spans])
     contact = along_contacts(chain, log_ratio[0], log_ratio[1])
     limit = along_contacts(chain, bound[0], bound[1])
     spans = _along(chain, gap_tension, body_tension)[:, :-1]
-    curvature = flexure.strain[..., 1]
+    curvature = in_space(flexure.strain)[..., 1]
     section = chain.rods.section
     farthest = jnp.maximum(section.edge_spine, section.edge_near)
     contact_force, gap = notch_lips(chain, point.unknowns, at)
     base = base_wrench(chain, point.base_tension, at, solved.applied)
     return Quantities(
-        tension=point.base_tension,
-        stroke=solved.stroke,
-        notch_angle=notch_angles(bodies, chain),
         chord_angle=_chords(chain, flexure),
-        body_position=bodies.translation,
-        body_rotation=bodies.rotation,
-        tip_position=last.point(jnp.array([0.0, 0.0, 1.0]) * chain.body_length[-1]),
         span_tension=jnp.concatenate([point.base_tension[:, None], spans], axis=1),
         notch_moment=largest_moment(flexure),
         outer_strain=jnp.max(curvature * section.edge_spine, axis=-1),
@@ -111,10 +141,8 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
         contact_bound=limit,
         contact_turning=along_contacts(chain, turning[0], turning[1]),
         contact_state=at_bound(contact, limit),
-        friction_holds=jnp.all(chain.friction.valid(turning[0], turning[1])),
         base_force=base[3:],
         base_moment=base[:3],
-        moment_error=moment_error(chain, point.unknowns, at),
         stored_energy=_stored_energy(chain, point, at, gap_tension, body_tension),
     )
 
@@ -125,15 +153,15 @@ def notch_lips(
     """Contact force and what is left of the narrowest opening of every notch (N, mm)."""
     force = jnp.zeros(chain.flexures)
     gap = jnp.full(chain.flexures, jnp.inf)
-    for group, own, left in zip(chain.lips, unknowns.lip_force, at.result.gap, strict=True):
+    for group, own, touch in zip(chain.lips, unknowns.lip_force, at.touches, strict=True):
         force = force + jnp.sum(own * group.closes, axis=-1)
-        gap = jnp.minimum(gap, jnp.min(jnp.where(group.closes > 0.0, left, jnp.inf), axis=-1))
+        gap = jnp.minimum(gap, jnp.min(jnp.where(group.closes > 0.0, touch.gap, jnp.inf), axis=-1))
     return force, jnp.where(jnp.isinf(gap), jnp.nan, gap)
 
 
 def largest_moment(flexure: FlexureState) -> Float[Array, " n"]:
     """Bending moment in the plane of each notch, the largest along it, with its sign."""
-    moment = flexure.resultants[..., 1]
+    moment = in_space(flexure.resultants)[..., 1]
     where = jnp.argmax(jnp.abs(moment), axis=-1)
     return jnp.take_along_axis(moment, where[:, None], axis=-1)[:, 0]
 
@@ -145,16 +173,17 @@ def base_wrench(
 
     It balances the loads, and the drives' pull on the tendons where they enter the base.
     """
-    acting = jnp.zeros(6) if at.base.wrench is None else at.base.wrench
-    for handed_back in (*at.base.reaction, *at.base.pressed):
-        if not isinstance(handed_back, tuple):
-            acting = acting + jnp.sum(handed_back, axis=0)
-    if applied is not None:
+    acting = jnp.zeros(6)
+    if applied is not None and at.base.load is not None:
         on_base = jax.tree.map(lambda leaf: leaf[0], applied)
-        acting = acting + body_wrench(jnp.eye(3), on_base)
+        acting = in_space(
+            at.base.load + body_wrench(jnp.eye(on_base.dead_force.shape[-1]), on_base)
+        )
+        if chain.frame is not None:
+            acting = (chain.frame @ acting.reshape(2, 3, 1)).reshape(6)
     # What the drives pull on the tendons with.
     pulled = base_tension[:, None] * jnp.array([[0.0, 0.0, -1.0]])
-    return -acting - jnp.sum(wrenches_at(chain.tendon_place, pulled), axis=0)
+    return -acting - jnp.sum(jax.vmap(wrench_at)(chain.tendon_place, pulled), axis=0)
 
 
 def notch_angles(bodies: Motion, chain: Chain) -> Float[Array, " n"]:
@@ -185,7 +214,9 @@ def _stored_energy(
 ) -> Float[Array, ""]:
     """Energy of the flexures and of stretched tendons, N mm."""
     flexure = at.flexure
-    density = jax.vmap(jax.vmap(chain.law.energy))(flexure.strain, chain.rods.section, chain.memory)
+    density = jax.vmap(jax.vmap(chain.law.energy))(
+        in_space(flexure.strain), chain.rods.section, chain.memory
+    )
     natural_gap = per_tendon(chain, tuple(group.natural_gap for group in chain.groups))
     body_length = per_tendon(chain, tuple(group.body_length for group in chain.groups))
     visits = per_tendon(chain, tuple(group.visits for group in chain.groups))
@@ -198,15 +229,21 @@ def _stored_energy(
     )
 
 
-def _edges(
-    chain: Chain, crossings: tuple[Crossing, ...], at_exit: str, at_entry: str
-) -> tuple[Float[Array, "n t"], Float[Array, "n t"]]:
-    """Values of every tendon at the two edges of every gap."""
-    first, second = (
-        per_tendon(chain, tuple(getattr(crossing, name) for crossing in crossings))
-        for name in (at_exit, at_entry)
-    )
-    return first, second
+def _each(chain: Chain, pairs: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Pairs of values per group, each of the two in the order of the robot's tendons."""
+    first, second = zip(*pairs, strict=True)
+    return per_tendon(chain, first), per_tendon(chain, second)
+
+
+def _in_space(chain: Chain, poses: Motion) -> Motion:
+    """Poses in the frame of the base, of a chain that may be flat."""
+    if chain.frame is None:
+        return poses
+    frame = chain.frame
+    plane = frame[:, IN_PLANE]
+    about = frame[:, 1:2]
+    rotation = plane @ poses.rotation @ plane.T + (about @ about.T)[None]
+    return Motion(rotation, poses.translation @ plane.T)
 
 
 def _along(
@@ -226,15 +263,3 @@ def along_contacts(
 ) -> Float[Array, "t contacts"]:
     """Values at the contacts of each tendon, base to tip; NaN beyond its end."""
     return _along(chain, exit_value, entry_value)[:, :-1]
-
-
-def body_poses(relative: Motion) -> Motion:
-    """Poses of bodies 0 to n in the frame of the base, from the poses between neighbours."""
-
-    def outward(pose: Motion, step: Motion) -> tuple[Motion, Motion]:
-        following = pose.then(step)
-        return following, following
-
-    start = identity()
-    _, poses = jax.lax.scan(outward, start, relative)
-    return jax.tree.map(lambda first, rest: jnp.concatenate([first[None], rest]), start, poses)

@@ -1,34 +1,39 @@
-"""The compiled programs: a path of loads with memory, and many loads each from rest.
+"""The compiled programs: a path of loads with memory, or many loads each from rest.
 
-Compiled once for a shape (number of flexures, modes and tendons, and which laws); a new load or
-a new robot of the same shape runs the same program. The number of loads is rounded up to one of
-few sizes, so that it hardly ever asks for a new program; loads added so are skipped.
+Compiled once for a form (number of flexures, modes and tendons, and which laws); a new load or a
+new robot of the same form runs the same program. The number of loads is rounded up to one of few
+sizes, so that it hardly ever asks for a new program; loads added so are skipped. What is asked of
+the states beyond their shape is another program, run when it is asked for.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jit, jnp
-from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
-from notchflex.statics.quantities import Quantities, notch_lips, quantities
+from notchflex.statics.packing import Form
+from notchflex.statics.prepare import Prepared
+from notchflex.statics.quantities import Quantities, Shape, notch_lips, quantities, shape
 from notchflex.statics.stability import held_stiffness
-from notchflex.statics.stepping import Advance, Solved, advance
+from notchflex.statics.stepping import Solved, advance
 from notchflex.statics.walk import evaluate
 
+# Numbers of loads that programs are compiled for: a solve, a usual path, and longer ones.
+_SIZES = (1, 128, 4096)
+# Beside state and shape: residual, iterations, converged, tried, reached.
+_TOLD = 5
 
-class Run(NamedTuple):
+
+class Run:
     """States of many loads, loads as leading axis.
 
     Attributes:
-        solved: The last solved state at each load: its own, or as far as it could be followed.
-        before: What is reported of the state before the first load, without leading axis.
-        quantities: What is reported of each state.
         residual: Largest scaled imbalance of the last attempt.
         iterations: Newton iterations.
         converged: Whether the load was reached.
@@ -36,29 +41,70 @@ class Run(NamedTuple):
         reached: Part of the way from the load before that was reached.
     """
 
-    solved: Solved
-    before: Quantities
-    quantities: Quantities
-    residual: Float[Array, " s"]
-    iterations: Int[Array, " s"]
-    converged: Bool[Array, " s"]
-    tried: Bool[Array, " s"]
-    reached: Float[Array, " s"]
+    def __init__(
+        self, prepared: Prepared, start: np.ndarray, table: np.ndarray, count: int
+    ) -> None:
+        """Take what the program returned, of which the first rows count."""
+        self._prepared, self._first, self._table, self._count = prepared, start, table, count
+        told = table[:count, -_TOLD:]
+        self.residual: Float[np.ndarray, " s"] = told[:, 0]
+        self.iterations: Int[np.ndarray, " s"] = told[:, 1].astype(int)
+        self.converged: Bool[np.ndarray, " s"] = told[:, 2] != 0.0
+        self.tried: Bool[np.ndarray, " s"] = told[:, 3] != 0.0
+        self.reached: Float[np.ndarray, " s"] = told[:, 4]
 
+    @cached_property
+    def solved(self) -> Solved:
+        """The last solved state at each load: its own, or as far as it could be followed."""
+        return self._prepared.state.unpack(self._table[: self._count, : self._prepared.state.size])
 
-# Numbers of loads that programs are compiled for: a solve, a usual path, and longer ones.
-_SIZES = (1, 128, 4096)
+    @cached_property
+    def _shape(self) -> Shape:
+        size = self._prepared.state.size
+        return self._prepared.shape.unpack(self._table[: self._count, size:-_TOLD])
+
+    @cached_property
+    def _more(self) -> tuple[Quantities, Quantities]:
+        """What is reported of each state, and of the one before the first."""
+        states = self._table[:, : self._prepared.state.size]
+        every = _quantities(
+            self._prepared.vector,
+            np.concatenate([states, self._first[None]]),
+            self._prepared.chain_form,
+            self._prepared.state,
+        )
+        every = jax.tree.map(np.asarray, every)
+        return (
+            jax.tree.map(lambda leaf: leaf[: self._count], every),
+            jax.tree.map(lambda leaf: leaf[-1], every),
+        )
+
+    def quantity(self, name: str) -> np.ndarray:
+        """What is reported of each state, by its name in `Shape` or `Quantities`."""
+        return getattr(self._shape if name in Shape._fields else self._more[0], name)
+
+    def before(self, name: str) -> np.ndarray:
+        """A quantity of the state before the first load; of the shape only tension and stroke."""
+        if name not in ("tension", "stroke"):
+            return np.asarray(getattr(self._more[1], name))
+        start: Solved = self._prepared.state.unpack(self._first)
+        return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
 
 def run(
-    chain: Chain, commands: Command, start: Solved, settings: Settings, *, each_from_start: bool
+    prepared: Prepared,
+    commands: Command,
+    start: Solved | None,
+    settings: Settings,
+    *,
+    each_from_start: bool,
 ) -> Run:
     """Follow loads, each from the state before or each from the same one.
 
     Args:
-        chain: The chain.
+        prepared: The robot.
         commands: The loads, as leading axis.
-        start: The state before the first.
+        start: The state before the first; rest where None.
         settings: How hard to try.
         each_from_start: Whether every load starts from `start`.
 
@@ -66,21 +112,27 @@ def run(
         One entry per load.
     """
     count = len(commands.value)
-    padded = _pad(commands)
-    wanted = np.arange(len(padded.value)) < count
-    came = _run(chain, padded, wanted, start, settings, np.asarray(each_from_start))
-    before = jax.tree.map(np.asarray, came.before)
-    came = came._replace(before=())
-    return jax.tree.map(lambda leaf: np.asarray(leaf)[:count], came)._replace(before=before)
+    form = prepared.command
+    packed = form.pack(commands, leading=1)
+    size = next((size for size in _SIZES if size >= count), -(-count // _SIZES[-1]) * _SIZES[-1])
+    if size > count:
+        packed = packed[np.minimum(np.arange(size), count - 1)]
+    first = prepared.rest_vector if start is None else prepared.state.pack(start)
+    options = np.array([*settings.numbers, float(each_from_start), float(count)])
+    forms = (prepared.chain_form, form, prepared.state)
+    table = np.asarray(_follow(prepared.vector, packed, first, options, *forms))
+    return Run(prepared, first, table, count)
 
 
-def stability(chain: Chain, commands: Command, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
+def stability(
+    prepared: Prepared, commands: Command, solved: Solved
+) -> tuple[np.ndarray, np.ndarray]:
     """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
     count = len(commands.value)
-    padded = _pad(commands)
-    wanted = np.arange(len(padded.value)) < count
-    stiffness, sign = _stability(chain, padded, _pad(solved), wanted)
-    held = np.asarray(stiffness)[:count]
+    stiffness, sign = _stability(prepared.chain, _pad(commands), _pad(solved), np.array(count))
+    # Modes that only fill up the arrays are none of the robot's.
+    own = np.flatnonzero(np.asarray(prepared.chain.rods.idle).ravel() == 0.0)
+    held = np.asarray(stiffness)[:count][:, own[:, None], own]
     whole = np.isfinite(held).all(axis=(1, 2))
     eigenvalue = np.full(count, np.nan)
     eigenvalue[whole] = np.real(np.linalg.eigvals(held[whole])).min(axis=-1)
@@ -88,7 +140,7 @@ def stability(chain: Chain, commands: Command, solved: Solved) -> tuple[np.ndarr
 
 
 def lips(
-    chain: Chain, commands: Command, start: Solved, settings: Settings
+    prepared: Prepared, commands: Command, start: Solved, settings: Settings
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Contact forces (N) and gaps (mm) of all notches, each load from the same state.
 
@@ -98,13 +150,13 @@ def lips(
     Returns:
         Contact forces and gaps, loads by notches, and which loads converged.
     """
-    force, gap, converged = _lips(chain, commands, start, settings)
+    force, gap, converged = _lips(prepared.chain, commands, start, settings)
     return np.asarray(force), np.asarray(gap), np.asarray(converged)
 
 
 @jit
 def _lips(
-    chain: Chain, commands: Command, start: Solved, settings: Settings
+    chain: Any, commands: Command, start: Solved, settings: Settings
 ) -> tuple[Array, Array, Array]:
     def at_lips(command: Command) -> tuple[Array, Array, Array]:
         came = advance(chain, command, start, settings)
@@ -126,67 +178,67 @@ def _pad(tree: Any) -> Any:
     return jax.tree.map(lambda leaf: np.asarray(leaf)[index], tree)
 
 
-@jit
-def _run(
-    chain: Chain,
-    commands: Command,
-    wanted: Bool[Array, " s"],
-    start: Solved,
-    settings: Settings,
-    each_from_start: Bool[Array, ""],
-) -> Run:
-    def follow(
-        state: tuple[Solved, Array], item: tuple[Command, Array]
-    ) -> tuple[tuple[Solved, Array], tuple[Advance, Array]]:
+@partial(jit, static_argnums=(4, 5, 6))
+def _follow(
+    vector: Float[Array, " chain"],
+    commands: Float[Array, "s command"],
+    start: Float[Array, " state"],
+    options: Float[Array, " options"],
+    chain_form: Form,
+    command_form: Form,
+    state_form: Form,
+) -> Float[Array, "s told"]:
+    chain = chain_form.unpack(vector)
+    settings = Settings.of(options[:-2])
+    each_from_start, count = options[-2] > 0.0, options[-1]
+
+    def follow(state: tuple[Array, Array], item: tuple[Array, Array]) -> tuple[Any, Array]:
         last, alive = state
-        command, own = item
-        before = jax.tree.map(
-            lambda first, current: jnp.where(each_from_start, first, current), start, last
-        )
-        tried = own & (alive | each_from_start)
-        came = jax.lax.cond(
-            tried,
-            lambda: advance(chain, command, before, settings),
-            lambda: _not_tried(before),
-        )
-        return (came.solved, alive & came.converged), (came, tried)
+        packed, number = item
+        before = jnp.where(each_from_start, start, last)
+        tried = (number < count) & (alive | each_from_start)
 
-    _, (came, tried) = jax.lax.scan(follow, (start, jnp.array(True)), (commands, wanted))
-    with_start = jax.tree.map(
-        lambda leaf, first: jnp.concatenate([leaf, jnp.asarray(first)[None]]), came.solved, start
-    )
-    every = jax.lax.map(lambda solved: quantities(chain, solved), with_start)
-    return Run(
-        solved=came.solved,
-        before=jax.tree.map(lambda leaf: leaf[-1], every),
-        quantities=jax.tree.map(lambda leaf: leaf[:-1], every),
-        residual=came.residual,
-        iterations=came.iterations,
-        converged=came.converged,
-        tried=tried,
-        reached=came.reached,
-    )
+        def try_it() -> tuple[Array, Array]:
+            came = advance(chain, command_form.unpack(packed), state_form.unpack(before), settings)
+            told = [came.residual, came.iterations, came.converged, True, came.reached]
+            return state_form.pack(came.solved), jnp.stack([jnp.asarray(x, float) for x in told])
+
+        def skip() -> tuple[Array, Array]:
+            return before, jnp.zeros(_TOLD).at[0].set(jnp.nan)
+
+        solved, told = jax.lax.cond(tried, try_it, skip)
+        return (solved, alive & (told[2] > 0.0)), jnp.concatenate([solved, told])
+
+    numbers = jnp.arange(len(commands), dtype=float)
+    _, table = jax.lax.scan(follow, (start, jnp.array(True)), (commands, numbers))
+
+    def with_shape(row: Array) -> Array:
+        size = state_form.size
+        found = shape(chain, state_form.unpack(row[:size]))
+        return jnp.concatenate([row[:size], Form.of(found).pack(found), row[size:]])
+
+    return jax.lax.map(with_shape, table)
+
+
+@partial(jit, static_argnums=(2, 3))
+def _quantities(
+    vector: Float[Array, " chain"],
+    states: Float[Array, "s state"],
+    chain_form: Form,
+    state_form: Form,
+) -> Quantities:
+    chain = chain_form.unpack(vector)
+    return jax.lax.map(lambda packed: quantities(chain, state_form.unpack(packed)), states)
 
 
 @jit
-def _stability(
-    chain: Chain, commands: Command, solved: Solved, wanted: Bool[Array, " s"]
-) -> tuple[Array, Array]:
+def _stability(chain: Any, commands: Command, solved: Solved, count: Array) -> tuple[Array, Array]:
     modes = chain.stiffness.size
 
     def one(item: tuple[Command, Solved, Array]) -> tuple[Array, Array]:
-        command, state, own = item
+        command, state, number = item
         nothing = (jnp.full((modes, modes), jnp.nan), jnp.array(jnp.nan))
-        return jax.lax.cond(own, lambda: held_stiffness(chain, command, state), lambda: nothing)
+        wanted = number < count
+        return jax.lax.cond(wanted, lambda: held_stiffness(chain, command, state), lambda: nothing)
 
-    return jax.lax.map(one, (commands, solved, wanted))
-
-
-def _not_tried(last: Solved) -> Advance:
-    return Advance(
-        solved=last,
-        residual=jnp.array(jnp.nan),
-        iterations=jnp.zeros((), int),
-        converged=jnp.array(False),
-        reached=jnp.zeros(()),
-    )
+    return jax.lax.map(one, (commands, solved, jnp.arange(len(commands.value))))

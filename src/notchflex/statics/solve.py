@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import numpy as np
-
-from notchflex.chain import Chain, prepared
+from notchflex.chain import tendons_in_plane
 from notchflex.errors import InputError
 from notchflex.flexure import LEVELS
 from notchflex.robot import Robot
-from notchflex.statics.applied import bending_normal, is_planar, is_unloaded
+from notchflex.statics.applied import is_planar, is_unloaded
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import Settings
 from notchflex.statics.path import Equilibrium, Path, command
+from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import run
 from notchflex.statics.state import SavedState, State, fitted
 
@@ -57,11 +56,11 @@ def simulate(
             f"the state belongs to robot {from_state.robot!r}, this one is {robot.name!r}; "
             "continue from a state of the same robot"
         )
-    chain = chain_for(robot, load, from_state, refinement)
-    start = fitted(from_state, chain)
-    commands = command(load, robot, chain)
-    came = run(chain, commands, start, settings or Settings(), each_from_start=False)
-    return Path(robot, load, chain, came)
+    ready = prepared_for(robot, load, from_state, refinement)
+    start = None if from_state is None else fitted(from_state, ready.chain)
+    commands = command(load, robot, ready.chain)
+    came = run(ready, commands, start, settings or Settings(), each_from_start=False)
+    return Path(robot, load, ready, came)
 
 
 def solve(
@@ -127,20 +126,19 @@ def solve_each(
         [True, True, True]
     """
     load = load_path(loads, robot.number_of_tendons)
-    chain = chain_for(robot, load, refinement=refinement)
-    commands = command(load, robot, chain)
-    rest = fitted(None, chain)
-    came = run(chain, commands, rest, settings or Settings(), each_from_start=True)
-    return Path(robot, load, chain, came, each_from_rest=True)
+    ready = prepared_for(robot, load, refinement=refinement)
+    commands = command(load, robot, ready.chain)
+    came = run(ready, commands, None, settings or Settings(), each_from_start=True)
+    return Path(robot, load, ready, came, each_from_rest=True)
 
 
-def chain_for(
+def prepared_for(
     robot: Robot,
     load: LoadPath,
     from_state: State | SavedState | None = None,
     refinement: int = 0,
-) -> Chain:
-    """The chain with modes enough for all loads of a path, and for the state before it."""
+) -> Prepared:
+    """The robot with modes enough for all loads of a path, and for the state before it."""
     if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
         raise InputError(
             f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
@@ -150,24 +148,14 @@ def chain_for(
             f"the state was computed with refinement {from_state.refinement}, not {refinement}; "
             "go on with the same"
         )
-    loaded = not is_unloaded(load) or (from_state is not None and from_state.loaded)
+    unloaded = is_unloaded(load)
+    loaded = not unloaded or (from_state is not None and from_state.loaded)
     level = "tendons" if not loaded else "plane"
-    if not (tendons_in_plane(robot) and is_planar(load, robot)):
+    if not (tendons_in_plane(robot) and (unloaded or is_planar(load, robot))):
         level = "space"
     if from_state is not None:
         level = max(level, from_state.level, key=LEVELS.index)
     return prepared(robot, level, loaded=loaded, refinement=refinement)
-
-
-def tendons_in_plane(robot: Robot) -> bool:
-    """Whether every tendon runs in the one plane in which all notches bend."""
-    normal = bending_normal(robot)
-    if normal is None:
-        return False
-    direction = np.radians([tendon.direction_deg for tendon in robot.tendon])
-    return bool(
-        (np.abs(np.cos(direction) * normal[0] + np.sin(direction) * normal[1]) < 1e-9).all()
-    )
 
 
 __all__ = ["simulate", "solve", "solve_each"]

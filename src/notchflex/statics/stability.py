@@ -46,18 +46,16 @@ def held_stiffness(
     flat, point_of = ravel_pytree(point)
     here = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
     slid = tuple(
-        over - _SLIP * at_bound(ratio, bound)
-        for over, ratio, bound in zip(
-            here.result.slid, point.unknowns.log_ratio, here.result.bound, strict=True
-        )
+        span.slid - _SLIP * at_bound(ratio, span.bound)
+        for span, ratio in zip(here.spans, point.unknowns.log_ratio, strict=True)
     )
-    memory = Memory(point.unknowns.log_ratio, slid, here.result.bound)
+    memory = Memory(point.unknowns.log_ratio, slid, tuple(span.bound for span in here.spans))
 
     def imbalance(flat: Array) -> Array:
         varied: Point = point_of(flat)
         at = evaluate(chain, varied.unknowns, memory, varied.base_tension, solved.applied)
         demand = command_residual(chain, command, varied.base_tension, at.base)
-        residual = at.result.residual
+        residual = at.residual
         residual = residual._replace(modes=residual.modes * chain.stiffness)
         return ravel_pytree((residual, demand))[0]
 

@@ -13,11 +13,12 @@ import numpy as np
 from notchflex.chain import Chain
 from notchflex.errors import InputError
 from notchflex.flexure import LEVELS
+from notchflex.statics.applied import in_frame, out_of_frame
 from notchflex.statics.stepping import Solved, at_rest
 
 _MODES = ".point.unknowns.modes"
 _LOADS = ".applied"
-_FORMAT = "notchflex state 2"
+_FORMAT = "notchflex state 3"
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,8 @@ class State:
 
     Attributes:
         robot: Name of the robot it belongs to.
-        solved: Unknowns, base tensions (N), memory of the contacts, stroke (mm) and loads.
+        solved: Unknowns, base tensions (N), memory of the contacts, stroke (mm) and loads, those as
+            of space.
         level: For which loads its chain was assembled.
         loaded: Whether loads other than the tendons' act in it.
         refinement: How many more modes its chain has than for usual loads.
@@ -152,7 +154,11 @@ def fitted(state: State | SavedState | None, chain: Chain) -> Solved:
 
 def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solved:
     """A state on a chain that may have been assembled for more loads than that of the state."""
-    leaves, structure = tree_util.tree_flatten_with_path(at_rest(chain))
+    rest = at_rest(chain)
+    frame = chain.frame
+    if rest.applied is not None and frame is not None:  # a state holds loads as those of space
+        rest = rest._replace(applied=out_of_frame(rest.applied, frame))
+    leaves, structure = tree_util.tree_flatten_with_path(rest)
     fitting = []
     for key, leaf in leaves:
         name = tree_util.keystr(key)
@@ -166,4 +172,7 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solved
                 "continue from a state of the same robot"
             )
         fitting.append(array)
-    return tree_util.tree_unflatten(structure, fitting)
+    found: Solved = tree_util.tree_unflatten(structure, fitting)
+    if found.applied is not None and frame is not None:
+        found = found._replace(applied=in_frame(found.applied, frame))
+    return found

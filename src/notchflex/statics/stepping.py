@@ -72,8 +72,9 @@ def unloaded(chain: Chain) -> Applied | None:
     if not chain.loaded:
         return None
     bodies = chain.flexures + 1
-    shapes = ((bodies, 3), (bodies, 3), (bodies, 3, 3), (bodies, 6))
-    return Applied(*(constant(np.zeros(shape)) for shape in shapes))
+    d, a = (3, 3) if chain.frame is None else (2, 1)
+    shapes = ((d,), (a,), (d, d), (a + d,))
+    return Applied(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
 
 
 def advance(chain: Chain, command: Command, last: Solved, settings: Settings) -> Advance:

@@ -5,52 +5,33 @@ Linearised, an element couples only to its neighbours:
     residual + A du + B dcarried + C dbeyond = 0
     dcarried_out = Yu du + Yc dcarried,   dbehind = Zu du + Zc dcarried + Zb dbeyond
 
-From the tip on, what comes back is a linear function of what is carried,
-dbeyond = P dcarried_out + c (nothing comes back from beyond the tip: P = 0, c = 0). Each element
-is then eliminated in turn, which gives P and c for its neighbour; at the base only the tensions
-are left. This is the elimination of a block-tridiagonal matrix from its last block.
+All elements eliminate their own unknowns at once. What each then says is
+
+    dcarried_out = y + Y1 dcarried + Y2 dbeyond,   dbehind = z + Z1 dcarried + Z2 dbeyond
+
+and two neighbours together say the same of their ends (Redheffer's star product), what passes
+between them being eliminated. So all neighbours are joined at once, then all pairs of them, until
+one is left; nothing comes back from beyond the tip, and at the base only the tensions are left to
+find. On the way back every pair learns what passes between its two. It is the elimination of a
+block-tridiagonal matrix by nested dissection: a few wide operations instead of many narrow ones.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
-from notchflex.flexure import FlexureState, flexure_state
-from notchflex.motion import skew, unskew
 from notchflex.statics.actuation import Command, command_residual
-from notchflex.statics.applied import Applied
-from notchflex.statics.element import (
-    Beyond,
-    Carried,
-    Memory,
-    Unknowns,
-    element_result,
-    elements,
-    leave_base,
-    nothing_beyond,
-    shared,
-)
+from notchflex.statics.element import Memory, Unknowns
+from notchflex.statics.layout import layout
+from notchflex.statics.linear import blocks
 from notchflex.statics.walk import Evaluation
 
 _HELD = 1e-9
-
-
-class Blocks(NamedTuple):
-    """Derivatives of one element (names as in the head of this file)."""
-
-    unknown: Float[Array, "u u"]
-    carried: Float[Array, "u c"]
-    beyond: Float[Array, "u b"]
-    on_by_unknown: Float[Array, "c u"]
-    on_by_carried: Float[Array, "c c"]
-    back_by_unknown: Float[Array, "b u"]
-    back_by_carried: Float[Array, "b c"]
-    back_by_beyond: Float[Array, "b b"]
 
 
 class Step(NamedTuple):
@@ -63,125 +44,6 @@ class Step(NamedTuple):
 
     unknowns: Unknowns
     base_tension: Float[Array, " t"]
-
-
-def element_blocks(
-    chain: Chain,
-    unknowns: Unknowns,
-    memory: Memory,
-    applied: Applied | None,
-    at: Evaluation,
-) -> Blocks:
-    """Derivatives of all elements, by differentiating each on its own, all at once.
-
-    The flexure's own state depends on its modes alone; it is differentiated by them only.
-    """
-    common = shared(chain)
-
-    def blocks(
-        element: Any,
-        flexure: FlexureState,
-        own: Unknowns,
-        past: Memory,
-        carried: Carried,
-        onward: Carried,
-        beyond: Beyond,
-    ) -> Blocks:
-        flat_own, own_of = ravel_pytree(own)
-        flat_beyond, beyond_of = ravel_pytree(beyond)
-        no_change = jnp.zeros(changes(carried))
-        ends = (len(flat_own), len(flat_own) + len(no_change))
-
-        def flat(state: FlexureState, everything: Array) -> tuple[Array, Array, Array]:
-            mine, brought, back = jnp.split(everything, ends)
-            result = element_result(
-                element,
-                common,
-                state,
-                own_of(mine),
-                past,
-                varied(carried, brought),
-                beyond_of(back),
-            )
-            return (
-                ravel_pytree(result.residual)[0],
-                change(onward, result.onward),
-                ravel_pytree(result.behind)[0],
-            )
-
-        def state_at(modes: Array) -> FlexureState:
-            return flexure_state(
-                element.rod,
-                common.law,
-                element.memory,
-                modes,
-                with_pose=chain.forces_on_bodies,
-            )
-
-        # One direction for every number that may change; the modes, which are the first of the
-        # unknowns, change the flexure's state as well.
-        here = jnp.concatenate([flat_own, no_change, flat_beyond])
-        others = len(here) - len(own.modes)
-        by_modes = jax.tree.map(
-            lambda leaf: jnp.concatenate(
-                [jnp.moveaxis(leaf, -1, 0), jnp.zeros((others, *leaf.shape[:-1]))]
-            ),
-            jax.jacfwd(state_at)(own.modes),
-        )
-
-        def along(state_way: FlexureState, way: Array) -> tuple[Array, Array, Array]:
-            return jax.jvp(flat, (flexure, here), (state_way, way))[1]
-
-        residual, on, back = jax.vmap(along, out_axes=-1)(by_modes, jnp.eye(len(here)))
-        by_unknown, by_carried, by_beyond = jnp.split(residual, ends, axis=1)
-        on_by_unknown, on_by_carried, _ = jnp.split(on, ends, axis=1)
-        back_by_unknown, back_by_carried, back_by_beyond = jnp.split(back, ends, axis=1)
-        return Blocks(
-            by_unknown,
-            by_carried,
-            by_beyond,
-            on_by_unknown,
-            on_by_carried,
-            back_by_unknown,
-            back_by_carried,
-            back_by_beyond,
-        )
-
-    return jax.vmap(blocks)(
-        elements(chain, applied),
-        at.flexure,
-        unknowns,
-        memory,
-        at.carried,
-        at.result.onward,
-        at.beyond,
-    )
-
-
-def changes(carried: Carried) -> int:
-    """How many numbers say how what is carried may change: three for a rotation."""
-    flat, _ = ravel_pytree(carried._replace(rotation=None))
-    return len(flat) + (0 if carried.rotation is None else 3)
-
-
-def varied(carried: Carried, by: Float[Array, " c"]) -> Carried:
-    """What is carried, changed by a little: a rotation by a rotation vector in the body's frame."""
-    flat, carried_of = ravel_pytree(carried._replace(rotation=None))
-    moved: Carried = carried_of(flat + by[: len(flat)])
-    if carried.rotation is None:
-        return moved
-    turned = carried.rotation @ (jnp.eye(3) + skew(by[len(flat) :]))
-    return moved._replace(rotation=turned)
-
-
-def change(start: Carried, end: Carried) -> Float[Array, " c"]:
-    """The change that `varied` takes, from one state to another close by."""
-    first, _ = ravel_pytree(start._replace(rotation=None))
-    second, _ = ravel_pytree(end._replace(rotation=None))
-    if start.rotation is None or end.rotation is None:
-        return second - first
-    turned = unskew(start.rotation.T @ end.rotation)
-    return jnp.concatenate([second - first, turned])
 
 
 def linear_step(
@@ -205,63 +67,131 @@ def linear_step(
     Returns:
         The step.
     """
-    blocks = element_blocks(chain, unknowns, memory, command.applied, at)
-    residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.result.residual)
-    nothing, beyond_of = ravel_pytree(nothing_beyond(chain))
-    start = leave_base(chain, base_tension)
+    form = layout(chain)
+    rows = blocks(chain, unknowns, memory, command.applied, at)
+    imbalance = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
+    own = form.unknowns
+    # Own unknowns as functions of 1, what is carried, and what comes back: du = answer @ (1, c, b).
+    right = jnp.concatenate([imbalance[..., None], rows.residual[..., own:]], axis=-1)
+    answer = -eliminated(rows.residual[..., :own], right)
 
-    def eliminate(tail: Any, item: Any) -> tuple[Any, Any]:
-        matrix, constant = tail
-        block, imbalance = item
-        seen = block.beyond @ matrix
-        right = jnp.concatenate(
-            [
-                -(imbalance + block.beyond @ constant)[:, None],
-                -(block.carried + seen @ block.on_by_carried),
-            ],
-            axis=1,
-        )
-        solution = _solve(block.unknown + seen @ block.on_by_unknown, right)
-        fixed, gain = solution[:, 0], solution[:, 1:]
-        back = block.back_by_beyond @ matrix
-        by_unknown = block.back_by_unknown + back @ block.on_by_unknown
-        by_carried = block.back_by_carried + back @ block.on_by_carried
-        tail = (
-            by_carried + by_unknown @ gain,
-            block.back_by_beyond @ constant + by_unknown @ fixed,
-        )
-        return tail, (fixed, gain)
+    def answered(row: Array) -> Array:
+        unasked = jnp.pad(row[..., own:], ((0, 0), (0, 0), (1, 0)))
+        return unasked + row[..., :own] @ answer
 
-    tip = (jnp.zeros((len(nothing), changes(start))), jnp.zeros_like(nothing))
-    (matrix, constant), (fixed, gain) = jax.lax.scan(
-        eliminate, tip, (blocks, residual), reverse=True
+    ports = Ports(answered(rows.onward), answered(rows.behind))
+    levels: list[Ports] = []
+    while len(ports.onward) > 1:
+        between, ports = _joined(ports, form.carried)
+        levels.append(between)
+    matrix, constant = ports.behind[0, :, 1 : 1 + form.carried], ports.behind[0, :, :1]
+
+    groups = [jnp.array(group.numbers, int) for group in chain.groups]
+    order = jnp.concatenate(groups) if groups else jnp.zeros(0, int)
+    others = form.carried - len(order)
+    leave = (
+        jnp.zeros((form.carried, chain.tendons)).at[others + jnp.arange(len(order)), order].set(1)
     )
 
-    leave = jax.jacfwd(lambda tension: change(start, leave_base(chain, tension)))(base_tension)
-    flat_base, _ = ravel_pytree(at.base)
+    def demand(tension: Array, drawn: Array, stretch: Array) -> Array:
+        base = at.base._replace(drawn=drawn, stretch=stretch)
+        return command_residual(chain, command, tension, base)
 
-    def demand(tension: Array, flat: Array) -> Array:
-        return command_residual(chain, command, tension, beyond_of(flat))
-
-    by_tension, by_base = jax.jacfwd(demand, argnums=(0, 1))(base_tension, flat_base)
+    here = (base_tension, at.base.drawn, at.base.stretch)
+    slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(*here)
+    back = jnp.concatenate([matrix @ leave, constant], axis=1)
+    back = back[form.beyond - 2 * len(order) :].reshape(2, len(order), -1)
+    # Rows in the order of the robot's tendons.
+    drawn, stretch = jnp.zeros_like(back).at[:, order].set(back)
+    by_base = slopes[1] @ drawn + slopes[2] @ stretch
     # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; the
     # small entry keeps such a step finite.
     held = _HELD * jnp.diag(command.by_stroke.astype(float))
-    border = by_tension + by_base @ matrix @ leave + held
-    imbalance = demand(base_tension, flat_base) + by_base @ constant
-    tension_step = _solve(border, -imbalance[:, None])
+    missing = demand(*here) + by_base[:, -1]
+    tension_step = -eliminated(slopes[0] + by_base[:, :-1] + held, missing[:, None])[:, 0]
 
-    def substitute(carried: Array, item: Any) -> tuple[Array, Array]:
-        block, own_fixed, own_gain = item
-        own = own_fixed + own_gain @ carried
-        return block.on_by_unknown @ own + block.on_by_carried @ carried, own
-
-    _, steps = jax.lax.scan(substitute, leave @ tension_step[:, 0], (blocks, fixed, gain))
+    beyond_tip = jnp.zeros(form.beyond)
+    known = jnp.concatenate([jnp.ones(1), leave @ tension_step, beyond_tip])[None]
+    for between in reversed(levels):
+        known = _parted(between, known, form.carried)
+    steps = jnp.einsum("nuz,nz->nu", answer, known)
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
-    return Step(jax.vmap(unknowns_of)(steps), tension_step[:, 0])
+    return Step(jax.vmap(unknowns_of)(steps), tension_step)
 
 
-def _solve(matrix: Float[Array, "u u"], right: Float[Array, "u r"]) -> Float[Array, "u r"]:
-    """Solution of a small system."""
-    factors, pivots, _ = jax.lax.linalg.lu(matrix)
-    return jax.scipy.linalg.lu_solve((factors, pivots), right)
+class Ports(NamedTuple):
+    """What parts of the chain, base to tip, say of their ends: over (1, carried, from beyond).
+
+    Attributes:
+        onward: What is carried out of each part; between two parts, from the one to the other.
+        behind: What is handed back by each; between two parts, from the other to the one.
+    """
+
+    onward: Float[Array, "parts c z"]
+    behind: Float[Array, "parts b z"]
+
+
+def _joined(ports: Ports, carried: int) -> tuple[Ports, Ports]:
+    """Join neighbours: what passes between the two of each pair, and all parts that are left."""
+    whole = len(ports.onward) // 2 * 2
+    (first, first_back), (second, second_back) = (
+        (ports.onward[start:whole:2], ports.behind[start:whole:2]) for start in (0, 1)
+    )
+    own = 1 + carried
+    # What is carried to the second part, put in terms of what comes back to it from beyond.
+    returned = first[..., own:] @ second_back
+    closed = jnp.eye(carried)[None] - returned[..., 1:own]
+    right = [first[..., :1] + returned[..., :1], first[..., 1:own], returned[..., own:]]
+    between = eliminated(closed, jnp.concatenate(right, axis=-1))
+    back = _without(second_back, own) + second_back[..., 1:own] @ between
+    onward = _without(second, own) + second[..., 1:own] @ between
+    own_back = jnp.pad(first_back[..., :own], ((0, 0), (0, 0), (0, back.shape[1])))
+    behind = own_back + first_back[..., own:] @ back
+    left = Ports(
+        jnp.concatenate([onward, ports.onward[whole:]]),
+        jnp.concatenate([behind, ports.behind[whole:]]),
+    )
+    return Ports(between, back), left
+
+
+def _without(rows: Float[Array, "parts k z"], own: int) -> Float[Array, "parts k z"]:
+    """Rows without what they say of what is carried."""
+    return jnp.concatenate(
+        [rows[..., :1], jnp.zeros_like(rows[..., 1:own]), rows[..., own:]], axis=-1
+    )
+
+
+def _parted(between: Ports, known: Float[Array, "parts z"], carried: int) -> Float[Array, "more z"]:
+    """From (1, carried, from beyond) of joined parts to those of the parts they were made of."""
+    pairs = len(between.onward)
+    outer, own = known[:pairs], 1 + carried
+    carried_on = jnp.einsum("pcz,pz->pc", between.onward, outer)
+    back = jnp.einsum("pbz,pz->pb", between.behind, outer)
+    first = jnp.concatenate([outer[:, :own], back], axis=1)
+    second = jnp.concatenate([outer[:, :1], carried_on, outer[:, own:]], axis=1)
+    both = jnp.stack([first, second], axis=1).reshape(2 * pairs, -1)
+    return jnp.concatenate([both, known[pairs:]])
+
+
+def eliminated(
+    matrix: Float[Array, "*n u u"], right: Float[Array, "*n u r"]
+) -> Float[Array, "*n u r"]:
+    """Solutions of small systems, by Gauss and Jordan.
+
+    Pivots are taken as they come: modes first, whose stiffness is there, then what they give way
+    under. Many small factorisations by LAPACK, one after the other, take several times as long.
+    """
+    size = matrix.shape[-1]
+    if size == 1:
+        return right / matrix
+
+    def eliminate(number: Array, table: Array) -> Array:
+        pivot = jax.lax.dynamic_index_in_dim(table, number, axis=-2, keepdims=True)
+        column = jax.lax.dynamic_index_in_dim(table, number, axis=-1, keepdims=True)
+        pivot = pivot / jax.lax.dynamic_index_in_dim(pivot, number, axis=-1, keepdims=True)
+        others = table - column * pivot
+        is_own = (jnp.arange(size) == number).reshape(*(1,) * (table.ndim - 2), size, 1)
+        return jnp.where(is_own, pivot, others)
+
+    table = jnp.concatenate([matrix, right], axis=-1)
+    return jax.lax.fori_loop(0, size, eliminate, table)[..., size:]

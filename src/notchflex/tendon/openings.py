@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from notchflex.robot.kinds import Notch
 from notchflex.robot.opening import openings_along
@@ -22,6 +22,9 @@ class Passage(NamedTuple):
     Attributes:
         visits: 1 where the body behind the flexure has wall on that side.
         closes: 1 where the opening is on that very side, not all round.
+        back: How many bodies before that one it visited the last one, its anchor; 1 where it does
+            not visit.
+        left: Where it left the anchor, along the tube in the anchor's frame.
         enters: Where the line enters that body, along the tube.
         leaves: Where it leaves that body again.
         base_leaves: Where it leaves the base.
@@ -29,6 +32,8 @@ class Passage(NamedTuple):
 
     visits: Float[np.ndarray, " n"]
     closes: Float[np.ndarray, " n"]
+    back: Int[np.ndarray, " n"]
+    left: Float[np.ndarray, " n"]
     enters: Float[np.ndarray, " n"]
     leaves: Float[np.ndarray, " n"]
     base_leaves: Float[np.ndarray, ""]
@@ -45,15 +50,17 @@ def passage(
         direction_deg: Side of the tube.
     """
     count = len(notches)
-    visits, closes, enters = np.zeros(count), np.zeros(count), np.zeros(count)
+    visits, closes, left, enters = (np.zeros(count) for _ in range(4))
+    back = np.ones(count, int)
     leaves = np.array(body_length, float)
     last = 0
     for body, opening in openings_along(notches, direction_deg):
         visits[body - 1], enters[body - 1] = 1.0, opening.enters
         closes[body - 1] = opening.faces(direction_deg)
         leaves[last] += opening.leaves
+        back[body - 1], left[body - 1] = body - last, leaves[last]
         last = body
-    return Passage(visits, closes, enters, leaves[1:], leaves[0])
+    return Passage(visits, closes, back, left, enters, leaves[1:], leaves[0])
 
 
 def passages(

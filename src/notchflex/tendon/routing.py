@@ -95,6 +95,7 @@ def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -
         "present": present,
         "visits": visits,
         "ends": ends,
+        "back": np.where(visits > 0.0, line.back, 1),
         # A cable may end at an edge beyond the axial length of the last piece.
         "body_length": visits * np.maximum(line.leaves - line.enters, 0.0),
     }
@@ -134,15 +135,12 @@ def _straight(
     entry = place + line.enters[..., None] * along
     leave = place + line.leaves[..., None] * along
     base = place + np.asarray(line.base_leaves)[:, None] * along
-    everywhere = entry.shape
     return Straight(
         **masks,
         natural_gap=_free_gaps(masks["visits"], entry, leave, base, ground.free),
-        entry=constant(entry),
-        exit=constant(leave),
-        channel=constant(np.broadcast_to(along, everywhere)),
-        base_exit=constant(np.broadcast_to(base, everywhere)),
-        base_channel=constant(np.broadcast_to(along, everywhere)),
+        leaves=constant(place + line.left[..., None] * along),
+        enters=constant(entry),
+        along=constant(np.broadcast_to(along, entry.shape)),
         pulls=_PULLS[path],
         turns_with_chord=ground.turns_with_chord,
     )

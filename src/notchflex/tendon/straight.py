@@ -11,34 +11,22 @@ are. That is a reading of a paper; it is no tendon whose work is tension times l
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from notchflex._jax import jnp
+from notchflex._jax import jax, jnp
 from notchflex.flexure import FlexureState, Rod
-from notchflex.motion import wrenches_at
-from notchflex.tendon.crossing import Crossing, TendonGroup, fall, guarded_norm
-
-
-class Carried(NamedTuple):
-    """Tension, and where and how the tendon left the last body, in the current body's frame."""
-
-    tension: Float[Array, " t"]
-    point: Float[Array, "t 3"]
-    direction: Float[Array, "t 3"]
+from notchflex.motion import Motion, moment_of, wrench_at
+from notchflex.tendon.crossing import Crossing, TendonGroup, guarded_norm
 
 
 class Straight(TendonGroup):
     """Tendons straight across the gaps.
 
     Attributes:
-        entry: Where the tendon enters the distal body, in its frame, mm.
-        exit: Where it leaves the distal body, in its frame, mm.
-        channel: Unit direction of its channel through the distal body.
-        base_exit: Where it leaves the base, mm, the same for every flexure.
-        base_channel: Unit direction of its channel in the base.
+        leaves: Where the tendon leaves its anchor, in the anchor's frame, mm.
+        enters: Where it enters the distal body, in that body's frame, mm.
+        along: Unit direction of its channels, in the frames of the bodies.
         pulls: Along what it pulls: the "gap", or the channel of the body before ("dead") or
             behind ("follower").
         turns_with_chord: Whether it turns at the distal body by the turn of the flexure's chord
@@ -51,76 +39,46 @@ class Straight(TendonGroup):
     present: Float[Array, "*n t"]
     visits: Float[Array, "*n t"]
     ends: Float[Array, "*n t"]
+    back: Int[Array, "*n t"]
     body_length: Float[Array, "*n t"]
     natural_gap: Float[Array, "*n t"]
-    entry: Float[Array, "*n t 3"]
-    exit: Float[Array, "*n t 3"]
-    channel: Float[Array, "*n t 3"]
-    base_exit: Float[Array, "*n t 3"]
-    base_channel: Float[Array, "*n t 3"]
+    leaves: Float[Array, "*n t d"]
+    enters: Float[Array, "*n t d"]
+    along: Float[Array, "*n t d"]
     pulls: str = eqx.field(static=True)
     turns_with_chord: bool = eqx.field(static=True)
 
-    def leave_base(self, base_tension: Float[Array, " t"]) -> Any:
-        """Tension, exit point and direction at the base."""
-        return Carried(base_tension, self.base_exit[0], self.base_channel[0])
+    @property
+    def by_modes(self) -> bool:
+        """Only where the chord of the flexure tells how the tendon turns."""
+        return self.turns_with_chord
 
-    def no_reaction(self) -> Any:
-        """No pull from beyond the tip."""
-        return jnp.zeros((len(self.numbers), 6))
-
-    def cross(
-        self,
-        rod: Rod,
-        flexure: FlexureState,
-        log_ratios: Float[Array, "t 2"],
-        carried: Any,
-        reaction: Any,
-    ) -> Crossing:
-        """Straight span from the carried point to the entry of the distal body."""
+    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
+        """Straight span from the anchor to the entry of the distal body."""
         del rod
-        pose = flexure.pose
-        assert pose is not None  # acts_on_bodies asks for it
-        point = pose.points_inside(carried.point)
-        direction = carried.direction @ pose.rotation
-        span = self.entry - point
-        length = guarded_norm(span)
-        along = span / jnp.where(length == 0.0, 1.0, length)[:, None]
-        gap_tension = self.visits * fall(carried.tension, log_ratios[:, 0])
-        body_tension = self.visits * fall(gap_tension, log_ratios[:, 1])
-        pulled = {"gap": along, "dead": direction, "follower": self.channel}[self.pulls]
-        force = -gap_tension[:, None] * pulled
-        on_entry = wrenches_at(self.entry, force)
-        visited = self.visits[:, None] > 0.0
-        going_on = self.visits == 0.0
-        back = jnp.where(visited, -on_entry, reaction)
-        return Crossing(
-            gap_tension=gap_tension,
-            body_tension=body_tension,
-            shortening=self.visits * (self.natural_gap - length),
-            exit_turning=turning(direction, along),
-            entry_turning=turning(along, self._onward(flexure, direction)),
-            pull=jnp.zeros_like(flexure.internal),
-            wrench=jnp.sum(on_entry + self.visits[:, None] * reaction, axis=0),
-            carried=Carried(
-                tension=jnp.where(going_on, carried.tension, body_tension),
-                point=jnp.where(visited, self.exit, point),
-                direction=jnp.where(visited, self.channel, direction),
-            ),
-            reaction=pose.wrenches(back),
-        )
+        assert anchors is not None  # acts_on_bodies asks for it
 
-    def _onward(self, flexure: FlexureState, direction: Float[Array, "t 3"]) -> Float[Array, "t 3"]:
-        """Direction in which the tendon goes on through the distal body, in its frame."""
-        if not self.turns_with_chord:
-            return self.channel
+        def one(anchor: Motion, leaves: Array, enters: Array, channel: Array) -> tuple[Array, ...]:
+            span = enters - anchor.point_inside(leaves)
+            length = guarded_norm(span)
+            gap = span / jnp.where(length == 0.0, 1.0, length)
+            before = channel @ anchor.rotation
+            onward = self._onward(flexure, before) if self.turns_with_chord else channel
+            pulled = {"gap": gap, "dead": before, "follower": channel}[self.pulls]
+            return length, turning(before, gap), turning(gap, onward), wrench_at(enters, pulled)
+
+        found = jax.vmap(one)(anchors, self.leaves, self.enters, self.along)
+        return Crossing(*found, slope=None)
+
+    def _onward(self, flexure: FlexureState, direction: Float[Array, " d"]) -> Float[Array, " d"]:
+        """Direction in which the tendon goes on by the chord's turn, in the distal body's frame."""
         pose, turn = flexure.pose, flexure.chord_turn
         assert pose is not None
         assert turn is not None
-        before = direction @ pose.rotation.T
-        return before @ turn.T @ pose.rotation
+        before = pose.rotation @ direction
+        return (turn @ before) @ pose.rotation
 
 
-def turning(before: Float[Array, "t 3"], after: Float[Array, "t 3"]) -> Float[Array, " t"]:
+def turning(before: Float[Array, " d"], after: Float[Array, " d"]) -> Float[Array, ""]:
     """Angle between two unit directions, exact for small angles, with slope 0 at zero."""
-    return jnp.atan2(guarded_norm(jnp.cross(before, after)), jnp.sum(before * after, axis=-1))
+    return jnp.atan2(guarded_norm(moment_of(before, after)), jnp.sum(before * after))

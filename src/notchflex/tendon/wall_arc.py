@@ -7,14 +7,13 @@ whichever way the notch faces.
 
 from __future__ import annotations
 
-from typing import Any
-
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from notchflex._jax import jnp
-from notchflex.flexure import FlexureState, Rod, fibre_stretch
-from notchflex.tendon.crossing import Crossing, TendonGroup, fall, guarded_norm
+from notchflex.flexure import FlexureState, Rod, fibre_slope, fibre_stretch, of_rod
+from notchflex.motion import Motion
+from notchflex.tendon.crossing import Crossing, TendonGroup, guarded_norm
 
 
 class WallArc(TendonGroup):
@@ -30,41 +29,25 @@ class WallArc(TendonGroup):
     present: Float[Array, "*n t"]
     visits: Float[Array, "*n t"]
     ends: Float[Array, "*n t"]
+    back: Int[Array, "*n t"]
     body_length: Float[Array, "*n t"]
     natural_gap: Float[Array, "*n t"]
     across: Float[Array, "*n t 2"]
 
-    def leave_base(self, base_tension: Float[Array, " t"]) -> Any:
-        """Only the tension is carried."""
-        return base_tension
+    @property
+    def runs(self) -> Float[Array, "*n t"]:
+        """Over every notch up to its end."""
+        return self.present
 
-    def no_reaction(self) -> Any:
-        """Nothing is pulled from afar: each gap acts on its own flexure."""
-        return ()
-
-    def cross(
-        self,
-        rod: Rod,
-        flexure: FlexureState,
-        log_ratios: Float[Array, "t 2"],
-        carried: Any,
-        reaction: Any,
-    ) -> Crossing:
-        """Length, turning and pull on the wall arc; half the turning at each edge."""
-        weights = fibre_stretch(self.across)
-        gap_tension = self.present * fall(carried, log_ratios[:, 0])
-        body_tension = self.present * fall(gap_tension, log_ratios[:, 1])
-        slope = jnp.einsum("tc,icm,i->tm", weights, rod.basis, rod.length)
-        half_turning = 0.5 * jnp.broadcast_to(guarded_norm(flexure.bend), gap_tension.shape)
+    def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
+        """Length and turning on the wall arc; half the turning at each edge."""
+        del anchors
+        weights = of_rod(rod, fibre_stretch(self.across))
+        half_turning = 0.5 * jnp.broadcast_to(guarded_norm(flexure.bend), self.natural_gap.shape)
         return Crossing(
-            gap_tension=gap_tension,
-            body_tension=body_tension,
-            shortening=-self.present
-            * jnp.einsum("tc,ic,i->t", weights, flexure.strain, rod.length),
+            length=self.natural_gap + (rod.length @ flexure.strain) @ weights.T,
             exit_turning=half_turning,
             entry_turning=half_turning,
-            pull=gap_tension @ slope,
             wrench=None,
-            carried=body_tension,
-            reaction=reaction,
+            slope=fibre_slope(rod, weights),
         )

@@ -1,0 +1,219 @@
+"""All forces on the bodies of a solved robot, put together in numpy from what a result reports.
+
+Loads from outside, tendons and closed edges: `State` holds them with the point and the body they
+act on, so that `beyond` adds up what acts beyond a notch. Nothing is taken from the solver but
+poses, tensions along the tendons and contact forces; where a tendon leaves and enters bodies
+follows from the notches' openings. Tendons on an arc of the wall and the lips opposite a spine act
+on their own flexure alone and are no part of this (see arcs.py).
+
+World frame; mm, N, N mm.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+import notchflex as nf
+
+_Z = np.array([0.0, 0.0, 1.0])
+# An edge this near to a face touches it, as a part of the height of the notch.
+_TOUCHES = 1e-6
+
+
+class Stop(NamedTuple):
+    """A body on the way of a line along the wall: where it is entered and left, mm on the axis."""
+
+    body: int
+    enters: float
+    leaves: float
+    faces: bool
+
+
+class Force(NamedTuple):
+    """A force at a point of a body, and a moment."""
+
+    body: int
+    point: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+
+
+class Span(NamedTuple):
+    """A straight piece of tendon over a gap: its length, and how it turns at either end (rad)."""
+
+    length: float
+    exit_turning: float
+    entry_turning: float
+
+
+class State:
+    """One step of a path, with all forces on its bodies.
+
+    Attributes:
+        forces: Force by force, but for tendons on the wall and lips opposite a spine.
+        gap: Narrowest opening between edges of pieces at every notch, mm; inf where there is none.
+        undecided: Whether a contact force is reported that may stand on either of two edges.
+    """
+
+    def __init__(self, robot: nf.Robot, path: nf.Path, step: int) -> None:
+        self.robot, self.step = robot, step
+        self.origin, self.rotation = path.body_position[step], path.body_rotation[step]
+        self.load = path.load.external[step]
+        self.tension = path.span_tension[step]
+        around = [*robot.notches[1:], None]
+        behind = [one.spacing(after) for one, after in zip(robot.notches, around, strict=True)]
+        self.length = np.array([robot.tube.base_length, *behind])
+        self.tip = self.point(len(behind), behind[-1] * _Z)
+        self.forces = list(self._external(path))
+        self.spans = [self._tendon(number) for number in range(robot.number_of_tendons)]
+        self.gap = np.full(len(behind), np.inf)
+        self.undecided = False
+        self._edges(path.contact_force[step])
+
+    @property
+    def height(self) -> float:
+        """Height of all notches together, mm."""
+        return sum(notch.height for notch in self.robot.notches)
+
+    @property
+    def reach(self) -> float:
+        """Largest coordinate of any body, mm: what rounding of poses goes by."""
+        return float(max(np.abs(self.origin).max(), np.abs(self.tip).max()))
+
+    @property
+    def rounding(self) -> float:
+        """What of a force is rounding, N: 1e-13 of what would stretch the tube to twice its length.
+
+        A tendon let go, and an edge that just does not touch, have so much instead of nothing.
+        """
+        return 1e-13 * self.robot.material.elastic_modulus * self.robot.tube.outer_radius**2
+
+    def point(self, body: int, inside: np.ndarray) -> np.ndarray:
+        """A point of a body in the world."""
+        return self.origin[body] + self.rotation[body] @ inside
+
+    def way(self, side: float) -> list[Stop]:
+        """The bodies that a line along the wall passes through, the base first."""
+        around = (None, *self.robot.notches, None)
+        stops = [Stop(0, 0.0, self.length[0], False)]
+        for body in range(1, len(around) - 1):
+            for opening in around[body].openings(around[body - 1], around[body + 1]):
+                if opening.admits(side):
+                    last = stops[-1]
+                    stops[-1] = last._replace(leaves=last.leaves + opening.leaves)
+                    faces = opening.faces(side)
+                    stops.append(Stop(body, opening.enters, self.length[body], faces))
+        return stops
+
+    def beyond(self, body: int, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force and moment of all that acts on a body and those beyond it, about a point."""
+        force, moment, _ = self.beyond_with_size(body, about)
+        return force, moment
+
+    def beyond_with_size(
+        self, body: int, about: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
+        """The same, and the sums of the magnitudes of forces and of moments."""
+        chosen = [one for one in self.forces if one.body >= body]
+        force, moment = np.zeros(3), np.zeros(3)
+        sizes = [0.0, 0.0]
+        for one in chosen:
+            lever = np.cross(one.point - about, one.force)
+            force, moment = force + one.force, moment + lever + one.moment
+            sizes[0] += np.linalg.norm(one.force)
+            sizes[1] += np.linalg.norm(lever) + np.linalg.norm(one.moment)
+        return force, moment, (sizes[0], sizes[1])
+
+    def tendon_place(self, number: int) -> np.ndarray:
+        """Where a tendon crosses a section of the tube, mm."""
+        tendon = self.robot.tendon[number]
+        side = np.radians(tendon.direction_deg)
+        return tendon.radius * np.array([np.cos(side), np.sin(side), 0.0])
+
+    def end_body(self, number: int) -> int:
+        """Body in which a tendon ends."""
+        return self.robot.tendon[number].end_body or len(self.robot.notches)
+
+    def _external(self, path: nf.Path):
+        """Loads from outside, as the load tells them."""
+        load, last, none = self.load, len(self.origin) - 1, np.zeros(3)
+        for one in load.body_forces:
+            turn = self.rotation[one.body] if one.following else np.eye(3)
+            at = self.point(one.body, np.array(one.point))
+            yield Force(one.body, at, turn @ one.force, turn @ one.moment)
+        turn = self.rotation[last] if load.following else np.eye(3)
+        hangs = self.tip + self.rotation[last] @ load.tip_point
+        yield Force(last, hangs, turn @ load.tip_force, turn @ load.tip_moment)
+        yield Force(last, hangs, np.array(load.weight(load.tip_mass)), none)
+        if load.gravity is not None:
+            for body, (mass, centre) in enumerate(
+                zip(path.chain.body_mass, path.chain.body_centre, strict=True)
+            ):
+                weight = np.array(load.weight(float(mass)))
+                yield Force(body, self.point(body, np.asarray(centre)), weight, none)
+
+    def _tendon(self, number: int) -> list[Span]:
+        """Pull of a straight tendon on the bodies it leaves and enters; its spans, base to tip."""
+        tendon = self.robot.tendon[number]
+        if tendon.path == "wall-arc":
+            return []
+        place, none, spans = self.tendon_place(number), np.zeros(3), []
+        stops = [one for one in self.way(tendon.direction_deg) if one.body <= self.end_body(number)]
+        for i, (before, behind) in enumerate(pairwise(stops)):
+            leaves = self.point(before.body, place + before.leaves * _Z)
+            enters = self.point(behind.body, place + behind.enters * _Z)
+            channel, onward = self.rotation[before.body] @ _Z, self.rotation[behind.body] @ _Z
+            length = float(np.linalg.norm(enters - leaves))
+            along = (enters - leaves) / length if length else channel
+            # Read as dead or follower the pull stands on the entry, whatever way the span goes.
+            at = leaves if tendon.path == "straight" else enters
+            pulls = {"straight": along, "straight-dead": channel, "straight-follower": onward}
+            pull = self.tension[number, 2 * i + 1] * pulls[tendon.path]
+            self.forces += [
+                Force(before.body, at, pull, none),
+                Force(behind.body, enters, -pull, none),
+            ]
+            spans.append(Span(length, angle(channel, along), angle(along, onward)))
+        return spans
+
+    def _edges(self, reported: np.ndarray) -> None:
+        """Gaps between edges of pieces, and the forces where they touch."""
+        around = (None, *self.robot.notches, None)
+        sides = {
+            opening.side_deg % 360.0
+            for body in range(1, len(around) - 1)
+            for opening in around[body].openings(around[body - 1], around[body + 1])
+            if opening.side_deg is not None
+        }
+        touching: dict[int, list[tuple[int, np.ndarray, np.ndarray]]] = {}
+        for side in sides:
+            turn = np.radians(side)
+            out = self.robot.tube.outer_radius * np.array([np.cos(turn), np.sin(turn), 0.0])
+            stops = self.way(side)
+            for before, behind in pairwise(stops):
+                if not behind.faces:
+                    continue
+                normal = self.rotation[before.body] @ _Z
+                edge = self.point(behind.body, out + behind.enters * _Z)
+                gap = (edge - self.point(before.body, out + before.leaves * _Z)) @ normal
+                notch = behind.body - 1
+                self.gap[notch] = min(self.gap[notch], gap)
+                if gap < _TOUCHES * self.robot.notches[notch].height:
+                    touching.setdefault(notch, []).append((before.body, edge, normal))
+        for notch in np.flatnonzero(np.isfinite(self.gap) & (reported > 0.0)):
+            places = touching.get(int(notch), [])
+            self.undecided |= len(places) != 1
+            for body, edge, normal in places[:1]:
+                push = reported[notch] * normal
+                self.forces += [
+                    Force(int(notch) + 1, edge, push, np.zeros(3)),
+                    Force(body, edge, -push, np.zeros(3)),
+                ]
+
+
+def angle(one: np.ndarray, other: np.ndarray) -> float:
+    """Angle between two directions, exact for small ones too."""
+    return float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))

@@ -1,0 +1,288 @@
+"""Whether arc notches are in balance, by a rod integrated anew in numpy.
+
+An arc notch is a rod along its neutral axis with five strains: bending toward its side and bending
+sideways, each constant and linear along the rod, and a constant twist about the shear centre.
+Pose of the distal body against the proximal one: six numbers. So the strains follow from the two
+poses that are reported, with one number left that must fit. From the strains follow by the law of
+the material the moments inside, and these must balance, in the mean over the notch, what acts on
+everything beyond (acting.py) and what tendons on the wall and closed lips do to the notch.
+
+A mode whose strain is nil may be one that the solver left out for these loads; its balance is not
+asked for. (What is left out is told by `moment_error`.)
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from acting import State
+from numpy.polynomial.legendre import leggauss
+
+import notchflex as nf
+
+_SECTIONS = {"on-axis": nf.annular_sector, "off-axis": nf.annular_segment}
+# Seven Gauss nodes all along, those of the solver: where the law of the material has a kink within
+# the notch, the mean over other nodes would differ.
+_POINTS, _HALVES = leggauss(7)
+_NODES, _WEIGHTS = 0.5 * (_POINTS + 1.0), 0.5 * _HALVES
+_LINEAR = 2.0 * _NODES - 1.0
+# Between nodes the rod is integrated in so many steps.
+_STEPS = 3
+_ENDS = np.concatenate([[0.0], _NODES, [1.0]])
+_PLACES = np.arange(float(len(_ENDS)))
+_STOPS = np.interp(np.linspace(0.0, _PLACES[-1], (len(_ENDS) - 1) * _STEPS + 1), _PLACES, _ENDS)
+_NUDGE = 1e-6  # rad, for slopes
+_FITTED = 1e-12  # rad, where the fit of the strains ends
+_NIL = 1e-7  # rad, of a mode
+# The solver integrates the pose in its own way, to better than this (rad, and lengths over the
+# notch's height) as long as a notch bends by less than half a turn.
+POSE = 1e-6
+# Relative to what acts, and of the moment that bends the notch by a tenth of a degree.
+BALANCE, _SMALL = 1e-6, 2e-3
+
+
+class Arcs(NamedTuple):
+    """The arc notches of a robot in one state, their numbers (from 0) and what the fit found.
+
+    Attributes:
+        notches: Which notches of the robot.
+        modes: Bending toward the side (elastic; constant, linear), sideways, and twist, rad.
+        misfit: What of the relative poses no strains explain, rad and heights.
+        problems: What does not hold.
+    """
+
+    notches: list[int]
+    modes: np.ndarray
+    misfit: np.ndarray
+    problems: list[str]
+
+
+def judge_arcs(state: State, path: nf.Path) -> Arcs:
+    """Fit strains to the poses of one step, and add up every arc notch.
+
+    Args:
+        state: The forces on the bodies.
+        path: The path, for contact forces, gaps and moments that it reports.
+    """
+    robot, step = state.robot, state.step
+    chosen = [i for i, notch in enumerate(robot.notches) if isinstance(notch, nf.ArcNotch)]
+    if not chosen:
+        return Arcs([], np.zeros((0, 5)), np.zeros(0), [])
+    notches = [robot.notches[i] for i in chosen]
+    outer = robot.tube.outer_radius
+    left = [left_by(one, robot.tube) for one in notches]
+    centroid = np.array([float(one.centroid) for one in left])
+    shear = np.array([float(one.shear_centre) for one in left]) - centroid
+    height = np.array([one.height for one in notches])
+    precurved = np.radians([one.precurvature_deg for one in notches])
+    frames = np.array([about_z(one.direction_deg) for one in notches])
+    before, behind = np.array(chosen), np.array(chosen) + 1
+    axis = np.stack([-centroid, 0 * centroid, 0 * centroid], axis=-1)
+    lead = np.stack([0 * height, 0 * height, state.length[before]], axis=-1)
+    start = state.rotation[before] @ frames
+    begins = _at(state.origin[before], state.rotation[before], lead) + _turned(start, axis)
+    end = state.rotation[behind] @ frames
+    ends = state.origin[behind] + _turned(end, axis)
+    turn = np.swapaxes(start, 1, 2) @ end
+    move = _turned(np.swapaxes(start, 1, 2), ends - begins) / height[:, None]
+    modes, misfit = _fit(turn, move, precurved, shear / height)
+    rotations, places = (one[:-1] for one in _rods(modes, precurved, shear / height))
+    problems = [
+        f"notch {i + 1}: no strains of an arc lead to its pose (by {miss:.1e})"
+        for i, miss in zip(chosen, misfit, strict=True)
+        if miss > POSE
+    ]
+    for k, i in enumerate(chosen):
+        node_at = begins[k] + height[k] * places[:, k] @ start[k].T
+        node_turn = start[k] @ rotations[:, k]
+        force, about, size = state.beyond_with_size(i + 1, node_at[2])
+        asked = about + np.cross(node_at[2] - node_at, force)
+        local = np.einsum("gba,gb->ga", node_turn, asked)
+        across = np.einsum("gba,b->ga", node_turn, force)
+        local[:, 2] += shear[k] * across[:, 1]
+        scale = size[1]
+        for number, tendon in enumerate(robot.tendon):
+            if tendon.path == "wall-arc" and i < state.end_body(number):
+                place = frames[k].T @ state.tendon_place(number) - axis[k]
+                pull = state.tension[number, 2 * i + 1]
+                local[:, 0] -= pull * place[1]
+                local[:, 1] += pull * place[0]
+                scale += abs(pull) * float(np.hypot(place[0], place[1]))
+        lip = path.contact_force[step, i] * (outer + centroid[k])
+        local[:, 1] -= lip
+        scale += abs(lip)
+        inside = _inside(robot.material, left[k], modes[k], height[k])
+        floor = _SMALL * robot.material.elastic_modulus * float(left[k].second_moment_weak)
+        scale += floor / height[k]
+        problems += _out_of_balance(i, modes[k], inside, local, scale)
+        problems += _disagreeing(state, path, i, modes[k], precurved[k], outer + centroid[k])
+        largest = inside[np.abs(inside[:, 1]).argmax(), 1]
+        if abs(largest - path.notch_moment[step, i]) > BALANCE * scale:
+            problems.append(f"notch {i + 1}: notch_moment is not that of its strains")
+    return Arcs(chosen, modes, misfit, problems)
+
+
+def _out_of_balance(
+    notch: int, modes: np.ndarray, inside: np.ndarray, local: np.ndarray, scale: float
+) -> list[str]:
+    """Means over the notch of moment inside less moment asked for, by each mode that is used."""
+    missing = inside - local
+    left = {
+        "bending": _WEIGHTS @ missing[:, 1],
+        "linear bending": _WEIGHTS @ (_LINEAR * missing[:, 1]),
+        "sideways bending": _WEIGHTS @ missing[:, 0],
+        "linear sideways bending": _WEIGHTS @ (_LINEAR * missing[:, 0]),
+        "twist": _WEIGHTS @ missing[:, 2],
+    }
+    return [
+        f"notch {notch + 1}: {name} out of balance by {abs(value) / scale:.1e}"
+        for k, (name, value) in enumerate(left.items())
+        if (k == 0 or abs(modes[k]) > _NIL) and abs(value) > BALANCE * scale
+    ]
+
+
+def _disagreeing(
+    state: State, path: nf.Path, notch: int, modes: np.ndarray, precurved: float, lip: float
+) -> list[str]:
+    """Gap as the lips' fibre has it."""
+    height = state.robot.notches[notch].height
+    gap = height - lip * (precurved + modes[0])
+    if abs(gap - path.gap[state.step, notch]) > POSE * height:
+        return [f"notch {notch + 1}: gap {path.gap[state.step, notch]:.3g} mm, not {gap:.3g}"]
+    return []
+
+
+def _inside(
+    material: nf.Linear | nf.Superelastic, left: nf.Section, modes: np.ndarray, height: float
+) -> np.ndarray:
+    """Moments about x, y, z at the nodes by the law of the material, N mm."""
+    bend = (modes[0] + modes[1] * _LINEAR) / height
+    sideways = (modes[2] + modes[3] * _LINEAR) / height
+    twist = np.full(len(_NODES), modes[4] / height)
+    modulus = material.elastic_modulus
+    shear = modulus / (2.0 * (1.0 + material.poisson_ratio))
+    weak, spine = float(left.second_moment_weak), float(left.edge_spine)
+    return np.stack(
+        [
+            modulus * float(left.second_moment_strong) * sideways,
+            weak / spine * stress(material, bend * spine),
+            shear * float(left.torsion_constant) * twist,
+        ],
+        axis=-1,
+    )
+
+
+@lru_cache(maxsize=256)
+def left_by(notch: nf.ArcNotch, tube: nf.Tube) -> nf.Section:
+    """What the cut of an arc notch leaves of the tube."""
+    return _SECTIONS[notch.cut](tube.outer_radius, tube.inner_radius, notch.depth)
+
+
+def stress(material: nf.Linear | nf.Superelastic, strain: np.ndarray) -> np.ndarray:
+    """Stress of a fibre (Pacheco 2021, eq. 13), MPa."""
+    if isinstance(material, nf.Linear):
+        return material.elastic_modulus * strain
+    size = np.abs(strain)
+    first = np.minimum(size, material.transition_strain)
+    second = np.clip(size, material.transition_strain, material.plastic_strain)
+    third = np.maximum(size - material.plastic_strain, 1e-300)
+    hardening = material.plastic_modulus * np.exp(material.plastic_exponent / third)
+    flat = material.superelastic_modulus * (second - material.transition_strain)
+    return np.sign(strain) * (material.elastic_modulus * first + flat + hardening)
+
+
+def _fit(
+    turn: np.ndarray, move: np.ndarray, precurved: np.ndarray, shear: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Modes that lead to given poses, by Gauss and Newton; and what is left, largest by notch."""
+    back = np.swapaxes(turn, 1, 2)
+
+    def off(modes: np.ndarray) -> np.ndarray:
+        rotations, places = _rods(modes, precurved, shear)
+        left = [_unskew(back @ rotations[-1]), _turned(back, places[-1] - move)]
+        return np.concatenate(left, axis=-1)
+
+    vector = _unskew(turn)
+    angle = np.arctan2(np.linalg.norm(vector, axis=-1), 0.5 * (np.trace(turn.T) - 1.0))
+    vector = vector / np.maximum(np.sinc(angle / np.pi), 1e-3)[:, None]
+    modes = np.zeros((len(turn), 5))
+    modes[:, 0], modes[:, 2], modes[:, 4] = vector[:, 1] - precurved, vector[:, 0], vector[:, 2]
+    here = off(modes)
+    for attempt in range(12):
+        if attempt in (0, 3):
+            slope = [(off(modes + nudge) - here) / _NUDGE for nudge in _NUDGE * np.eye(5)]
+            inverse = np.linalg.pinv(np.stack(slope, axis=-1))
+        change = np.einsum("nij,nj->ni", inverse, here)
+        modes = modes - change
+        here = off(modes)
+        if np.abs(change).max() < _FITTED:
+            break
+    return modes, np.abs(here).max(axis=-1)
+
+
+def _rods(
+    modes: np.ndarray, precurved: np.ndarray, shear: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations and places (over the height) of the rods at all nodes and, last, at their ends."""
+    constant, linear = np.zeros((2, len(modes), 6))
+    constant[:, 1], constant[:, 0] = precurved + modes[:, 0], modes[:, 2]
+    constant[:, 2], constant[:, 4], constant[:, 5] = modes[:, 4], shear * modes[:, 4], 1.0
+    linear[:, 1], linear[:, 0] = 2.0 * modes[:, 1], 2.0 * modes[:, 3]
+    size = np.diff(_STOPS)[:, None, None]
+    middle = constant + (0.5 * (_STOPS[1:] + _STOPS[:-1]) - 0.5)[:, None, None] * linear
+    # Magnus to fourth order, of a strain that is linear in the place.
+    twist = size * middle + size**3 / 12.0 * _bracket(middle, np.broadcast_to(linear, middle.shape))
+    by, to = _exponential(twist)
+    rotation = np.broadcast_to(np.eye(3), (len(modes), 3, 3))
+    place = np.zeros((len(modes), 3))
+    rotations, places = [], []
+    for k in range(len(by)):
+        place = place + _turned(rotation, to[k])
+        rotation = rotation @ by[k]
+        if (k + 1) % _STEPS == 0:
+            rotations.append(rotation)
+            places.append(place)
+    return np.stack(rotations), np.stack(places)
+
+
+def _exponential(twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation and displacement along a constant twist (angular, linear) of small angle."""
+    angular, linear = twist[..., :3], twist[..., 3:]
+    square = np.sum(angular**2, axis=-1)
+    angle = np.sqrt(square)
+    first = np.sinc(angle / np.pi)[..., None]
+    second = 0.5 * np.sinc(0.5 * angle / np.pi)[..., None] ** 2
+    series = 1 - square / 20 * (1 - square / 42 * (1 - square / 72 * (1 - square / 110)))
+    once = np.cross(angular, linear)
+    moved = linear + second * once + series[..., None] / 6.0 * np.cross(angular, once)
+    matrix = np.cross(np.eye(3), angular[..., None, :])  # its rows are e_i x w
+    turned = np.eye(3) + first[..., None] * matrix + second[..., None] * (matrix @ matrix)
+    return turned, moved
+
+
+def _bracket(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    turn = np.cross(one[..., :3], other[..., :3])
+    move = np.cross(one[..., :3], other[..., 3:]) + np.cross(one[..., 3:], other[..., :3])
+    return np.concatenate([turn, move], axis=-1)
+
+
+def _unskew(matrix: np.ndarray) -> np.ndarray:
+    above = matrix[:, [2, 0, 1], [1, 2, 0]]
+    return 0.5 * (above - matrix[:, [1, 2, 0], [2, 0, 1]])
+
+
+def about_z(degrees: float) -> np.ndarray:
+    """Rotation about the tube axis."""
+    turn = np.radians(degrees)
+    cosine, sine = np.cos(turn), np.sin(turn)
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _turned(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    return np.einsum("nij,nj->ni", rotation, vector)
+
+
+def _at(origin: np.ndarray, rotation: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    return origin + _turned(rotation, inside)

@@ -1,0 +1,198 @@
+"""Fuzzing: random robots under random paths of loads, each from rest, and what came of them.
+
+A row for each shape of robot (shapes.py): how many states were solved, how many were not and for
+which reason, how many failed silently (NaN in a state that is called solved, an exception, a
+failure without a reason), how many are wrong, and how long a state took. Wrong is what does not
+balance when it is added up outside the solver (judge.py).
+
+    python benchmarks/robustness.py [--count 640] [--seed 1] [--json FILE] [--shape NAME]
+
+Draw i of a seed is the same whatever the count; `--first I --count 1` runs it alone if the shape
+is left to its number. Exit code 1: something silent or wrong. The first robot of a shape compiles
+its program, which is no part of the times; putting a robot's arrays together is, in the first step.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from draw import Draw, draws
+from judge import plain, wrong
+from shapes import SHAPES
+
+import notchflex as nf
+
+# What a solved state must tell as finite numbers; gap and contact tables have NaN where nothing is.
+FINITE = (
+    "tension",
+    "stroke",
+    "notch_angle",
+    "total_angle",
+    "body_position",
+    "body_rotation",
+    "tip_position",
+    "notch_moment",
+    "outer_strain",
+    "peak_strain",
+    "contact_force",
+    "base_force",
+    "base_moment",
+    "moment_error",
+    "stored_energy",
+    "residual",
+    "smallest_eigenvalue",
+)
+
+
+@dataclass
+class Outcome:
+    """What came of one state of a draw.
+
+    Attributes:
+        number: Of the draw.
+        step: Of its path, from 0.
+        seconds: How long the state took.
+        reason: Why it was not solved; empty where it was.
+        silent: What failed without being told.
+        wrong: What does not hold of a solved state.
+    """
+
+    number: int
+    step: int
+    seconds: float = float("nan")
+    reason: str = ""
+    silent: list[str] = field(default_factory=list)
+    wrong: list[str] = field(default_factory=list)
+
+
+def silent(path: nf.Path) -> list[str]:
+    """What a path of one load fails to tell."""
+    if not path.converged[0]:
+        return [] if path.reason[0] else ["not converged, and no reason"]
+    names = [name for name in FINITE if not np.isfinite(getattr(path, name)).all()]
+    return [f"{name} is not finite" for name in names]
+
+
+def follow(one: Draw) -> Iterator[Outcome]:
+    """Solve the loads of a draw one after the other, up to the first that is not solved."""
+    state = None
+    for step, load in enumerate(one.loads):
+        outcome = Outcome(one.number, step)
+        try:
+            start = time.perf_counter()
+            path = nf.simulate(one.robot, load, from_state=state)
+            outcome.seconds = time.perf_counter() - start
+            outcome.reason = path.reason[0]
+            outcome.silent = silent(path)
+            if path.converged[0]:
+                outcome.wrong = wrong(one.robot, load, path)
+        except Exception as error:  # whatever it is, it is counted
+            outcome.silent = [f"{type(error).__name__}: {error}"]
+        yield outcome
+        if outcome.reason or outcome.silent:
+            return
+        state = path.state
+
+
+def warm(one: Draw) -> float:
+    """Compile the program of a draw's shape; its time, s."""
+    start = time.perf_counter()
+    path = nf.simulate(one.robot, one.loads[0])
+    _ = path.smallest_eigenvalue  # a program of its own, computed when asked for
+    return time.perf_counter() - start
+
+
+def row(name: str, outcomes: list[Outcome]) -> dict[str, object]:
+    """Counts and times (ms) of one shape, or of all."""
+    seconds = [one.seconds for one in outcomes if np.isfinite(one.seconds)] or [np.nan]
+    middle, late, last = 1e3 * np.quantile(seconds, [0.5, 0.95, 1.0])
+    reasons = Counter(plain(one.reason) for one in outcomes if one.reason)
+    return {
+        "shape": name,
+        "draws": len({one.number for one in outcomes}),
+        "states": len(outcomes),
+        "solved": sum(not one.reason and not one.silent for one in outcomes),
+        "unsolved": dict(reasons.most_common()),
+        "silent": sum(bool(one.silent) for one in outcomes),
+        "wrong": sum(bool(one.wrong) for one in outcomes),
+        "median_ms": middle,
+        "p95_ms": late,
+        "max_ms": last,
+    }
+
+
+def show(rows: Iterable[dict]) -> None:
+    """Print the table and, below, the reasons."""
+    rows = list(rows)
+    print(
+        f"{'shape':22}{'draws':>7}{'states':>8}{'solved':>8}{'unsolved':>9}{'silent':>7}"
+        f"{'wrong':>6}{'median':>9}{'95 %':>9}{'max ms':>9}"
+    )
+    for one in rows:
+        print(
+            f"{one['shape']:22}{one['draws']:7}{one['states']:8}{one['solved']:8}"
+            f"{sum(one['unsolved'].values()):9}{one['silent']:7}{one['wrong']:6}"
+            f"{one['median_ms']:9.2f}{one['p95_ms']:9.2f}{one['max_ms']:9.1f}"
+        )
+    for one in rows:
+        for reason, count in one["unsolved"].items():
+            print(f"{one['shape']}: {count} x {reason}")
+
+
+def told(outcomes: list[Outcome], names: dict[int, str]) -> None:
+    """Print every state that is silent, wrong or not solved, with what reproduces it."""
+    for one in outcomes:
+        what = [*one.silent, *one.wrong, *([one.reason] if one.reason else [])]
+        if what:
+            kind = "silent" if one.silent else "wrong" if one.wrong else "unsolved"
+            print(f"{kind}: draw {one.number} ({names[one.number]}) step {one.step}: {what[0]}")
+            for more in what[1:]:
+                print(f"    {more}")
+
+
+def main() -> int:
+    """Draw, solve, judge, print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=640, help="robots to draw")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="number of the first draw")
+    parser.add_argument("--shape", help="only draws of this shape")
+    parser.add_argument("--json", type=Path, help="write rows and every state that is not good")
+    given = parser.parse_args()
+    outcomes: dict[str, list[Outcome]] = {shape.name: [] for shape in SHAPES}
+    names: dict[int, str] = {}
+    compiled: dict[str, float] = {}
+    last = given.first + given.count
+    for one in draws(last, given.seed):
+        name = one.shape.name
+        if one.number < given.first or given.shape not in (None, name):
+            continue
+        if name not in compiled:
+            compiled[name] = warm(one)
+        names[one.number] = name
+        outcomes[name] += follow(one)
+        print(f"\r{one.number + 1} of {last}  {name:24}", end="", file=sys.stderr)
+    print(file=sys.stderr)
+    every = sorted((one for some in outcomes.values() for one in some), key=lambda o: o.number)
+    rows = [row(name, some) for name, some in outcomes.items() if some]
+    rows.append(row("all", every))
+    told(every, names)
+    print(f"\nseed {given.seed}, draws {given.first} to {last - 1}")
+    show(rows)
+    if given.json:
+        bad = [vars(one) for one in every if one.reason or one.silent or one.wrong]
+        content = {"seed": given.seed, "rows": rows, "compiled_s": compiled, "not_good": bad}
+        given.json.write_text(json.dumps(content, indent=1) + "\n")
+    return int(any(one.silent or one.wrong for one in every))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,75 @@
+"""Many arrays as one: what goes into a compiled program, and what comes out of it.
+
+A chain has some sixty arrays. Handed over one by one they take longer than the solution of a small
+robot; as one vector they cost nothing, robots of one form differ only in its numbers, and a batch
+of robots is a table of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from jaxtyping import Array
+
+from notchflex._jax import array_module, jax
+
+
+class Form:
+    """How a tree of arrays is laid out in a vector of floats.
+
+    Forms are kept: trees of the same make have the very same form, so that compiled programs tell
+    them apart by identity.
+    """
+
+    _known: ClassVar[dict[Any, Form]] = {}
+
+    def __init__(self, structure: Any, shapes: tuple[Any, ...], kinds: tuple[str, ...]) -> None:
+        """Lay out leaves of given shapes and kinds of numbers one after the other."""
+        self.structure, self.shapes, self.kinds = structure, shapes, kinds
+        sizes = [int(np.prod(shape)) for shape in shapes]
+        self.ends = np.cumsum(sizes)[:-1].tolist()
+        self.size = sum(sizes)
+
+    @classmethod
+    def of(cls, tree: Any) -> Form:
+        """The form of a tree."""
+        leaves, structure = jax.tree.flatten(tree)
+        shapes = tuple(np.shape(leaf) for leaf in leaves)
+        kinds = tuple(np.dtype(leaf.dtype).kind for leaf in leaves)
+        key = (structure, shapes, kinds)
+        if key not in cls._known:
+            cls._known[key] = cls(*key)
+        return cls._known[key]
+
+    def pack(self, tree: Any, leading: int = 0) -> Any:
+        """The leaves of a tree as one vector, or one per entry of so many leading axes.
+
+        A vector of NumPy where all leaves are plain.
+        """
+        leaves = self.structure.flatten_up_to(tree)
+        xp = array_module(*leaves)
+        flat = [
+            xp.reshape(xp.asarray(leaf, dtype=float), (*np.shape(leaf)[:leading], -1))
+            for leaf in leaves
+        ]
+        return xp.concatenate(flat, axis=-1)
+
+    def unpack(self, vector: Any) -> Any:
+        """The tree of a vector (NumPy's or JAX's), with the vector's leading axes."""
+        xp = array_module(vector)
+        parts = xp.split(vector, self.ends, axis=-1)
+        leaves = [
+            _as_kind(part.reshape(*vector.shape[:-1], *shape), kind)
+            for part, shape, kind in zip(parts, self.shapes, self.kinds, strict=True)
+        ]
+        return jax.tree.unflatten(self.structure, leaves)
+
+
+def _as_kind(values: Array, kind: str) -> Array:
+    if kind == "b":
+        return values != 0.0
+    return values.astype(int) if kind in "iu" else values
+
+
+__all__ = ["Form"]

@@ -1,0 +1,79 @@
+"""Batches give what one solve after the other gives, whatever robots and loads they mix."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def wrist() -> nf.Robot:
+    return nf.load_robot("pacheco2021-a")
+
+
+def test_loads_of_one_robot(wrist, margin):
+    loads = nf.pull(0.0, 2.5, steps=70)  # more than are solved side by side
+    told: list[tuple[int, int]] = []
+    found = nf.solve_batch(wrist, loads, progress=lambda done, count: told.append((done, count)))
+    each = nf.solve_each(wrist, loads)
+    assert found["converged"].all()
+    margin.within("total angle", found["total_angle"] - each.total_angle, 1e-12, "rad")
+    margin.within("tip", found["tip_position"] - each.tip_position, 1e-12, "mm")
+    np.testing.assert_allclose(found["tip_rotation"], each.tip_rotation, atol=1e-12)
+    assert told[-1] == (70, 70)
+
+
+def test_paths_remember(wrist, margin):
+    paths = [nf.pull(0.0, top, steps=5).release() for top in (1.0, 1.5, 2.0)]
+    names = ("total_angle", "contact_log_ratio", "iterations", "converged")
+    found = nf.simulate_batch(wrist, paths, outputs=names)
+    assert set(found) == set(names)
+    assert found["converged"].all()
+    for row, path in enumerate(paths):
+        alone = nf.simulate(wrist, path)
+        margin.within("angle", found["total_angle"][row] - alone.total_angle, 1e-12, "rad")
+        margin.within("memory", found["contact_log_ratio"][row] - alone.contact_log_ratio, 1e-10)
+
+
+def test_robots_of_one_form_and_of_others(wrist, margin):
+    deeper = [wrist.with_value("notch.depth", depth) for depth in (1.36, 1.38, 1.40)]
+    robots = [*deeper, nf.load_robot("pacheco2021-b"), nf.load_robot("pacheco2021-c")]
+    tensions = np.array([0.5, 1.0, 1.5, 0.7, 0.4])
+    loads = [nf.Load(tension=float(tension)) for tension in tensions]
+    found = nf.solve_batch(robots, loads, outputs=("notch_angle", "total_angle"))
+    for row, (robot, load) in enumerate(zip(robots, loads, strict=True)):
+        alone = nf.solve(robot, load)
+        count = robot.number_of_notches
+        margin.within("total", found["total_angle"][row] - alone.total_angle, 1e-12, "rad")
+        own = found["notch_angle"][row]
+        margin.within("notches", own[:count] - alone.notch_angle, 1e-12, "rad")
+        assert np.isnan(own[count:]).all()
+
+
+def test_a_row_that_fails_leaves_the_others(wrist):
+    loads = [nf.Load(stroke=1.0), nf.Load(stroke=50.0), nf.Load(stroke=0.5)]
+    assert nf.solve_batch(wrist, loads)["converged"].tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("robots", "loads", "outputs", "said"),
+    [
+        ([], [nf.Load(tension=1.0)], ("total_angle",), "needs a notchflex.Robot"),
+        ("pacheco2021-a", [nf.Load(tension=1.0)], ("total_angle",), "needs a notchflex.Robot"),
+        (2, [nf.Load(tension=1.0)] * 3, ("total_angle",), "got 2 robots and 3 loads"),
+        (1, [nf.Load(tension=1.0)], ("angle",), "no output 'angle'"),
+        (1, [], ("total_angle",), "no loads"),
+    ],
+)
+def test_what_makes_no_batch(wrist, robots, loads, outputs, said):
+    given = [wrist] * robots if isinstance(robots, int) else robots
+    with pytest.raises(InputError, match=said):
+        nf.solve_batch(given, loads, outputs=outputs)
+
+
+def test_paths_of_unlike_lengths(wrist):
+    with pytest.raises(InputError, match="equally many steps"):
+        nf.simulate_batch(wrist, [nf.pull(0, 1, steps=2), nf.pull(0, 1, steps=3)])
