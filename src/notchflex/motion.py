@@ -190,17 +190,6 @@ def exponential(twist: Float[Array, " w"]) -> Motion:
     return Motion(rotation, linear + second * (matrix @ linear) + third * (twice @ linear))
 
 
-def bracket(first: Float[Array, " w"], second: Float[Array, " w"]) -> Float[Array, " w"]:
-    """Lie bracket of two twists: how far following one and then the other depends on the order."""
-    xp = array_module(first, second)
-    axes = angular(first)
-    turn, move = first[:axes], first[axes:]
-    other_turn, other_move = second[:axes], second[axes:]
-    moved = cross(turn, other_move) - cross(other_turn, move)
-    both = cross(turn, other_turn) if axes == 3 else xp.zeros_like(turn)
-    return xp.concatenate([both, moved])
-
-
 def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " w"]:
     """A force at a point as a wrench (moment, force) about the origin."""
     return array_module(point, force).concatenate([moment_of(point, force), force])

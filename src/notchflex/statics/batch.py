@@ -27,7 +27,7 @@ from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form
 from notchflex.statics.path import MODES_FAIL, command
 from notchflex.statics.prepare import Prepared
-from notchflex.statics.quantities import Quantities, Shape, quantities, shape
+from notchflex.statics.quantities import Quantities, Shape, quantities, shape, total_angle
 from notchflex.statics.solve import prepared_for
 from notchflex.statics.stepping import Solved, advance, at_rest
 
@@ -246,15 +246,11 @@ class _Table:
         size = _PIECE if len(self.rows) > _SMALL else _SMALL
         count = min(size, len(self.rows) - start)
         index = start + np.minimum(np.arange(size), count - 1)
-        chains, commands = (
-            values[index] if len(values) > 1 else np.broadcast_to(values, (size, *values.shape[1:]))
-            for values in (self.chains, self.commands)
-        )
-        forms = (self.ready.chain_form, self.ready.command, self.ready.state, self.outputs)
+        commands = self.commands[index if len(self.commands) > 1 else np.zeros_like(index)]
         one_robot = len(self.chains) == 1
-        came = _follow_all(
-            self.ready.vector if one_robot else chains, commands, numbers, *forms, one_robot
-        )
+        chains = self.ready.vector if one_robot else self.chains[index]
+        forms = (self.ready.chain_form, self.ready.command, self.ready.state, self.outputs)
+        came = _follow_all(chains, commands, numbers, *forms, one_robot)
         return {name: np.asarray(values)[:count] for name, values in came.items()}
 
 
@@ -324,26 +320,20 @@ def _follow_all(
 
         return jax.lax.scan(step, (rest, jnp.array(True)), path)[1]
 
-    in_axes = (None, 0) if one_robot else (0, 0)
-    if one_robot:
-        side_by_side = commands.reshape(-1, _SIDE_BY_SIDE, *commands.shape[1:])
-        found = jax.lax.map(lambda some: jax.vmap(follow, in_axes)(chains, some), side_by_side)
-    else:
-        some_of_each = tuple(
-            values.reshape(-1, _SIDE_BY_SIDE, *values.shape[1:]) for values in (chains, commands)
-        )
-        found = jax.lax.map(lambda some: jax.vmap(follow, in_axes)(*some), some_of_each)
+    each = partial(follow, chains) if one_robot else follow
+    tables = [
+        values.reshape(-1, _SIDE_BY_SIDE, *values.shape[1:])
+        for values in ((commands,) if one_robot else (chains, commands))
+    ]
+    found = jax.lax.map(lambda some: jax.vmap(each)(*some), tables)
     return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), found)
 
 
 def _told(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
     """What is asked of a state, and whether it may be believed."""
     own = shape(chain, solved)
-    along = jnp.einsum("na,a->n", chain.notch_frame[:, :, 0], chain.notch_frame[0, :, 0])
-    in_plane = jnp.all(jnp.abs(jnp.abs(along) - 1.0) < 1e-12)
     last = own.body_rotation[-1]
-    between = jnp.arccos(jnp.clip(last[2, 2], -1.0, 1.0))
-    total = jnp.where(in_plane, own.notch_angle @ jnp.sign(along), between)
+    total = total_angle(chain.notch_frame, own.notch_angle, last)
     known = {**own._asdict(), "tip_rotation": last, "total_angle": total}
     if any(name in Quantities._fields for name in outputs):
         known |= quantities(chain, solved)._asdict()

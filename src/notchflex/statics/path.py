@@ -18,6 +18,7 @@ from notchflex.statics.actuation import Command, drawn_when_closed
 from notchflex.statics.applied import applied, in_frame, out_of_frame
 from notchflex.statics.load import LoadPath
 from notchflex.statics.prepare import Prepared
+from notchflex.statics.quantities import total_angle
 from notchflex.statics.run import Run, stability
 from notchflex.statics.state import State
 from notchflex.statics.stepping import Solved
@@ -127,12 +128,8 @@ class Path:
         Where all notches bend in one plane, the sum of their angles, toward the first one's bend
         positive; otherwise the angle between the axes of base and tip.
         """
-        direction = np.radians([notch.direction_deg for notch in self.robot.notches])
-        along = np.cos(direction - direction[0])
-        if np.allclose(np.abs(along), 1.0, atol=1e-12):
-            return self.notch_angle @ np.sign(along)
-        cosine = np.clip(self._of("body_rotation")[..., -1, 2, 2], -1.0, 1.0)
-        return np.arccos(cosine)
+        frame, tip = np.asarray(self.chain.notch_frame), self._of("body_rotation")[..., -1, :, :]
+        return np.asarray(total_angle(frame, self.notch_angle, tip))  # pyright: ignore
 
     @cached_property
     def _base(self) -> np.ndarray:

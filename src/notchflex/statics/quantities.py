@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import array_module, jax, jnp
 from notchflex.chain import Chain
 from notchflex.flexure import FlexureState, in_space, relative_pose
 from notchflex.motion import IN_PLANE, Motion, wrench_at
@@ -64,6 +64,27 @@ def shape(chain: Chain, solved: Solved) -> Shape:
         friction_holds=jnp.all(chain.friction.valid(turning[0], turning[1])),
         moment_error=moment_error(chain, point.unknowns, at),
     )
+
+
+def total_angle(
+    notch_frame: Float[Array, "n 3 3"],
+    notch_angle: Float[Array, "*s n"],
+    tip_rotation: Float[Array, "*s 3 3"],
+) -> Float[Array, "*s"]:
+    """Bending angle of a whole robot, rad, of plain arrays or traced ones.
+
+    Where all notches bend in one plane, the sum of their angles, toward the first one's bend
+    positive; otherwise the angle between the axes of base and tip.
+    """
+    xp = array_module(notch_angle)
+    along = notch_frame[:, :, 0] @ notch_frame[0, :, 0]
+    in_plane = xp.all(xp.abs(xp.abs(along) - 1.0) <= _IN_PLANE)
+    between = xp.arccos(xp.clip(tip_rotation[..., 2, 2], -1.0, 1.0))
+    return xp.where(in_plane, notch_angle @ xp.sign(along), between)
+
+
+# Of the cosine between the directions of two notches, less than 0.3 degrees.
+_IN_PLANE = 1e-5
 
 
 class Quantities(NamedTuple):

@@ -114,9 +114,7 @@ def run(
     count = len(commands.value)
     form = prepared.command
     packed = form.pack(commands, leading=1)
-    size = next((size for size in _SIZES if size >= count), -(-count // _SIZES[-1]) * _SIZES[-1])
-    if size > count:
-        packed = packed[np.minimum(np.arange(size), count - 1)]
+    packed = packed[_padded(count)]
     first = prepared.rest_vector if start is None else prepared.state.pack(start)
     options = np.array([*settings.numbers, float(each_from_start), float(count)])
     forms = (prepared.chain_form, form, prepared.state)
@@ -170,11 +168,15 @@ def _lips(
     return jax.lax.map(at_lips, commands)
 
 
+def _padded(count: int) -> Int[np.ndarray, " size"]:
+    """Entries up to one of the sizes, the last one repeated."""
+    size = next((size for size in _SIZES if size >= count), -(-count // _SIZES[-1]) * _SIZES[-1])
+    return np.minimum(np.arange(size), count - 1)
+
+
 def _pad(tree: Any) -> Any:
     """Repeat the last entry until the leading axis has one of the sizes."""
-    count = len(jax.tree.leaves(tree)[0])
-    size = next((size for size in _SIZES if size >= count), -(-count // _SIZES[-1]) * _SIZES[-1])
-    index = np.minimum(np.arange(size), count - 1)
+    index = _padded(len(jax.tree.leaves(tree)[0]))
     return jax.tree.map(lambda leaf: np.asarray(leaf)[index], tree)
 
 

@@ -26,7 +26,6 @@ class Spans(NamedTuple):
 
     Attributes:
         crossing: Its way over every gap.
-        brought: Tension that comes from the base side.
         gap_tension: Tension in the gap; 0 where the tendon has no span there.
         body_tension: Tension inside the distal body, likewise.
         drawn: How much tendon the shape has set free beyond the distal body.
@@ -38,7 +37,6 @@ class Spans(NamedTuple):
     """
 
     crossing: Crossing
-    brought: Float[Array, "n t"]
     gap_tension: Float[Array, "n t"]
     body_tension: Float[Array, "n t"]
     drawn: Float[Array, "n t"]
@@ -56,14 +54,12 @@ class Wrenches(NamedTuple):
         ending: What the spans and lips that end at body j do to the bodies j - m and beyond
             together, for m = 0 ... window - 1.
         handed: The same of those that end beyond body j.
-        own: The loads from outside on body j; None where there are none.
-        outside: Those on it and on all beyond it; None likewise.
+        outside: The loads from outside on body j and all beyond; None where there are none.
         whole: All that acts on body j and beyond.
     """
 
     ending: Float[Array, "n window w"]
     handed: Float[Array, "n window w"]
-    own: Float[Array, "n w"] | None
     outside: Float[Array, "n w"] | None
     whole: Float[Array, "n w"]
 
@@ -251,7 +247,6 @@ def _spans(
     bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
     return Spans(
         crossing=crossing,
-        brought=brought,
         gap_tension=gap_tension,
         body_tension=body_tension,
         drawn=beyond[0],
@@ -272,23 +267,21 @@ class _Outside(NamedTuple):
     """Loads from outside on all bodies; None where there are none."""
 
     rotation: Float[Array, "n d d"] | None
-    own: Float[Array, "n w"] | None
     beyond: Float[Array, "n w"] | None
     load: Float[Array, " w"] | None
 
 
 def _outside(pose: Motion, applied: Applied | None) -> _Outside:
-    """Each body's own loads, and the sum over it and all beyond, in the frame of the body."""
+    """Sum of the loads on every body and all beyond, in the frame of the body."""
     if applied is None:
-        return _Outside(None, None, None, None)
+        return _Outside(None, None, None)
     bodies = body_poses(pose)
     beyond_base: Motion = jax.tree.map(lambda leaf: leaf[1:], bodies)
     own = jax.vmap(body_wrench)(beyond_base.rotation, jax.tree.map(lambda leaf: leaf[1:], applied))
     in_base = jax.vmap(Motion.wrench)(beyond_base, own)
     summed = jnp.cumsum(in_base[::-1], axis=0)[::-1]
-    return _Outside(
-        beyond_base.rotation, own, jax.vmap(Motion.wrench_inside)(beyond_base, summed), summed[0]
-    )
+    inside = jax.vmap(Motion.wrench_inside)(beyond_base, summed)
+    return _Outside(beyond_base.rotation, inside, summed[0])
 
 
 def body_poses(relative: Motion) -> Motion:
@@ -329,7 +322,7 @@ def _wrenches(
     whole = ending[:, 0] + handed[0]
     if outside.beyond is not None:
         whole = whole + outside.beyond
-    return Wrenches(ending, jnp.stack(handed, axis=1), outside.own, outside.beyond, whole)
+    return Wrenches(ending, jnp.stack(handed, axis=1), outside.beyond, whole)
 
 
 def reaches(chain: Chain, back: Array) -> Float[Array, "n t window"]:
