@@ -1,6 +1,7 @@
 """Settings that all tests share."""
 
 import os
+from importlib.metadata import version
 
 import pytest
 from hypothesis import settings
@@ -22,7 +23,12 @@ def pytest_configure(config: pytest.Config) -> None:
     # compiled in a third of the time; that the optimised code of users finds the same numbers is
     # a test of its own (tests/statics/test_as_users_run_it.py).
     flags = os.environ.get("XLA_FLAGS", "")
-    os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_optimization_level=0".strip()
+    options = ["--xla_backend_optimization_level=0"]
+    # The library's own programs go without these emitters (_jax.py); functions that users
+    # differentiate can't choose, and are compiled in a third of the time without.
+    if version("jax").split(".")[:2] < ["0", "11"]:
+        options.append("--xla_cpu_use_fusion_emitters=false")
+    os.environ["XLA_FLAGS"] = " ".join([flags, *options]).strip()
     # Compiled code is kept beside pytest's own cache, for the other process of `-n 2` and later.
     cache = getattr(config, "cache", None)
     if cache is not None:

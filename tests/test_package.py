@@ -20,6 +20,7 @@ NAMES = [
     "simulate", "Equilibrium", "Path", "State", "tip_from_angles", "equal_stroke", "closing",
     "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError", "draw",
     "solve_each", "Batch", "solve_batch", "simulate_batch",
+    "Differentiable", "differentiable", "TipResponse", "tip_response",
     "bodies_from_angles", "SharedStroke", "Closing", "ConvergenceError", "Settings",
     "BodyForce",
     "StripNotch", "ULink", "Corner",

@@ -25,6 +25,7 @@ from notchflex.statics import Batch as Batch
 from notchflex.statics import BodyForce as BodyForce
 from notchflex.statics import Closing as Closing
 from notchflex.statics import ConvergenceError as ConvergenceError
+from notchflex.statics import Differentiable as Differentiable
 from notchflex.statics import Equilibrium as Equilibrium
 from notchflex.statics import Load as Load
 from notchflex.statics import LoadPath as LoadPath
@@ -32,8 +33,10 @@ from notchflex.statics import Path as Path
 from notchflex.statics import Settings as Settings
 from notchflex.statics import SharedStroke as SharedStroke
 from notchflex.statics import State as State
+from notchflex.statics import TipResponse as TipResponse
 from notchflex.statics import bodies_from_angles as bodies_from_angles
 from notchflex.statics import closing as closing
+from notchflex.statics import differentiable as differentiable
 from notchflex.statics import draw as draw
 from notchflex.statics import equal_stroke as equal_stroke
 from notchflex.statics import pull as pull
@@ -43,5 +46,6 @@ from notchflex.statics import solve as solve
 from notchflex.statics import solve_batch as solve_batch
 from notchflex.statics import solve_each as solve_each
 from notchflex.statics import tip_from_angles as tip_from_angles
+from notchflex.statics import tip_response as tip_response
 
 __version__: str

@@ -10,7 +10,7 @@ import time
 import pytest
 
 QUICK = (["--help"], ["robots"], ["schema"], ["simulate", "--help"], ["compare", "--help"])
-ROOT_VERBS = ("robots", "show", "schema", "new", "simulate", "compare")
+ROOT_VERBS = ("robots", "show", "schema", "new", "simulate", "compare", "bench")
 
 
 def notchflex(*arguments, cwd=None, stdin=""):

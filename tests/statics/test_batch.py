@@ -7,6 +7,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.errors import InputError
+from notchflex.statics.outputs import OUTPUTS
 
 
 @pytest.fixture(scope="module")
@@ -77,3 +78,33 @@ def test_what_makes_no_batch(wrist, robots, loads, outputs, said):
 def test_paths_of_unlike_lengths(wrist):
     with pytest.raises(InputError, match="equally many steps"):
         nf.simulate_batch(wrist, [nf.pull(0, 1, steps=2), nf.pull(0, 1, steps=3)])
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        nf.Load(tension=2.4),
+        nf.Load(tension=1.5, tip_force=(0.02, 0.0, -0.01)),
+        nf.Load(stroke=0.7),
+    ],
+)
+def test_robots_of_unlike_length_share_a_program(wrist, load, margin):
+    robots = [
+        wrist.replace(
+            notch=(nf.ArcNotch("on-axis", 1.40, 0.8, uncut_length=1.2, repeat=count),),
+            tendon=(nf.Tendon(0.7),),
+        )
+        for count in (2, 4, 3)
+    ]
+    names = [name for name in OUTPUTS if name not in ("residual", "iterations")]
+    found = nf.solve_batch(robots, load, outputs=names)
+    for row, robot in enumerate(robots):
+        alone = nf.solve(robot, load)
+        for name in names:
+            one = np.asarray(getattr(alone, name))
+            all_of_it = found[name][row]
+            own = all_of_it[tuple(slice(size) for size in one.shape)]
+            np.testing.assert_allclose(own, one, rtol=1e-8, atol=1e-9, err_msg=name)
+    assert np.isnan(found["notch_angle"][0, 2:]).all()
+    assert np.isnan(found["body_position"][0, 3:]).all()
+    margin.within("tip", found["tip_position"][1] - nf.solve(robots[1], load).tip_position, 1e-9)

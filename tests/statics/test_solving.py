@@ -220,3 +220,20 @@ def test_modes_that_fill_up_are_no_modes_of_the_robot() -> None:
     smallest = min(np.linalg.eigvalsh(stiffness).min() for stiffness in real)
     assert smallest > 2.0
     assert path.smallest_eigenvalue[0] == pytest.approx(smallest, rel=1e-9)
+
+
+def test_a_notch_that_would_pass_through_itself_is_no_answer():
+    # Draw 1191 of seed 5 of benchmarks/robustness.py in short: far more load than a notch can bear
+    # where nothing closes it.
+    robot = nf.Robot(
+        name="soft",
+        tube=nf.Tube(2.0, 1.8),
+        notch=(nf.ArcNotch("on-axis", 1.6, 3.0, uncut_length=1.0, repeat=2),),
+        tendon=(nf.Tendon(0.9),),
+        material=nf.Linear(100.0),
+        friction=nf.Frictionless(),
+    )
+    for moment in (20.0, 200.0):
+        state = nf.solve(robot, nf.Load(tip_moment=(0.0, -moment, 0.0)))
+        assert not state.converged
+        assert "half a turn" in state.reason or "equilibrium" in state.reason

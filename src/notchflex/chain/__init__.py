@@ -1,6 +1,7 @@
 """The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
 
 from notchflex.chain.chain import Chain, assemble, flexure_states
+from notchflex.chain.pad import padded
 from notchflex.chain.plane import bending_normal, tendons_in_plane
 
 __all__ = [
@@ -8,5 +9,6 @@ __all__ = [
     "assemble",
     "bending_normal",
     "flexure_states",
+    "padded",
     "tendons_in_plane",
 ]

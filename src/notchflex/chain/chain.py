@@ -60,6 +60,8 @@ class Chain(eqx.Module):
         elastic: Stiffness of the modes of each flexure against each other, N mm, where the
             material is linear; None where the law of the material must be asked.
         lip_stiffness: Stiffness of each notch at its lips in the free robot, N/mm.
+        closing_force: Force that would close a notch by that stiffness, mean of all, N.
+        drawn_stiffness: How fast the tension of a tendon answers its stroke, roughly, N/mm.
         frame: Rotation from the frame in which flexures, tendons and lips are given to that of the
             base: x and z span the plane of bending of a flat chain. None in space.
         notch_frame: Rotation from the frame of every notch, turned by its direction, to the tube.
@@ -86,6 +88,8 @@ class Chain(eqx.Module):
     stiffness: Float[Array, "n modes"]
     elastic: Float[Array, "n modes modes"] | None
     lip_stiffness: Float[Array, " n"]
+    closing_force: Float[Array, ""]
+    drawn_stiffness: Float[Array, ""]
     frame: Float[Array, "3 3"] | None
     notch_frame: Float[Array, "n 3 3"]
     tendon_place: Float[Array, "t 3"]
@@ -114,8 +118,7 @@ class Chain(eqx.Module):
     @property
     def memory_stiffness(self) -> Float[Array, " t"]:
         """Axial stiffness that the memory of the contacts uses, always finite, N."""
-        closing = jnp.mean(self.lip_stiffness * jnp.sum(self.rods.length, axis=-1))
-        return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS * closing)
+        return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS * self.closing_force)
 
 
 def assemble(
@@ -149,18 +152,24 @@ def assemble(
         notch: with_level(rod(notch, robot.tube, refinement), level)
         for notch in dict.fromkeys(notches)
     }
-    rods = stack([unlike[notch] for notch in notches])
+    # Notches that are alike are worked out once.
+    alike = stack(list(unlike.values()))
+    which = [list(unlike).index(notch) for notch in notches]
+    rods = jax.tree.map(lambda leaf: leaf[which], alike)
     body_length = constant(body_lengths(robot))
     lead = body_length[:-1, None] * _UP
     rods = eqx.tree_at(lambda rods: rods.start_offset, rods, rods.start_offset + lead)
+    free = jax.tree.map(lambda leaf: leaf[which], _free_poses(alike))
+    free = Motion(free.rotation, free.translation + lead)
     body_mass, body_centre = body_masses(robot, rods)
     law = section_law(robot.material)
-    elastic = _elastic(rods, law)
+    elastic = _elastic(alike, law)[which]
     stiffness = np.einsum("nmm->nm", elastic)
     tendons = robot.tendon
     chord = getattr(robot.friction, "turning", None) == "chord"
-    ground = Ground(notches, rods, _free_poses(rods), body_length, turns_with_chord=chord)
+    ground = Ground(notches, rods, free, body_length, turns_with_chord=chord)
     laid = route(tendons, ground)
+    lip_stiffness = _lip_stiffness(rods, stiffness, robot.tube.outer_radius)
     chain = Chain(
         rods=rods,
         memory=(),
@@ -175,7 +184,9 @@ def assemble(
         body_centre=constant(body_centre),
         stiffness=constant(stiffness),
         elastic=constant(elastic) if law.is_linear else None,
-        lip_stiffness=constant(_lip_stiffness(rods, stiffness, robot.tube.outer_radius)),
+        lip_stiffness=constant(lip_stiffness),
+        closing_force=constant(np.mean(lip_stiffness * rods.length.sum(axis=-1))),
+        drawn_stiffness=constant(np.mean(lip_stiffness) / len(notches)),
         frame=None,
         notch_frame=constant(
             [rotation_about(_UP * np.radians(notch.direction_deg)) for notch in notches]

@@ -72,6 +72,10 @@ VERBS = {
         "notchflex compare pacheco2021-a-specimen wrist_A_measured.csv --plot compare.png\n"
         "    notchflex compare my-wrist.toml pulls.csv --path --set friction.coefficient=0.1",
     ),
+    "bench": (
+        "Time the solver on this machine.",
+        "notchflex bench --json bench.json\n    notchflex bench --only wrist",
+    ),
 }
 """Verb to its one-line help and its examples."""
 

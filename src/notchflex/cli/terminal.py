@@ -8,7 +8,7 @@ import os
 import shutil
 import sys
 import unicodedata
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, TextIO
 
 from notchflex.results.streams import let_go
@@ -82,6 +82,16 @@ def working(text: str) -> Generator[None]:
         return
     with messages().status(text):
         yield
+
+
+@contextlib.contextmanager
+def progress(text: str) -> Generator[Callable[[str], None]]:
+    """As `working`, for what takes minutes: yields a function that tells what is done now."""
+    if not sys.stderr.isatty():
+        yield lambda step: None
+        return
+    with messages().status(text) as status:
+        yield lambda step: status.update(f"{text} {step}")
 
 
 def _say(head: str, style: str, text: str) -> None:

@@ -1,5 +1,6 @@
 """Names of values, such as `notch[2].depth`, and setting values by them (`--set`)."""
 
+import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -98,6 +99,37 @@ def parse_assignment(text: str) -> tuple[str, object]:
     if not (path and equals and value):
         raise InputError(f"`{text}` sets nothing; {_EXAMPLES.replace('depth', 'depth=1.3', 1)}.")
     return path, _value(value)
+
+
+def number_at(robot: Robot, path: str) -> float:
+    """The number of a robot that has a name, in the units of the robot file.
+
+    Args:
+        robot: The robot.
+        path: Its name, as for `Robot.with_value`.
+
+    Raises:
+        InputError: There is no such value, it is no number that may change little by little, or
+            several notches have unlike ones.
+    """
+    if not isinstance(path, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError(f"{path!r} is not the name of a value; {_EXAMPLES}.")
+    target = _parse(path)
+    found: set[object] = set()
+    for one in _chosen(to_table(robot), target) if target.section != "name" else ():
+        keys = fields_of(_class_of(target.section, one))
+        if target.key in keys:
+            found.add(one.get(target.key, keys[target.key].default))
+    if not found:
+        raise InputError(f"`{path}` is not the name of a number of this robot; {_EXAMPLES}.")
+    if len(found) > 1:
+        raise InputError(f"`{path}` has unlike values in this robot; name one, such as [1].")
+    value = found.pop()
+    if not isinstance(value, float) or not math.isfinite(value):
+        raise InputError(
+            f"`{path}` is {value!r} in this robot, and no number that changes smoothly."
+        )
+    return value
 
 
 def _value(text: str) -> object:

@@ -2,6 +2,7 @@
 
 from notchflex.statics.batch import Batch, simulate_batch, solve_batch
 from notchflex.statics.closing import Closing, closing
+from notchflex.statics.differentiable import Differentiable, differentiable
 from notchflex.statics.external import BodyForce, ExternalLoad
 from notchflex.statics.kinematics import (
     SharedStroke,
@@ -15,12 +16,14 @@ from notchflex.statics.path import ConvergenceError, Equilibrium, Path
 from notchflex.statics.ramps import draw, pull
 from notchflex.statics.solve import simulate, solve, solve_each
 from notchflex.statics.state import SavedState, State
+from notchflex.statics.tip_response import TipResponse, tip_response
 
 __all__ = [
     "Batch",
     "BodyForce",
     "Closing",
     "ConvergenceError",
+    "Differentiable",
     "Equilibrium",
     "ExternalLoad",
     "Load",
@@ -30,8 +33,10 @@ __all__ = [
     "Settings",
     "SharedStroke",
     "State",
+    "TipResponse",
     "bodies_from_angles",
     "closing",
+    "differentiable",
     "draw",
     "equal_stroke",
     "pull",
@@ -41,4 +46,5 @@ __all__ = [
     "solve_batch",
     "solve_each",
     "tip_from_angles",
+    "tip_response",
 ]

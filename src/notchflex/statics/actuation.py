@@ -21,19 +21,45 @@ class Command(NamedTuple):
 
     Attributes:
         value: Tension (N) or stroke (mm).
-        by_stroke: Whether it is a stroke.
+        by_stroke: Whether it is a stroke; None where all are tensions.
         applied: Other loads on the bodies; None for a chain assembled for tendons alone.
     """
 
     value: Float[Array, " t"]
-    by_stroke: Bool[Array, " t"]
+    by_stroke: Bool[Array, " t"] | None
     applied: Applied | None
+
+    def either(self, by_stroke: Array, by_tension: Array) -> Array:
+        """Of two values per tendon the one that belongs to what is demanded of it."""
+        return (
+            by_tension
+            if self.by_stroke is None
+            else jnp.where(self.by_stroke, by_stroke, by_tension)
+        )
 
 
 def tensions_alone(value: Float[np.ndarray, "s t"]) -> Command:
     """Tensions of every tendon (N), loads as leading axis, and nothing else."""
-    by_stroke = cast("Array", np.zeros(value.shape, bool))
-    return Command(constant(value), by_stroke, None)
+    return Command(constant(value), None, None)
+
+
+def filled(commands: Command, flexures: int, by_stroke: bool) -> Command:
+    """Loads, as leading axis, for a chain with more flexures that carry none.
+
+    Args:
+        commands: The loads.
+        flexures: How many flexures the chain has.
+        by_stroke: Whether they are to stand beside loads by stroke.
+    """
+    drawn, others = commands.by_stroke, commands.applied
+    if by_stroke and drawn is None:
+        drawn = cast("Array", np.zeros(commands.value.shape, bool))
+    if others is not None:
+        more = flexures + 1 - others.dead_force.shape[1]
+        others = jax.tree.map(
+            lambda leaf: np.pad(leaf, [(0, 0), (0, more)] + [(0, 0)] * (leaf.ndim - 2)), others
+        )
+    return Command(commands.value, drawn, others)
 
 
 def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Base) -> Float[Array, " t"]:
@@ -62,11 +88,6 @@ def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
     return reach
 
 
-def stroke_scale(chain: Chain) -> Float[Array, ""]:
-    """A stiffness of the size of the robot's own, N/mm: how fast tension answers stroke."""
-    return jnp.mean(chain.lip_stiffness) / chain.flexures
-
-
 def command_residual(
     chain: Chain, command: Command, base_tension: Float[Array, " t"], base: Base
 ) -> Float[Array, " t"]:
@@ -75,8 +96,8 @@ def command_residual(
     A tendon drawn by stroke is slack where the robot has set free more than is drawn:
     tension >= 0, stroke set free >= stroke demanded, product 0.
     """
-    scale = stroke_scale(chain)
+    scale = chain.drawn_stiffness
     pressed = base_tension + scale * (command.value - stroke(chain, base_tension, base))
     by_stroke = base_tension - jnp.where(pressed >= 0.0, pressed, 0.0)
     by_tension = base_tension - command.value
-    return jnp.where(command.by_stroke, by_stroke, by_tension) / scale
+    return command.either(by_stroke, by_tension) / scale

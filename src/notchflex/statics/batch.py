@@ -2,7 +2,7 @@
 
 Robots of one form (as many notches, tendons and modes, the same laws) run through one program, a
 row of numbers each. A batch is cut into pieces; the cores take one after the other, so that memory
-is bounded whatever the batch.
+is bounded whatever the batch. Where JAX has a GPU they run there, whole pieces side by side.
 """
 
 from __future__ import annotations
@@ -15,35 +15,38 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from notchflex._jax import jax, jit, jnp
+from notchflex._jax import jax, jit
 from notchflex.chain import Chain
 from notchflex.errors import InputError
 from notchflex.robot import Robot
+from notchflex.statics.actuation import filled
 from notchflex.statics.given import shown
 from notchflex.statics.load import Load, LoadPath, joined_paths, load_path
-from notchflex.statics.newton import Settings
+from notchflex.statics.newton import DEFAULT, Settings
+from notchflex.statics.outputs import DEFAULT_OUTPUTS, followed, known_outputs
 from notchflex.statics.packing import Form
-from notchflex.statics.path import MODES_FAIL, command
-from notchflex.statics.prepare import Prepared
-from notchflex.statics.quantities import Quantities, Shape, quantities, shape, total_angle
+from notchflex.statics.path import command
+from notchflex.statics.prepare import Prepared, lengthened
 from notchflex.statics.solve import prepared_for
-from notchflex.statics.stepping import Solved, advance, at_rest
+from notchflex.statics.stepping import advance, at_rest
 
-DEFAULT_OUTPUTS = ("total_angle", "tip_position", "tip_rotation", "converged")
-OUTPUTS = (
-    *DEFAULT_OUTPUTS,
-    "residual",
-    "iterations",
-    *(name for name in Shape._fields if name not in ("tip_position", "friction_holds")),
-    *Quantities._fields,
+_BY_FLEXURE = (
+    "notch_angle",
+    "chord_angle",
+    "notch_moment",
+    "outer_strain",
+    "peak_strain",
+    "gap",
+    "contact_force",
 )
-"""What can be asked of a batch."""
+_BY_BODY = ("body_position", "body_rotation")
 
-# Rows of a piece, and rows of it that are solved side by side.
-_PIECE, _SIDE_BY_SIDE = 1024, 64
-_SMALL = 64
+# Rows of a piece, by how many rows there are, so that all cores have work; and rows of it that are
+# solved side by side.
+_PIECES = {0: 64, 512: 256, 8192: 1024}
+_SIDE_BY_SIDE = 64
 
 
 class Batch(Mapping[str, np.ndarray]):
@@ -181,23 +184,21 @@ def _simulate(
     progress: Callable[[int, int], None] | None,
 ) -> dict[str, np.ndarray]:
     """Follow paths, given one after the other as a long one, each from rest."""
-    wrong = [name for name in outputs if name not in OUTPUTS]
-    if wrong:
-        raise InputError(f"a batch has no output {wrong[0]!r}; there are {', '.join(OUTPUTS)}")
+    asked = known_outputs(outputs)
     count = max(len(robots), paths)
     if len(robots) not in (1, count) or paths not in (1, count):
         raise InputError(
             "a batch needs as many robots as loads, or one of either; "
             f"got {len(robots)} robots and {paths} loads"
         )
-    numbers = np.array([*(settings or Settings()).numbers])
+    numbers = np.array([*(settings or DEFAULT).numbers])
     found: dict[str, np.ndarray] = {}
     done = 0
     with ThreadPoolExecutor(cores or os.cpu_count() or 1) as pool:
         work = [
-            (table.rows[start : start + _PIECE], pool.submit(table.run, start, numbers))
-            for table in _tables(robots, joined, paths, count, tuple(outputs), refinement)
-            for start in range(0, len(table.rows), _PIECE)
+            (table.rows[start : start + table.piece], pool.submit(table.run, start, numbers))
+            for table in _tables(robots, joined, paths, count, asked, refinement)
+            for start in range(0, len(table.rows), table.piece)
         ]
         for rows, piece in work:
             for name, values in piece.result().items():
@@ -232,6 +233,8 @@ class _Table:
         rows: Which rows of the batch these are.
         chains: A row per robot, or one for all.
         commands: A row per path, or one for all, then the steps.
+        command_form: Form of one of them.
+        flexures: How many flexures are the robot's own, by row, or one number for all.
         outputs: What is asked.
     """
 
@@ -239,19 +242,36 @@ class _Table:
     rows: np.ndarray
     chains: Float[np.ndarray, "k chain"]
     commands: Float[np.ndarray, "k s command"]
+    command_form: Form
+    flexures: Int[np.ndarray, " k"]
     outputs: tuple[str, ...]
+
+    @property
+    def piece(self) -> int:
+        """How many rows are solved in one call of the program."""
+        return max(size for least, size in _PIECES.items() if len(self.rows) >= least)
 
     def run(self, start: int, numbers: np.ndarray) -> dict[str, np.ndarray]:
         """Solve a piece of the rows."""
-        size = _PIECE if len(self.rows) > _SMALL else _SMALL
+        size = self.piece
         count = min(size, len(self.rows) - start)
         index = start + np.minimum(np.arange(size), count - 1)
         commands = self.commands[index if len(self.commands) > 1 else np.zeros_like(index)]
         one_robot = len(self.chains) == 1
-        chains = self.ready.vector if one_robot else self.chains[index]
-        forms = (self.ready.chain_form, self.ready.command, self.ready.state, self.outputs)
+        chains = self.chains[0] if one_robot else self.chains[index]
+        forms = (self.ready.chain_form, self.command_form, self.ready.state, self.outputs)
         came = _follow_all(chains, commands, numbers, *forms, one_robot)
-        return {name: np.asarray(values)[:count] for name, values in came.items()}
+        own = self.flexures[index[:count] if len(self.flexures) > 1 else np.zeros(count, int)]
+        return {name: _of_own(name, np.array(values)[:count], own) for name, values in came.items()}
+
+
+def _of_own(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
+    """Values by flexure or body with NaN where a robot has none, rows and steps as leading axes."""
+    own = flexures + (name in _BY_BODY)
+    if name in (*_BY_FLEXURE, *_BY_BODY) and (own < values.shape[2]).any():
+        beyond = np.arange(values.shape[2]) >= own[:, None]
+        values[np.broadcast_to(beyond[:, None], values.shape[:3])] = np.nan
+    return values
 
 
 def _tables(
@@ -262,31 +282,30 @@ def _tables(
     outputs: tuple[str, ...],
     refinement: int,
 ) -> list[_Table]:
-    """The rows of a batch by the form of their robots."""
+    """The rows of a batch by the form of their robots, shorter ones filled up to the longest."""
     steps = len(joined) // paths
-
-    def packed(robot: Robot, ready: Prepared, path: LoadPath) -> np.ndarray:
-        command_of = ready.command.pack(command(path, robot, ready.chain), leading=1)
-        return command_of.reshape(-1, steps, ready.command.size)
-
-    if len(robots) == 1:
-        ready = prepared_for(robots[0], joined, None, refinement)
-        commands = packed(robots[0], ready, joined)
-        chains = np.asarray(ready.vector)[None]
-        return [_Table(ready, np.arange(count), chains, commands, outputs)]
-    by_form: dict[Form, tuple[Prepared, list[int], list[np.ndarray], list[np.ndarray]]] = {}
-    for row, robot in enumerate(robots):
-        # The modes that any of the loads asks for, so that rows share a program.
-        ready = prepared_for(robot, joined, None, refinement)
-        own = joined if paths == 1 else joined.part(row * steps, steps)
-        _, rows, chains, commands = by_form.setdefault(ready.chain_form, (ready, [], [], []))
-        rows.append(row)
-        chains.append(np.asarray(ready.vector))
-        commands.append(packed(robot, ready, own)[0])
-    return [
-        _Table(ready, np.array(rows), np.stack(chains), np.stack(commands), outputs)
-        for ready, rows, chains, commands in by_form.values()
-    ]
+    # The modes that any of the loads asks for, so that rows share a program.
+    every = [prepared_for(robot, joined, None, refinement) for robot in robots]
+    flexures = max(ready.chain.flexures for ready in every)
+    edges = max(ready.chain.contacts.shape[1] for ready in every)
+    by_stroke = not np.isnan(joined.stroke).all()
+    tables: dict[tuple[Form, Form], list[tuple[int, Prepared, int, np.ndarray]]] = {}
+    for row, (robot, own) in enumerate(zip(robots, every, strict=True)):
+        part = joined if len(robots) == 1 or paths == 1 else joined.part(row * steps, steps)
+        commands = filled(command(part, robot, own.chain), flexures, by_stroke)
+        ready = lengthened(own, flexures, edges)
+        form = ready.command_form(commands)
+        packed = form.pack(commands, leading=1).reshape(-1, steps, form.size)
+        entry = (row, ready, own.chain.flexures, packed)
+        tables.setdefault((ready.chain_form, form), []).append(entry)
+    made = []
+    for (_, form), entries in tables.items():
+        numbers, robots_of_one, own, commands = zip(*entries, strict=True)
+        rows = np.arange(count) if len(robots) == 1 else np.array(numbers)
+        chains = np.stack([np.asarray(ready.vector) for ready in robots_of_one])
+        commands = np.concatenate(commands)
+        made.append(_Table(robots_of_one[0], rows, chains, commands, form, np.array(own), outputs))
+    return made
 
 
 @partial(jit, static_argnums=(3, 4, 5, 6, 7))
@@ -303,42 +322,20 @@ def _follow_all(
     """Follow the paths of all rows, some rows side by side."""
     settings = Settings.of(numbers)
 
-    def follow(chain_vector: Array, path: Array) -> dict[str, Array]:
+    def one(chain_vector: Array, path: Array) -> dict[str, Array]:
         chain: Chain = chain_form.unpack(chain_vector)
-        rest = at_rest(chain)
+        commands = command_form.unpack(path)
+        return followed(chain, commands, at_rest(chain), settings, outputs, advance)
 
-        def step(state: tuple[Solved, Array], packed: Array) -> tuple[Any, dict[str, Array]]:
-            last, alive = state
-            came = advance(chain, command_form.unpack(packed), last, settings)
-            solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), came.solved, last)
-            reached = alive & came.converged
-            told = _told(chain, solved, outputs)
-            converged = reached & told.pop("_holds")
-            own = {"residual": came.residual, "iterations": came.iterations, "converged": converged}
-            told |= {name: value for name, value in own.items() if name in outputs}
-            return (solved, reached), told
-
-        return jax.lax.scan(step, (rest, jnp.array(True)), path)[1]
-
-    each = partial(follow, chains) if one_robot else follow
+    each = partial(one, chains) if one_robot else one
+    on_cores = jax.default_backend() == "cpu"
+    beside = _SIDE_BY_SIDE if on_cores else len(commands)
     tables = [
-        values.reshape(-1, _SIDE_BY_SIDE, *values.shape[1:])
+        values.reshape(-1, beside, *values.shape[1:])
         for values in ((commands,) if one_robot else (chains, commands))
     ]
     found = jax.lax.map(lambda some: jax.vmap(each)(*some), tables)
     return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), found)
 
 
-def _told(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
-    """What is asked of a state, and whether it may be believed."""
-    own = shape(chain, solved)
-    last = own.body_rotation[-1]
-    total = total_angle(chain.notch_frame, own.notch_angle, last)
-    known = {**own._asdict(), "tip_rotation": last, "total_angle": total}
-    if any(name in Quantities._fields for name in outputs):
-        known |= quantities(chain, solved)._asdict()
-    told = {name: known[name] for name in outputs if name in known}
-    return told | {"_holds": own.friction_holds & (own.moment_error < MODES_FAIL)}
-
-
-__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "Batch", "simulate_batch", "solve_batch"]
+__all__ = ["Batch", "simulate_batch", "solve_batch"]

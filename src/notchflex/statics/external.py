@@ -90,6 +90,8 @@ class ExternalLoad:
 
     def __post_init__(self) -> None:
         """Check the numbers and keep them as tuples, so that equal loads are found equal."""
+        if self._is_default:
+            return
         mass = number(self.tip_mass, "tip_mass", "a number of grams")
         if not 0.0 <= mass < float("inf"):
             raise InputError(f"tip_mass must be finite and 0 g or more; got {mass:g}")
@@ -108,8 +110,15 @@ class ExternalLoad:
             object.__setattr__(self, name, value)
 
     @property
+    def _is_default(self) -> bool:
+        """Whether no field was given, as in most loads: then there is nothing to check."""
+        return all(getattr(self, name) is default for name, default in _DEFAULTS)
+
+    @property
     def external(self) -> ExternalLoad:
         """What acts from outside, without what else a load may command."""
+        if self._is_default:
+            return NOTHING
         return ExternalLoad(**{name: getattr(self, name) for name in EXTERNAL})
 
     @property
@@ -139,6 +148,7 @@ def _body_forces(value: Any) -> tuple[BodyForce, ...]:
 
 
 EXTERNAL = tuple(one.name for one in fields(ExternalLoad))
+_DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))
 NOTHING = ExternalLoad()
 
 __all__ = ["EXTERNAL", "HANGING", "NOTHING", "BodyForce", "ExternalLoad"]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from notchflex.errors import InputError
+from notchflex.robot import Robot
 
 
 def number(value: Any, what: str, form: str = "a number") -> float:
@@ -93,6 +94,19 @@ def table(value: Any, what: str) -> np.ndarray:
         ) from None
 
 
+def robot_given(value: Any) -> Robot:
+    """A robot.
+
+    Raises:
+        InputError: It is none.
+    """
+    if not isinstance(value, Robot):
+        raise InputError(
+            f'a notchflex.Robot is needed, such as load_robot("pacheco2021-a"); got {shown(value)}'
+        )
+    return value
+
+
 def shown(value: Any) -> str:
     """A value as Python writes it, cut short."""
     try:
@@ -102,4 +116,4 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-__all__ = ["number", "shown", "table", "truth", "vector", "whole"]
+__all__ = ["number", "robot_given", "shown", "table", "truth", "vector", "whole"]

@@ -8,12 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Array
 
-from notchflex._jax import constant
+from notchflex._jax import constant, jnp
 from notchflex.chain import Chain
 
 
 class Units(NamedTuple):
-    """Rows of one 1 each, for every number that may change, in the order of the rows' axis."""
+    """Rows of one 1 each, for every number that may change, in the order of the rows' axis.
+
+    How bodies move depends on few of them: rows of motions are short, over the modes and the
+    motions of bodies further back alone, until `spread` puts them among the others.
+    """
 
     modes: Array
     lips: list[Array]
@@ -25,6 +29,30 @@ class Units(NamedTuple):
     outside: Array
     drawn: list[Array]
     stretch: list[Array]
+
+    @property
+    def motions(self) -> list[Array]:
+        """Short unit rows of the motions of bodies further back."""
+        modes, count = len(self.modes), sum(len(rows) for rows in self.older)
+        units = np.eye(modes + count)[modes:]
+        return [constant(rows) for rows in np.split(units, max(len(self.older), 1)) if len(rows)]
+
+    def of_modes(self, rows: Array) -> Array:
+        """Rows over the modes as short rows."""
+        return _padded(rows, sum(len(motion) for motion in self.older))
+
+    def spread(self, rows: Array) -> Array:
+        """Short rows over all numbers that may change."""
+        modes, whole = self.modes.shape
+        between = sum(len(own) for own in (*self.lips, *self.log_ratio))
+        beyond = whole - rows.shape[-1] - between
+        return jnp.concatenate(
+            [_padded(rows[..., :modes], between), _padded(rows[..., modes:], beyond)], axis=-1
+        )
+
+
+def _padded(rows: Array, behind: int) -> Array:
+    return jnp.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, behind)])
 
 
 @dataclass(frozen=True)

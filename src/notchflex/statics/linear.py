@@ -29,7 +29,7 @@ from notchflex.motion import Motion, skew, wrench_turn
 from notchflex.statics.applied import Applied, body_wrench
 from notchflex.statics.element import RATE, STICTION, Memory, Unknowns, driven, heights, pressed
 from notchflex.statics.layout import Layout, Units, layout
-from notchflex.statics.strands import Moves, Opening, Strand, moves_of, opening_of, strand_of, times
+from notchflex.statics.strands import Moves, Opening, Strand, moves_of, opening_of, strand_of
 from notchflex.statics.walk import Evaluation, holds, reaches
 
 
@@ -68,15 +68,19 @@ def blocks(
             chain.rods, chain.law, chain.memory, unknowns.modes
         )
     behind: list[Array] = []
+
+    def by_modes(rows: Array) -> Array:
+        return unit.spread(unit.of_modes(rows))
+
     if at.wrenches is not None:
         assert at.flexure.bent is not None
         elastic = elastic - jax.vmap(pull_change)(
             chain.rods, unknowns.modes, at.flexure.bent, at.wrenches.whole
         )
         whole, behind = _forces(chain, unknowns, applied, at, unit, moves, strands, openings)
-        balance = times(elastic, unit.modes) - jnp.einsum("nwm,nwz->nmz", at.flexure.twist, whole)
+        balance = by_modes(elastic) - jnp.einsum("nwm,nwz->nmz", at.flexure.twist, whole)
     else:
-        balance = times(elastic, unit.modes)
+        balance = by_modes(elastic)
     for strand, span in zip(strands, at.spans, strict=True):
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, strand.gap_tension)
@@ -91,11 +95,12 @@ def blocks(
         chain.lips, at.touches, unknowns.lip_force, unit.lips, openings, strict=True
     ):
         presses = pressed(chain.lip_stiffness, group.closes, force, touch.gap)[..., None]
-        residual.append(jnp.where(presses, opening.gap / height, own[None] / (stiff * height)))
+        closing = unit.spread(opening.gap)
+        residual.append(jnp.where(presses, closing / height, own[None] / (stiff * height)))
     residual += [
-        _friction(chain, k, unknowns, memory, at, strand) for k, strand in enumerate(strands)
+        _friction(chain, k, unknowns, memory, at, unit, strand) for k, strand in enumerate(strands)
     ]
-    onward = [-moves.relative[number] for number in range(form.older)]
+    onward = [-unit.spread(moves.relative[number]) for number in range(form.older)]
     onward += [] if moves.turn is None else [moves.turn]
     onward += [strand.carried for strand in strands]
     behind += [strand.drawn for strand in strands] + [strand.stretch for strand in strands]
@@ -131,16 +136,14 @@ def _forces(
     for group, span, strand in zip(chain.groups, at.spans, strands, strict=True):
         if strand.wrench is not None and span.crossing.wrench is not None:
             along = strand.gap_tension[:, :, None] * span.crossing.wrench[..., None]
-            pull = along + span.gap_tension[..., None, None] * strand.wrench
+            pull = along + unit.spread(span.gap_tension[..., None, None] * strand.wrench)
             ending = ending - jnp.einsum("ntwz,ntk->nkwz", pull, reaches(chain, group.back))
     for group, touch, force, own, opening in zip(
         chain.lips, at.touches, unknowns.lip_force, unit.lips, openings, strict=True
     ):
         if opening.wrench is not None and touch.wrench is not None:
-            along = (
-                own[None, :, None] * touch.wrench[..., None]
-                + force[..., None, None] * opening.wrench
-            )
+            along = own[None, :, None] * touch.wrench[..., None]
+            along = along + unit.spread(force[..., None, None] * opening.wrench)
             push = group.closes[..., None, None] * along
             ending = ending + jnp.einsum("nlwz,nlk->nkwz", push, reaches(chain, group.back))
     whole = ending[:, 0]
@@ -151,7 +154,8 @@ def _forces(
     def handed_back(rows: Array, wrench: Array) -> Array:
         """Rows of a wrench that goes along with the distal body, seen from the body before."""
         turning = jax.vmap(wrench_turn)(wrench)
-        return back(pose, rows + jnp.einsum("nvw,nwz->nvz", turning, moves.relative[0]))
+        turned = jnp.einsum("nvw,nwz->nvz", turning, moves.relative[0])
+        return back(pose, rows + unit.spread(turned))
 
     behind = []
     for number in range(1, chain.window):
@@ -162,7 +166,8 @@ def _forces(
         behind.append(handed_back(rows, beyond))
     if applied is not None and moves.turn is not None and at.rotation is not None:
         on_bodies = jax.tree.map(lambda leaf: leaf[1:], applied)
-        own = times(jax.vmap(_by_turn)(at.rotation, on_bodies), moves.turn)
+        turns = jax.vmap(_by_turn)(at.rotation, on_bodies)
+        own = jnp.einsum("nwa,naz->nwz", turns, moves.turn)
         whole = whole + unit.outside[None] + own
         behind.append(handed_back(unit.outside[None] + own, cast("Array", wrenches.outside)))
     return whole, behind
@@ -184,6 +189,7 @@ def _friction(
     unknowns: Unknowns,
     memory: Memory,
     at: Evaluation,
+    unit: Units,
     strand: Strand,
 ) -> Float[Array, "n 2t z"]:
     """Rows of the memory law of both edges."""
@@ -197,6 +203,7 @@ def _friction(
     # Edges, then the turning angles that they depend on.
     slope = jnp.stack([jnp.stack(by_one, axis=-1) for by_one in slopes], axis=-1)
     limit = jnp.einsum("ntes,nstz->ntez", holds(group)[..., None] * slope, strand.turning)
+    limit = unit.spread(limit)
     height = heights(chain)[:, None, None, None]
     stuck = -RATE * (strand.at_edges / height - strand.log_ratio[None] / STICTION)
     value, bound = driven(chain, own, span.slid, memory, k), span.bound

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from typing import Any, NamedTuple, cast
 
 import equinox as eqx
@@ -12,10 +13,10 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual, stroke
-from notchflex.statics.element import Memory, Unknowns
+from notchflex.statics.element import Memory, Unknowns, pressed
 from notchflex.statics.play import played
 from notchflex.statics.sweep import Step, linear_step
-from notchflex.statics.walk import evaluate
+from notchflex.statics.walk import Evaluation, evaluate
 
 
 class Settings(eqx.Module):
@@ -45,6 +46,9 @@ class Settings(eqx.Module):
     def of(cls, numbers: Float[Array, " settings"]) -> Settings:
         """Settings of a compiled program, from all numbers in order."""
         return cls(*cast("list[Any]", [numbers[i] for i in range(len(numbers))]))
+
+
+DEFAULT = Settings()
 
 
 class Point(NamedTuple):
@@ -103,6 +107,8 @@ _PLAYED_ABOVE = 1e-4
 # rounding allows.
 _ROUNDING = 100.0
 _LARGEST_GROWTH = 1e4
+# Lips are brought together by a little more than their gap, so that they count as closed.
+_BEYOND = 1.0 + 1e-6
 
 
 def newton(
@@ -164,11 +170,19 @@ def newton(
 
         def again() -> tuple[Point, Array]:
             step = linear_step(chain, command, point.unknowns, memory, point.base_tension, at)
-            turn = jnp.max(jnp.abs(step.unknowns.modes))
+            # Where strokes are given, contacts that turn round must not be held up on their way.
+            stops = command.by_stroke is None
+            stopped = partial(_stopped_by_lips, chain, point.unknowns, at, step)
+            turning = stopped(jnp.ones(())) if stops else step
+            turn = jnp.max(jnp.abs(turning.unknowns.modes))
             logs = [jnp.max(jnp.abs(leaf), initial=0.0) for leaf in step.unknowns.log_ratio]
             log_ratio = jnp.max(jnp.array([0.0, *logs]))
             by_turn = jnp.minimum(1.0, _LARGEST_TURN / turn)
             whole = jnp.minimum(by_turn, _LARGEST_LOG_RATIO / log_ratio)
+            if stops:
+                step = stopped(whole)
+                return Point(step.unknowns, step.base_tension), whole
+            assert command.by_stroke is not None
             early = (
                 jnp.any(command.by_stroke) & (best.iterations < _PLAYED) & (largest > _PLAYED_ABOVE)
             )
@@ -211,6 +225,26 @@ def newton(
     return jax.lax.while_loop(searching, iterate, search).best
 
 
+def _stopped_by_lips(
+    chain: Chain, unknowns: Unknowns, at: Evaluation, step: Step, part: Float[Array, ""]
+) -> Step:
+    """A step of which a part takes no notch farther than to where its lips meet.
+
+    Beyond, the law of the material would be taken at a bend that the notch cannot have, and what
+    follows from it would open the lips again.
+    """
+    modes = step.unknowns.modes
+    for group, touch, force in zip(chain.lips, at.touches, unknowns.lip_force, strict=True):
+        if touch.slope is None:
+            continue  # bodies have more than one flexure to come together by
+        closing = -part * jnp.einsum("nlm,nm->nl", touch.slope, modes)
+        is_open = ~pressed(chain.lip_stiffness, group.closes, force, touch.gap)
+        stops = is_open & (closing > touch.gap) & (touch.gap > 0.0) & (group.closes > 0.0)
+        allowed = jnp.where(stops, _BEYOND * touch.gap / jnp.where(stops, closing, 1.0), 1.0)
+        modes = modes * jnp.min(allowed, axis=-1, keepdims=True)
+    return step._replace(unknowns=step.unknowns._replace(modes=modes))
+
+
 def _contacts_put(
     chain: Chain,
     command: Command,
@@ -228,10 +262,12 @@ def _contacts_put(
     stays moderate. Of the step that is returned `part` is to be taken, of the linear one it would
     have been `whole`.
     """
-    closing_force = jnp.mean(chain.lip_stiffness * jnp.sum(chain.rods.length, axis=-1))
+    assert command.by_stroke is not None
     tension = point.base_tension + whole * step.base_tension
-    moderate = jnp.clip(tension, 0.5 * point.base_tension, 2.0 * point.base_tension + closing_force)
-    tension = jnp.where(command.by_stroke, moderate, tension)
+    moderate = jnp.clip(
+        tension, 0.5 * point.base_tension, 2.0 * point.base_tension + chain.closing_force
+    )
+    tension = command.either(moderate, tension)
     put = played(chain, before, tension, memory)
     logs = []
     for group, there, here, own in zip(

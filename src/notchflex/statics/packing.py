@@ -65,6 +65,13 @@ class Form:
         ]
         return jax.tree.unflatten(self.structure, leaves)
 
+    def leaf(self, vector: Any, number: int) -> Any:
+        """One leaf of the tree of a vector alone, by its number."""
+        starts = [0, *self.ends]
+        part = vector[..., starts[number] : [*self.ends, self.size][number]]
+        shape = (*vector.shape[:-1], *self.shapes[number])
+        return _as_kind(part.reshape(shape), self.kinds[number])
+
 
 def _as_kind(values: Array, kind: str) -> Array:
     if kind == "b":

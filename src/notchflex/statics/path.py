@@ -18,7 +18,7 @@ from notchflex.statics.actuation import Command, drawn_when_closed
 from notchflex.statics.applied import applied, in_frame, out_of_frame
 from notchflex.statics.load import LoadPath
 from notchflex.statics.prepare import Prepared
-from notchflex.statics.quantities import total_angle
+from notchflex.statics.quantities import believable
 from notchflex.statics.run import Run, stability
 from notchflex.statics.state import State
 from notchflex.statics.stepping import Solved
@@ -31,8 +31,6 @@ class ConvergenceError(RuntimeError):
 # A stroke is followed up to the last good state before the last notch closes, which leaves it
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
-# A state whose moments are off by this part of the largest is none.
-MODES_FAIL = 0.5
 # Log ratios this close to their bound are on it.
 _NEAR_BOUND = 1e-9
 
@@ -121,15 +119,14 @@ class Path:
         """Sum of the chord angles, the bending angle of Liu 2022, rad, (s,)."""
         return self.chord_angle.sum(axis=-1)
 
-    @cached_property
+    @property
     def total_angle(self) -> np.ndarray:
         """Bending angle of the whole robot, rad, (s,).
 
         Where all notches bend in one plane, the sum of their angles, toward the first one's bend
         positive; otherwise the angle between the axes of base and tip.
         """
-        frame, tip = np.asarray(self.chain.notch_frame), self._of("body_rotation")[..., -1, :, :]
-        return np.asarray(total_angle(frame, self.notch_angle, tip))  # pyright: ignore
+        return self._of("total_angle")
 
     @cached_property
     def _base(self) -> np.ndarray:
@@ -319,8 +316,8 @@ class Path:
     def converged(self) -> np.ndarray:
         """Whether a step was solved, within what friction law and strain modes hold for, (s,)."""
         solved = np.asarray(self.run.converged)
-        holds = self._of("friction_holds") & (self.moment_error < MODES_FAIL)
-        return solved & (holds | ~solved)
+        told = (self._of(name) for name in ("friction_holds", "moment_error", "bend_possible"))
+        return solved & believable(*told)
 
     @property
     def residual(self) -> np.ndarray:
@@ -343,6 +340,11 @@ class Path:
         if not self.run.tried[step]:
             failed = int(np.argmin(self.converged))
             return f"not tried, because step {failed + 1} of the path did not converge"
+        if self.run.converged[step] and not self._of("bend_possible")[step]:
+            return (
+                "a notch is bent by more than half a turn, or so sharply that a fibre would have "
+                "no length left; take smaller loads"
+            )
         if self.run.converged[step] and self._of("friction_holds")[step]:
             return (
                 "the strain modes miss the moment of the loads by "
@@ -478,7 +480,8 @@ def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
         )
         if chain.frame is not None:
             others = in_frame(others, chain.frame)
-    return Command(constant(value), cast("Array", by_stroke), others)
+    drawn = cast("Array", by_stroke) if by_stroke.any() else None
+    return Command(constant(value), drawn, others)
 
 
 __all__ = ["ConvergenceError", "Equilibrium", "Path", "command"]

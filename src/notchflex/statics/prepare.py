@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jax
-from notchflex.chain import Chain, assemble
+from notchflex.chain import Chain, assemble, padded
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
 from notchflex.statics.packing import Form
@@ -34,8 +34,11 @@ class Prepared:
 
     @cached_property
     def vector(self) -> Float[Array, " chain"]:
-        """The chain, kept where compiled programs take it from without copying."""
-        return jax.device_put(self.chain_form.pack(self.chain))
+        """The chain, kept where compiled programs take it from without copying.
+
+        That is the processor, also where JAX has a GPU: one robot is far too small for that.
+        """
+        return jax.device_put(self.chain_form.pack(self.chain), jax.local_devices(backend="cpu")[0])
 
     @cached_property
     def rest(self) -> Solved:
@@ -52,11 +55,11 @@ class Prepared:
         """Form of a solved state."""
         return Form.of(self.rest)
 
-    @cached_property
-    def command(self) -> Form:
-        """Form of a load."""
+    def command_form(self, commands: Command) -> Form:
+        """Form of one of some loads: by tensions alone, or some by stroke."""
         none = np.zeros(self.chain.tendons)
-        return Form.of(Command(constant(none), none.astype(bool), unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
+        by_stroke = None if commands.by_stroke is None else none.astype(bool)
+        return Form.of(Command(constant(none), by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
 
     @cached_property
     def shape(self) -> Form:
@@ -78,3 +81,11 @@ def prepared(
     The last robots asked for are remembered: a control loop solves the same one again and again.
     """
     return Prepared(assemble(robot, level, loaded=loaded, refinement=refinement, flat=flat))
+
+
+def lengthened(ready: Prepared, flexures: int, edges: int) -> Prepared:
+    """A robot ready to be solved beside longer ones; for the arguments see `chain.padded`."""
+    chain = ready.chain
+    if (chain.flexures, chain.contacts.shape[1]) == (flexures, edges):
+        return ready
+    return Prepared(padded(chain, flexures, edges))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import array_module, jax, jnp
+from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
 from notchflex.flexure import FlexureState, in_space, relative_pose
 from notchflex.motion import IN_PLANE, Motion, wrench_at
@@ -19,6 +19,9 @@ from notchflex.statics.packing import Form
 from notchflex.statics.stepping import Solved
 from notchflex.statics.walk import Evaluation, body_poses, evaluate, per_tendon
 
+# A state whose moments are off by this part of the largest is none.
+MODES_FAIL = 0.35
+
 
 class Shape(NamedTuple):
     """The shape of one state and whether it may be believed, or with a leading axis of many.
@@ -29,19 +32,27 @@ class Shape(NamedTuple):
     tension: Float[Array, "*s t"]
     stroke: Float[Array, "*s t"]
     notch_angle: Float[Array, "*s n"]
+    total_angle: Float[Array, "*s"]
     body_position: Float[Array, "*s bodies 3"]
     body_rotation: Float[Array, "*s bodies 3 3"]
     tip_position: Float[Array, "*s 3"]
     friction_holds: Bool[Array, "*s"]
     moment_error: Float[Array, "*s"]
+    bend_possible: Bool[Array, "*s"]
 
     @staticmethod
     def form(flexures: int, tendons: int) -> Form:
         """How it is packed for a robot of so many flexures and tendons."""
         bodies = flexures + 1
-        shapes = ((tendons,), (tendons,), (flexures,), (bodies, 3), (bodies, 3, 3), (3,), ())
+        shapes = ((tendons,), (tendons,), (flexures,), (), (bodies, 3), (bodies, 3, 3), (3,), ())
         numbers = [np.zeros(shape) for shape in shapes]
-        return Form.of(Shape(*numbers[:6], np.zeros((), bool), numbers[6]))  # pyright: ignore
+        no = np.zeros((), bool)
+        return Form.of(Shape(*numbers[:7], no, numbers[7], no))  # pyright: ignore
+
+
+def believable(friction_holds: Any, moment_error: Any, bend_possible: Any) -> Any:
+    """Whether solved states lie within what friction law, modes and geometry are for."""
+    return friction_holds & (moment_error < MODES_FAIL) & bend_possible
 
 
 def shape(chain: Chain, solved: Solved) -> Shape:
@@ -54,16 +65,32 @@ def shape(chain: Chain, solved: Solved) -> Shape:
     bodies = _in_space(chain, body_poses(relative))
     last = jax.tree.map(lambda leaf: leaf[-1], bodies)
     turning = _turning(chain, at)
+    angles = notch_angles(bodies, chain)
     return Shape(
         tension=point.base_tension,
         stroke=solved.stroke,
-        notch_angle=notch_angles(bodies, chain),
+        notch_angle=angles,
+        total_angle=total_angle(chain.notch_frame, angles, bodies.rotation[-1]),
         body_position=bodies.translation,
         body_rotation=bodies.rotation,
         tip_position=last.point(jnp.array([0.0, 0.0, 1.0]) * chain.body_length[-1]),
         friction_holds=jnp.all(chain.friction.valid(turning[0], turning[1])),
         moment_error=moment_error(chain, point.unknowns, at),
+        bend_possible=_bend_possible(chain, at.flexure),
     )
+
+
+def _bend_possible(chain: Chain, flexure: FlexureState) -> Bool[Array, ""]:
+    """Whether every flexure is bent by less than half a turn, and no fibre shortened to nothing."""
+    turn = jnp.sum(flexure.bend**2, axis=-1) < np.pi**2
+    return jnp.all(turn) & jnp.all(_fibre_strain(chain, flexure) < 1.0)
+
+
+def _fibre_strain(chain: Chain, flexure: FlexureState) -> Float[Array, "n nodes"]:
+    """Strain of the fibre farthest from the neutral axis at every node, its magnitude."""
+    section = chain.rods.section
+    farthest = jnp.maximum(section.edge_spine, section.edge_near)
+    return jnp.abs(in_space(flexure.strain)[..., 1]) * farthest
 
 
 def total_angle(
@@ -71,16 +98,18 @@ def total_angle(
     notch_angle: Float[Array, "*s n"],
     tip_rotation: Float[Array, "*s 3 3"],
 ) -> Float[Array, "*s"]:
-    """Bending angle of a whole robot, rad, of plain arrays or traced ones.
+    """Bending angle of a whole robot, rad.
 
     Where all notches bend in one plane, the sum of their angles, toward the first one's bend
     positive; otherwise the angle between the axes of base and tip.
     """
-    xp = array_module(notch_angle)
     along = notch_frame[:, :, 0] @ notch_frame[0, :, 0]
-    in_plane = xp.all(xp.abs(xp.abs(along) - 1.0) <= _IN_PLANE)
-    between = xp.arccos(xp.clip(tip_rotation[..., 2, 2], -1.0, 1.0))
-    return xp.where(in_plane, notch_angle @ xp.sign(along), between)
+    in_plane = jnp.all(jnp.abs(jnp.abs(along) - 1.0) <= _IN_PLANE)
+    across = tip_rotation[..., 0, 2] ** 2 + tip_rotation[..., 1, 2] ** 2
+    straight = across == 0.0  # where the angle has a kink, and no derivative
+    sine = jnp.where(straight, 0.0, jnp.sqrt(jnp.where(straight, 1.0, across)))
+    between = jnp.arctan2(sine, tip_rotation[..., 2, 2])
+    return jnp.where(in_plane, notch_angle @ jnp.sign(along), between)
 
 
 # Of the cosine between the directions of two notches, less than 0.3 degrees.
@@ -146,7 +175,6 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
     spans = _along(chain, gap_tension, body_tension)[:, :-1]
     curvature = in_space(flexure.strain)[..., 1]
     section = chain.rods.section
-    farthest = jnp.maximum(section.edge_spine, section.edge_near)
     contact_force, gap = notch_lips(chain, point.unknowns, at)
     base = base_wrench(chain, point.base_tension, at, solved.applied)
     return Quantities(
@@ -154,7 +182,7 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
         span_tension=jnp.concatenate([point.base_tension[:, None], spans], axis=1),
         notch_moment=largest_moment(flexure),
         outer_strain=jnp.max(curvature * section.edge_spine, axis=-1),
-        peak_strain=jnp.max(jnp.abs(curvature) * farthest, axis=-1),
+        peak_strain=jnp.max(_fibre_strain(chain, flexure), axis=-1),
         gap=gap,
         contact_force=contact_force,
         contact_log_ratio=contact,

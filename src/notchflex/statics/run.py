@@ -8,7 +8,7 @@ the states beyond their shape is another program, run when it is asked for.
 
 from __future__ import annotations
 
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -53,15 +53,15 @@ class Run:
         self.tried: Bool[np.ndarray, " s"] = told[:, 3] != 0.0
         self.reached: Float[np.ndarray, " s"] = told[:, 4]
 
-    @cached_property
-    def solved(self) -> Solved:
-        """The last solved state at each load: its own, or as far as it could be followed."""
-        return self._prepared.state.unpack(self._table[: self._count, : self._prepared.state.size])
+    @property
+    def states(self) -> Float[np.ndarray, "s state"]:
+        """The last solved state at each load, packed: its own, or as far as it was followed."""
+        return self._table[: self._count, : self._prepared.state.size]
 
     @cached_property
-    def _shape(self) -> Shape:
-        size = self._prepared.state.size
-        return self._prepared.shape.unpack(self._table[: self._count, size:-_TOLD])
+    def solved(self) -> Solved:
+        """The same, unpacked."""
+        return self._prepared.state.unpack(self.states)
 
     @cached_property
     def _more(self) -> tuple[Quantities, Quantities]:
@@ -81,7 +81,10 @@ class Run:
 
     def quantity(self, name: str) -> np.ndarray:
         """What is reported of each state, by its name in `Shape` or `Quantities`."""
-        return getattr(self._shape if name in Shape._fields else self._more[0], name)
+        if name not in Shape._fields:
+            return getattr(self._more[0], name)
+        packed = self._table[: self._count, self._prepared.state.size : -_TOLD]
+        return self._prepared.shape.leaf(packed, Shape._fields.index(name))
 
     def before(self, name: str) -> np.ndarray:
         """A quantity of the state before the first load; of the shape only tension and stroke."""
@@ -112,11 +115,11 @@ def run(
         One entry per load.
     """
     count = len(commands.value)
-    form = prepared.command
+    form = prepared.command_form(commands)
     packed = form.pack(commands, leading=1)
     packed = packed[_padded(count)]
     first = prepared.rest_vector if start is None else prepared.state.pack(start)
-    options = np.array([*settings.numbers, float(each_from_start), float(count)])
+    options = np.array([*_numbers(settings), float(each_from_start), float(count)])
     forms = (prepared.chain_form, form, prepared.state)
     table = np.asarray(_follow(prepared.vector, packed, first, options, *forms))
     return Run(prepared, first, table, count)
@@ -127,7 +130,8 @@ def stability(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
     count = len(commands.value)
-    stiffness, sign = _stability(prepared.chain, _pad(commands), _pad(solved), np.array(count))
+    items = (_pad(commands), _pad(solved), np.array(count))
+    stiffness, sign = _stability(prepared.vector, *items, prepared.chain_form)
     # Modes that only fill up the arrays are none of the robot's.
     own = np.flatnonzero(np.asarray(prepared.chain.rods.idle).ravel() == 0.0)
     held = np.asarray(stiffness)[:count][:, own[:, None], own]
@@ -148,14 +152,21 @@ def lips(
     Returns:
         Contact forces and gaps, loads by notches, and which loads converged.
     """
-    force, gap, converged = _lips(prepared.chain, commands, start, settings)
+    form = prepared.chain_form
+    force, gap, converged = _lips(prepared.vector, commands, start, settings, form)
     return np.asarray(force), np.asarray(gap), np.asarray(converged)
 
 
-@jit
+@partial(jit, static_argnums=4)
 def _lips(
-    chain: Any, commands: Command, start: Solved, settings: Settings
+    vector: Float[Array, " chain"],
+    commands: Command,
+    start: Solved,
+    settings: Settings,
+    chain_form: Form,
 ) -> tuple[Array, Array, Array]:
+    chain = chain_form.unpack(vector)
+
     def at_lips(command: Command) -> tuple[Array, Array, Array]:
         came = advance(chain, command, start, settings)
         point = came.solved.point
@@ -166,6 +177,11 @@ def _lips(
         return force, gap, came.converged
 
     return jax.lax.map(at_lips, commands)
+
+
+@lru_cache(maxsize=8)
+def _numbers(settings: Settings) -> tuple[float, ...]:
+    return settings.numbers
 
 
 def _padded(count: int) -> Int[np.ndarray, " size"]:
@@ -233,8 +249,15 @@ def _quantities(
     return jax.lax.map(lambda packed: quantities(chain, state_form.unpack(packed)), states)
 
 
-@jit
-def _stability(chain: Any, commands: Command, solved: Solved, count: Array) -> tuple[Array, Array]:
+@partial(jit, static_argnums=4)
+def _stability(
+    vector: Float[Array, " chain"],
+    commands: Command,
+    solved: Solved,
+    count: Array,
+    chain_form: Form,
+) -> tuple[Array, Array]:
+    chain = chain_form.unpack(vector)
     modes = chain.stiffness.size
 
     def one(item: tuple[Command, Solved, Array]) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from notchflex.flexure import LEVELS
 from notchflex.robot import Robot
 from notchflex.statics.applied import is_planar, is_unloaded
 from notchflex.statics.load import Load, LoadPath, load_path
-from notchflex.statics.newton import Settings
+from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.path import Equilibrium, Path, command
 from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import run
@@ -59,7 +59,7 @@ def simulate(
     ready = prepared_for(robot, load, from_state, refinement)
     start = None if from_state is None else fitted(from_state, ready.chain)
     commands = command(load, robot, ready.chain)
-    came = run(ready, commands, start, settings or Settings(), each_from_start=False)
+    came = run(ready, commands, start, settings or DEFAULT, each_from_start=False)
     return Path(robot, load, ready, came)
 
 
@@ -128,7 +128,7 @@ def solve_each(
     load = load_path(loads, robot.number_of_tendons)
     ready = prepared_for(robot, load, refinement=refinement)
     commands = command(load, robot, ready.chain)
-    came = run(ready, commands, None, settings or Settings(), each_from_start=True)
+    came = run(ready, commands, None, settings or DEFAULT, each_from_start=True)
     return Path(robot, load, ready, came, each_from_rest=True)
 
 

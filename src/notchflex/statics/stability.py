@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
-from notchflex.statics.actuation import Command, command_residual, stroke_scale
+from notchflex.statics.actuation import Command, command_residual
 from notchflex.statics.element import Memory, at_bound
 from notchflex.statics.newton import Point
 from notchflex.statics.stepping import Solved
@@ -70,8 +70,9 @@ def held_stiffness(
     rows = jnp.arange(len(on_diagonal))
     matrix = matrix.at[rows, rows].add(on_diagonal)
     drawn = len(flat) - chain.tendons + jnp.arange(chain.tendons)
-    soft = command.by_stroke / (_HOLDING_STIFFNESS * stroke_scale(chain))
-    matrix = matrix.at[drawn, drawn].add(soft)
+    if command.by_stroke is not None:
+        soft = command.by_stroke / (_HOLDING_STIFFNESS * chain.drawn_stiffness)
+        matrix = matrix.at[drawn, drawn].add(soft)
     others = matrix[modes:, modes:]
     stiffness = matrix[:modes, :modes] - matrix[:modes, modes:] @ jnp.linalg.solve(
         others, matrix[modes:, :modes]

@@ -95,7 +95,7 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
     Returns:
         What came of it.
     """
-    from_here = jnp.where(command.by_stroke, last.stroke, last.point.base_tension)
+    from_here = command.either(last.stroke, last.point.base_tension)
     slack = jnp.all(last.point.base_tension == 0.0)
     loads_first = slack if chain.loaded else jnp.array(False)
 
@@ -106,13 +106,13 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
         only_loads = loads_first & (for_tendons == 0.0)
         return Command(
             value=jnp.where(only_loads, 0.0, between(from_here, command.value, for_tendons)),
-            by_stroke=command.by_stroke & ~only_loads,
+            by_stroke=None if command.by_stroke is None else command.by_stroke & ~only_loads,
             applied=jax.tree.map(partial(between, part=for_loads), last.applied, command.applied),
         )
 
     def attempt(solved: Solved, part: Array) -> tuple[NewtonResult, Command]:
         wanted = towards(part)
-        tension = jnp.where(wanted.by_stroke, solved.point.base_tension, wanted.value)
+        tension = wanted.either(solved.point.base_tension, wanted.value)
         guess = played(chain, solved.point.base_tension, tension, solved.memory)
         start = Point(solved.point.unknowns._replace(log_ratio=guess), tension)
         found = newton(chain, wanted, solved.memory, solved.point.base_tension, start, settings)

@@ -23,11 +23,12 @@ class Moves(NamedTuple):
     """How bodies move: rows at every flexure.
 
     Attributes:
-        relative: Motion of the distal body relative to each of those before, in its own frame.
+        relative: Motion of the distal body relative to each of those before, in its own frame;
+            short rows.
         turn: Turn of the distal body against the base; nothing where no load asks for it.
     """
 
-    relative: list[Float[Array, "n w z"]]
+    relative: list[Float[Array, "n w short"]]
     turn: Float[Array, "n a z"] | None
 
 
@@ -35,8 +36,9 @@ class Strand(NamedTuple):
     """A group of tendons: rows at every flexure.
 
     Attributes:
-        turning: Of the turning angles at both edges.
-        wrench: Of the wrench on the distal body per tension; None where it does not act on bodies.
+        turning: Of the turning angles at both edges; short rows.
+        wrench: Of the wrench on the distal body per tension, short rows; None where it does not
+            act on bodies.
         log_ratio: Of its log ratios.
         gap_tension: Of the tension in the gap.
         carried: Of the tension handed on.
@@ -45,8 +47,8 @@ class Strand(NamedTuple):
         stretch: Of tension times length, this gap included.
     """
 
-    turning: Float[Array, "n 2 t z"]
-    wrench: Float[Array, "n t w z"] | None
+    turning: Float[Array, "n 2 t short"]
+    wrench: Float[Array, "n t w short"] | None
     log_ratio: Float[Array, "t 2 z"]
     gap_tension: Float[Array, "n t z"]
     carried: Float[Array, "n t z"]
@@ -59,17 +61,13 @@ class Opening(NamedTuple):
     """A kind of lips: rows at every flexure.
 
     Attributes:
-        gap: Of what is left open.
-        wrench: Of the wrench on the distal body per force; None where it does not act on bodies.
+        gap: Of what is left open; short rows.
+        wrench: Of the wrench on the distal body per force, short rows; None where it does not act
+            on bodies.
     """
 
-    gap: Float[Array, "n l z"]
-    wrench: Float[Array, "n l w z"] | None
-
-
-def times(matrix: Float[Array, "n k m"], rows: Array) -> Float[Array, "n k z"]:
-    """Rows times a matrix at every flexure; the rows may be the same at all."""
-    return jnp.einsum("nkm,mz->nkz" if rows.ndim == 2 else "nkm,nmz->nkz", matrix, rows)
+    gap: Float[Array, "n l short"]
+    wrench: Float[Array, "n l w short"] | None
 
 
 def moves_of(chain: Chain, at: Evaluation, unit: Units) -> Moves:
@@ -77,23 +75,23 @@ def moves_of(chain: Chain, at: Evaluation, unit: Units) -> Moves:
     pose, twist = at.flexure.pose, at.flexure.twist
     if pose is None or twist is None:
         return Moves([], None)
-    own = times(twist, unit.modes)
+    own = unit.of_modes(twist)
     relative = [own]
     inside = jax.vmap(jax.vmap(Motion.twist_inside, in_axes=(None, 1), out_axes=1), (0, None))
-    for older in unit.older:
+    for older in unit.motions:
         relative.append(own - inside(pose, older))
     if not len(unit.turn):
         return Moves(relative, None)
     axes = len(unit.turn)
     before = jax.vmap(jax.vmap(_turn_inside, (None, 1), 1), (0, None))(pose.rotation, unit.turn)
-    return Moves(relative, own[:, :axes] + before)
+    return Moves(relative, unit.spread(own[:, :axes]) + before)
 
 
 def _turn_inside(rotation: Array, axis: Array) -> Array:
     return turned(rotation.T, axis)
 
 
-def _of_anchors(moves: Moves, back: Array) -> Float[Array, "n t w z"]:
+def _of_anchors(moves: Moves, back: Array) -> Float[Array, "n t w short"]:
     """Motion relative to the anchor of each tendon or lip."""
     found = moves.relative[0][:, None]
     for number, rows in enumerate(moves.relative[1:], start=2):
@@ -152,9 +150,9 @@ def strand_of(
     if group.by_modes:
         slopes = _by_modes(chain, at, group, unknowns.modes)
         if crossing.slope is not None:
-            length.append(times(crossing.slope, unit.modes))
+            length.append(unit.of_modes(crossing.slope))
         both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
-        turning.append(jnp.einsum("nstm,mz->nstz", both, unit.modes))
+        turning.append(unit.of_modes(both))
     log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
     runs = group.runs[..., None]
     falls = jnp.exp(-unknowns.log_ratio[k])[..., None]
@@ -166,7 +164,7 @@ def strand_of(
     )
     in_body = body_tension * group.body_length[..., None]
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
-    drawn = unit.drawn[k][None] - runs * sum(length)
+    drawn = unit.drawn[k][None] - runs * unit.spread(cast("Array", sum(length)))
     stretch = unit.stretch[k][None] + gap_tension * group.natural_gap[..., None] + in_body
     at_entry = unit.drawn[k][None] + (unit.stretch[k][None] + in_body) / stiffness
     return Strand(
@@ -185,7 +183,7 @@ def opening_of(chain: Chain, k: int, at: Evaluation, unit: Units, moves: Moves) 
     """What the k-th kind of lips does."""
     group, touch = chain.lips[k], at.touches[k]
     if touch.slope is not None:
-        return Opening(times(touch.slope, unit.modes), None)
+        return Opening(unit.of_modes(touch.slope), None)
     slopes = _by_relative(chain, at, group, type(group).touch)
     move = _of_anchors(moves, group.back)
     return Opening(

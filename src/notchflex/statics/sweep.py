@@ -20,8 +20,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
@@ -31,7 +32,7 @@ from notchflex.statics.layout import layout
 from notchflex.statics.linear import blocks
 from notchflex.statics.walk import Evaluation
 
-_HELD = 1e-9
+_HELD, _TIED = 1e-9, 1e-7
 
 
 class Step(NamedTuple):
@@ -64,11 +65,15 @@ def linear_step(
         base_tension: Its base tensions, N.
         at: Its evaluation there.
 
+    Its derivatives are those of the imbalance it meets, not those of the linear system: a step
+    from a solved state then changes as the solution does (implicit function theorem).
+
     Returns:
         The step.
     """
     form = layout(chain)
-    rows = blocks(chain, unknowns, memory, command.applied, at)
+    here = (chain, unknowns, memory, command.applied, at)
+    rows = blocks(*jax.tree.map(jax.lax.stop_gradient, here))
     imbalance = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
     own = form.unknowns
     # Own unknowns as functions of 1, what is carried, and what comes back: du = answer @ (1, c, b).
@@ -84,39 +89,59 @@ def linear_step(
     while len(ports.onward) > 1:
         between, ports = _joined(ports, form.carried)
         levels.append(between)
-    matrix, constant = ports.behind[0, :, 1 : 1 + form.carried], ports.behind[0, :, :1]
+    tension_step = command.value - base_tension
+    if command.by_stroke is not None:
+        tension_step = _drawn(chain, command, base_tension, at, ports.behind[0])
+    carried = _leaving(chain) @ tension_step
+    known = jnp.concatenate([jnp.ones(1), carried, jnp.zeros(form.beyond)])[None]
+    for between in reversed(levels):
+        known = _parted(between, known, form.carried)
+    steps = jnp.einsum("nuz,nz->nu", answer, known)
+    _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
+    return Step(jax.vmap(unknowns_of)(steps), tension_step)
 
-    groups = [jnp.array(group.numbers, int) for group in chain.groups]
-    order = jnp.concatenate(groups) if groups else jnp.zeros(0, int)
-    others = form.carried - len(order)
-    leave = (
-        jnp.zeros((form.carried, chain.tendons)).at[others + jnp.arange(len(order)), order].set(1)
-    )
+
+def _drawn(
+    chain: Chain,
+    command: Command,
+    base_tension: Float[Array, " t"],
+    at: Evaluation,
+    behind: Float[Array, "b z"],
+) -> Float[Array, " t"]:
+    """Change of the base tensions that meets the strokes, from what the whole chain hands back."""
+    form, leave, order = layout(chain), _leaving(chain), _order(chain)
+    assert command.by_stroke is not None
 
     def demand(tension: Array, drawn: Array, stretch: Array) -> Array:
         base = at.base._replace(drawn=drawn, stretch=stretch)
         return command_residual(chain, command, tension, base)
 
     here = (base_tension, at.base.drawn, at.base.stretch)
-    slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(*here)
-    back = jnp.concatenate([matrix @ leave, constant], axis=1)
+    slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, here))
+    back = jnp.concatenate([behind[:, 1 : 1 + form.carried] @ leave, behind[:, :1]], axis=1)
     back = back[form.beyond - 2 * len(order) :].reshape(2, len(order), -1)
     # Rows in the order of the robot's tendons.
     drawn, stretch = jnp.zeros_like(back).at[:, order].set(back)
     by_base = slopes[1] @ drawn + slopes[2] @ stretch
-    # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; the
+    matrix = slopes[0] + by_base[:, :-1]
+    # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; a
     # small entry keeps such a step finite.
-    held = _HELD * jnp.diag(command.by_stroke.astype(float))
+    tied = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _TIED)
     missing = demand(*here) + by_base[:, -1]
-    tension_step = -eliminated(slopes[0] + by_base[:, :-1] + held, missing[:, None])[:, 0]
+    return -eliminated(matrix + _HELD * jnp.diag(tied.astype(float)), missing[:, None])[:, 0]
 
-    beyond_tip = jnp.zeros(form.beyond)
-    known = jnp.concatenate([jnp.ones(1), leave @ tension_step, beyond_tip])[None]
-    for between in reversed(levels):
-        known = _parted(between, known, form.carried)
-    steps = jnp.einsum("nuz,nz->nu", answer, known)
-    _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
-    return Step(jax.vmap(unknowns_of)(steps), tension_step)
+
+def _order(chain: Chain) -> Int[np.ndarray, " t"]:
+    """The tendons in the order of their groups."""
+    return np.array([number for group in chain.groups for number in group.numbers], int)
+
+
+def _leaving(chain: Chain) -> Float[np.ndarray, "c t"]:
+    """What is carried to the first flexure, per unit of base tension: the tension itself."""
+    order, carried = _order(chain), layout(chain).carried
+    leave = np.zeros((carried, chain.tendons))
+    leave[carried - len(order) + np.arange(len(order)), order] = 1.0
+    return leave
 
 
 class Ports(NamedTuple):

@@ -1,0 +1,33 @@
+"""A small draw of the fuzz: nothing silent, nothing wrong, reasons for what is not solved."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[2] / "benchmarks"
+# One shape of each kind of notch, friction and load; all of them are drawn by the benchmark.
+NUMBERS = (0, 1, 2, 5, 8, 13)
+
+
+@pytest.fixture(scope="module")
+def robustness():
+    if not FOLDER.is_dir():
+        pytest.skip("benchmarks are no part of this installation")
+    sys.path.insert(0, str(FOLDER))
+    yield __import__("robustness")
+    sys.path.remove(str(FOLDER))
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_a_draw_is_solved_or_says_why(robustness, number):
+    draw = __import__("draw")
+    shapes = __import__("shapes").SHAPES
+    for row in range(2):
+        one = draw.draw(number + row * len(shapes), 7, shapes[number])
+        for outcome in robustness.follow(one):
+            assert not outcome.silent
+            assert not outcome.wrong
+            assert outcome.reason == "" or len(outcome.reason) > 20
