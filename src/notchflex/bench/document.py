@@ -62,7 +62,10 @@ def _case(case: Case, clock: Clock, rows: dict[str, Row]) -> Row:
 
 
 def _process(process: Process, clock: Clock) -> Row:
-    value = process.measure()
+    try:
+        value = process.measure()
+    except InputError as problem:  # what has been measured so far must not be lost
+        return Row(process.name, None, None, None, str(problem))
     note = f"{value:.3g} {process.unit}; target {process.target:.4g} {process.unit}"
     if process.unit != "s":
         return Row(process.name, None, None, None, note)

@@ -60,6 +60,7 @@ def _second_command() -> float:
     with tempfile.TemporaryDirectory() as folder:
         environment = _environment() | {"XDG_CACHE_HOME": folder, "LOCALAPPDATA": folder}
         command = [sys.executable, "-m", "notchflex", "simulate", "pacheco2021-a"]
+        command += ["--tension", "0:3:31,3:0:31"]
         subprocess.run(command, env=environment, capture_output=True)
         started = time.perf_counter()
         done = subprocess.run(command, env=environment, capture_output=True, text=True)

@@ -19,7 +19,7 @@ from notchflex.errors import InputError
 
 # Widest difference, of the number itself, and how often it is halved.
 _WIDTH, _HALVINGS = 4e-3, 2
-# A control loop asks for slopes at the same numbers again and again.
+# A control loop asks for the same numbers again and again.
 _REMEMBERED = 8
 
 
@@ -33,24 +33,28 @@ def with_slopes(
         size: How long that is.
     """
 
-    @lru_cache(maxsize=_REMEMBERED)
-    def remembered(numbers: tuple[float, ...]) -> np.ndarray:
-        at = np.array(numbers)
-        rows = [slope(vector_of, at, index) for index in range(len(at))]
-        return np.stack([vector_of(at), *rows])
-
     # A robot that cannot be has NaN for arrays: a traceback out of a program tells nobody.
-    def value(numbers: Array) -> np.ndarray:
+    @lru_cache(maxsize=_REMEMBERED)
+    def value_at(numbers: tuple[float, ...]) -> np.ndarray:
         try:
-            return vector_of(np.asarray(numbers))
+            return vector_of(np.array(numbers))
         except InputError:
             return np.full(size, np.nan)
 
-    def slopes(numbers: Array) -> np.ndarray:
+    @lru_cache(maxsize=_REMEMBERED)
+    def slopes_at(numbers: tuple[float, ...]) -> np.ndarray:
+        at = np.array(numbers)
         try:
-            return remembered(tuple(np.asarray(numbers).tolist()))
+            rows = [slope(vector_of, at, index) for index in range(len(at))]
         except InputError:
-            return np.full((1 + len(numbers), size), np.nan)
+            rows = [np.full(size, np.nan) for _ in numbers]
+        return np.stack([value_at(numbers), *rows])
+
+    def value(numbers: Array) -> np.ndarray:
+        return value_at(tuple(np.asarray(numbers).tolist()))
+
+    def slopes(numbers: Array) -> np.ndarray:
+        return slopes_at(tuple(np.asarray(numbers).tolist()))
 
     @jax.custom_jvp
     def traced(numbers: Array) -> Array:
