@@ -110,6 +110,11 @@ class Chain(eqx.Module):
         return self.axial_stiffness.shape[0]
 
     @property
+    def tendon_order(self) -> Int[np.ndarray, " t"]:
+        """Numbers of the tendons, group by group."""
+        return np.array([number for group in self.groups for number in group.numbers], int)
+
+    @property
     def forces_on_bodies(self) -> bool:
         """Whether any force acts on a body, so that poses enter the balance."""
         parts = (*self.groups, *self.lips)
@@ -154,7 +159,8 @@ def assemble(
     }
     # Notches that are alike are worked out once.
     alike = stack(list(unlike.values()))
-    which = [list(unlike).index(notch) for notch in notches]
+    number = {notch: index for index, notch in enumerate(unlike)}
+    which = [number[notch] for notch in notches]
     rods = jax.tree.map(lambda leaf: leaf[which], alike)
     body_length = constant(body_lengths(robot))
     lead = body_length[:-1, None] * _UP

@@ -77,10 +77,7 @@ def error(text: str) -> None:
 @contextlib.contextmanager
 def working(text: str) -> Generator[None]:
     """Show that something is being computed, on a terminal only, and take it away afterwards."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    with messages().status(text):
+    with progress(text):
         yield
 
 

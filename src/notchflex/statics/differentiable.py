@@ -212,13 +212,12 @@ class Differentiable:
                 unit: Command = form.unpack(every[1 + 3 * number + axis])
                 along = values[name][:, axis]
                 applied = jax.tree.map(partial(_added, along), applied, bare.applied, unit.applied)
-        by_stroke = ~np.isnan(self.load.stroke)
         value = bare.value
         if "tension" in values:
             pulled = jnp.where(values["tension"] < 0.0, jnp.nan, values["tension"])
             value = jnp.where(~np.isnan(self.load.tension), pulled, value)
         if "stroke" in values:
-            value = jnp.where(by_stroke, values["stroke"], value)
+            value = jnp.where(~np.isnan(self.load.stroke), values["stroke"], value)
         return bare._replace(value=value, applied=applied)
 
 
@@ -229,8 +228,7 @@ def _added(along: Array, total: Array, none: Array, unit: Array) -> Array:
 # Without options of the compiler: JAX takes them only where nothing else is traced around.
 @partial(jax.jit, static_argnums=0)
 def _followed(function: Differentiable, values: dict[str, Array]) -> dict[str, Array]:
-    numbers = jnp.stack([jnp.zeros(()), *(values[name] for name in function.numbers)])[1:]
-    arrays = function.traced(numbers)
+    arrays = function.traced(jnp.array([values[name] for name in function.numbers], float))
     chain_form = function.ready.chain_form
     chain = chain_form.unpack(arrays[: chain_form.size])
     commands = function.commands(arrays[chain_form.size :], values)

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import jax
 from notchflex.errors import InputError
 
 # Widest difference, of the number itself, and how often it is halved.
@@ -65,14 +65,10 @@ def with_slopes(
     def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
         (numbers,), (change,) = primals, tangents
         shape = jax.ShapeDtypeStruct((1 + len(numbers), size), float)
-
         both = jax.pure_callback(slopes, shape, numbers, vmap_method="sequential")
         return both[0], change @ both[1:]
 
-    def as_floats(numbers: Array) -> Array:
-        return traced(jnp.asarray(numbers, float))
-
-    return as_floats
+    return traced
 
 
 def slope(

@@ -132,6 +132,14 @@ def solve_each(
     return Path(robot, load, ready, came, each_from_rest=True)
 
 
+def check_refinement(refinement: int) -> None:
+    """Raise if there is no such refinement."""
+    if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
+        raise InputError(
+            f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
+        )
+
+
 def prepared_for(
     robot: Robot,
     load: LoadPath,
@@ -139,10 +147,7 @@ def prepared_for(
     refinement: int = 0,
 ) -> Prepared:
     """The robot with modes enough for all loads of a path, and for the state before it."""
-    if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
-        raise InputError(
-            f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
-        )
+    check_refinement(refinement)
     if from_state is not None and from_state.refinement != refinement:
         raise InputError(
             f"the state was computed with refinement {from_state.refinement}, not {refinement}; "

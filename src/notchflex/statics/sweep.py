@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
@@ -109,7 +109,7 @@ def _drawn(
     behind: Float[Array, "b z"],
 ) -> Float[Array, " t"]:
     """Change of the base tensions that meets the strokes, from what the whole chain hands back."""
-    form, leave, order = layout(chain), _leaving(chain), _order(chain)
+    form, leave, order = layout(chain), _leaving(chain), chain.tendon_order
     assert command.by_stroke is not None
 
     def demand(tension: Array, drawn: Array, stretch: Array) -> Array:
@@ -131,14 +131,9 @@ def _drawn(
     return -eliminated(matrix + _HELD * jnp.diag(tied.astype(float)), missing[:, None])[:, 0]
 
 
-def _order(chain: Chain) -> Int[np.ndarray, " t"]:
-    """The tendons in the order of their groups."""
-    return np.array([number for group in chain.groups for number in group.numbers], int)
-
-
 def _leaving(chain: Chain) -> Float[np.ndarray, "c t"]:
     """What is carried to the first flexure, per unit of base tension: the tension itself."""
-    order, carried = _order(chain), layout(chain).carried
+    order, carried = chain.tendon_order, layout(chain).carried
     leave = np.zeros((carried, chain.tendons))
     leave[carried - len(order) + np.arange(len(order)), order] = 1.0
     return leave

@@ -23,7 +23,7 @@ from notchflex.statics.prepare import prepared
 from notchflex.statics.quantities import shape
 from notchflex.statics.run import run
 from notchflex.statics.sensitivity import answering
-from notchflex.statics.solve import prepared_for
+from notchflex.statics.solve import check_refinement
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ def tip_response(
         ((2, 6, 1), (2, 6, 6))
     """
     path = load_path(loads, robot_given(robot).number_of_tendons)
-    prepared_for(robot, path, None, refinement)  # which refuses a refinement that is none
+    check_refinement(refinement)
     ready = prepared(robot, "space", loaded=True, refinement=refinement, flat=False)
     commands = command(path, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
@@ -334,6 +335,5 @@ def per_tendon(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...]) -> A
     """Bring values per group of tendons into the order of the robot's tendons, as last axis."""
     if not grouped:
         return jnp.zeros(0)
-    order = [number for group in chain.groups for number in group.numbers]
     together = jnp.concatenate(grouped, axis=-1)
-    return together[..., jnp.argsort(jnp.array(order))]
+    return together[..., np.argsort(chain.tendon_order)]
