@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import notchflex as nf
+from notchflex.statics.command import command
 from notchflex.statics.load import load_path
 from notchflex.statics.newton import Settings
-from notchflex.statics.path import Path, command
+from notchflex.statics.path import Path
 from notchflex.statics.prepare import prepared
 from notchflex.statics.run import run
 

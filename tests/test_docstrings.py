@@ -10,6 +10,7 @@ import pytest
 
 import notchflex
 
+DOCS = Path(__file__).parents[1] / "docs"
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 MODULES = sorted(
     module.name
@@ -39,9 +40,19 @@ def test_readme_examples(capsys: pytest.CaptureFixture[str]):
     assert README.count("```python") == README.count("```text")
 
 
-def test_readme_robot_file():
-    (text,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
-    assert notchflex.robot.robot_from_text(text).number_of_notches == 5
+def test_readme_comparisons_are_those_of_the_pages():
+    (table,) = re.findall(r"## How right\n\n(.*?)\n\n", README, re.DOTALL)
+    pages = (DOCS / "validation.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1:-1] for line in table.splitlines()[2:]]
+    assert len(rows) == 5
+    for _, _, worst in rows:
+        number = re.escape(worst.split()[0])
+        assert re.search(rf"\| {number}( |$)", pages), worst
+
+
+def test_readme_links():
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (DOCS.parent / target).exists(), target
 
 
 def test_readme_commands():

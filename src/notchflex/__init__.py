@@ -32,6 +32,7 @@ _HOME = {
         ),
         "notchflex.robot",
     ),
+    **dict.fromkeys(("read_path", "read_table", "save_path"), "notchflex.results"),
     **dict.fromkeys(("Section", "annular_sector", "annular_segment"), "notchflex.section"),
     **dict.fromkeys(("Elastica", "elastica", "modulus_from_single_notch"), "notchflex.flexure"),
     **dict.fromkeys(
@@ -64,6 +65,30 @@ _HOME = {
             "tip_response",
         ),
         "notchflex.statics",
+    ),
+    **dict.fromkeys(
+        # not `calibrate`: the folder has that name
+        (
+            "Calibration",
+            "Constant",
+            "FrictionReadings",
+            "FrictionRig",
+            "LeastSquares",
+            "Measurements",
+            "SumOfDistances",
+            "SumOfRobotErrors",
+            "friction_rig",
+            "leave_out",
+            "next_measurement",
+            "posterior",
+            "read_friction_rig",
+            "read_measurements",
+            "synthetic",
+            "verdict",
+            "write_fitted",
+            "write_measurements",
+        ),
+        "notchflex.calibrate",
     ),
 }
 

@@ -92,13 +92,18 @@ def turned(rotation: Float[Array, "d d"], axis: Float[Array, " a"]) -> Float[Arr
     return (rotation[0, 0] * rotation[1, 1] - rotation[0, 1] * rotation[1, 0]) * axis
 
 
-def skew(vector: Float[Array, " a"]) -> Float[Array, "d d"]:
-    """Matrix of the cross product with an angular vector: `skew(a) @ b = a x b`."""
+def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
+    """Matrix of the cross product with an angular vector: `skew(a) @ b = a x b`.
+
+    In space of many vectors at once.
+    """
     xp = array_module(vector)
-    if vector.shape[0] == 1:
+    if vector.shape[-1] == 1:
         return vector[0] * _TURN
-    x, y, z, nothing = vector[0], vector[1], vector[2], xp.zeros_like(vector[0])
-    return xp.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing]).reshape(3, 3)
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    nothing = xp.zeros_like(x)
+    rows = [nothing, -z, y, z, nothing, -x, -y, x, nothing]
+    return xp.stack(rows, axis=-1).reshape(*vector.shape, 3)
 
 
 def cross(first: Float[Array, " a"], second: Float[Array, " d"]) -> Float[Array, " d"]:
@@ -214,27 +219,38 @@ def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
     return xp.stack(columns, axis=1)
 
 
-def adjoint(motion: Motion) -> Float[Array, "w w"]:
-    """Matrix that takes a twist of the inner frame to the outer one."""
-    xp = array_module(motion.rotation)
-    if motion.rotation.shape[-1] == 2:
-        x, z = motion.translation[0], motion.translation[1]
-        turn = turned(motion.rotation, xp.ones_like(motion.translation[:1]))
-        moved = xp.stack([-z, x])[:, None] * turn
-        top = xp.concatenate([turn, xp.zeros_like(motion.translation)])[None]
-        return xp.concatenate([top, xp.concatenate([moved, motion.rotation], axis=1)])
-    moved = skew(motion.translation) @ motion.rotation
-    return xp.block([[motion.rotation, xp.zeros((3, 3))], [moved, motion.rotation]])
+def outer_twists(motion: Motion, twists: Float[Array, "*n 6 k"]) -> Float[Array, "*n 6 k"]:
+    """Twists of the inner frame, as columns, at and along the outer one: in space, of many at once.
+
+    For plain arrays, as robots are put together of them.
+    """
+    turn = motion.rotation @ twists[..., :3, :]
+    place = motion.translation[..., None]
+    moved = motion.rotation @ twists[..., 3:, :] + np.cross(place, turn, axis=-2)
+    return constant(np.concatenate([turn, moved], axis=-2))
 
 
-def rotation_about(vector: Float[Array, " a"]) -> Float[Array, "d d"]:
-    """Rotation matrix of a rotation vector (rad)."""
+def rotation_about(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
+    """Rotation matrix of a rotation vector (rad); in space of many at once."""
     xp = array_module(vector)
-    return exponential(xp.concatenate([vector, xp.zeros(3 if len(vector) == 3 else 2)])).rotation
-
-
-def left_slope(vector: Float[Array, " 3"]) -> Float[Array, "3 3"]:
-    """How the rotation of a rotation vector turns on, along the outer axes, per change of it."""
-    _, second, third = _coefficients(vector @ vector)
+    if vector.shape[-1] == 1:
+        return exponential(xp.concatenate([vector, xp.zeros(2)])).rotation
+    first, second, _ = _coefficients(_squared(vector))
     matrix = skew(vector)
-    return constant(np.eye(3)) + second * matrix + third * (matrix @ matrix)
+    return constant(np.eye(3)) + _each(first) * matrix + _each(second) * (matrix @ matrix)
+
+
+def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
+    """How the rotation of a rotation vector turns on, along the outer axes, per change of it."""
+    _, second, third = _coefficients(_squared(vector))
+    matrix = skew(vector)
+    return constant(np.eye(3)) + _each(second) * matrix + _each(third) * (matrix @ matrix)
+
+
+def _squared(vector: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
+    return vector @ vector if vector.ndim == 1 else (vector * vector).sum(axis=-1)
+
+
+def _each(values: Float[Array, "*n"]) -> Float[Array, "*n 1 1"]:
+    """Numbers that matrices are to be multiplied by."""
+    return values if np.ndim(values) == 0 else values[..., None, None]

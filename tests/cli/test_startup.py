@@ -9,8 +9,28 @@ import time
 
 import pytest
 
-QUICK = (["--help"], ["robots"], ["schema"], ["simulate", "--help"], ["compare", "--help"])
-ROOT_VERBS = ("robots", "show", "schema", "new", "simulate", "compare", "bench")
+QUICK = (
+    ["--help"],
+    ["robots"],
+    ["schema"],
+    ["simulate", "--help"],
+    ["compare", "--help"],
+    ["calibrate", "--help"],
+)
+ROOT_VERBS = (
+    "robots",
+    "show",
+    "schema",
+    "new",
+    "simulate",
+    "view",
+    "compare",
+    "calibrate",
+    "friction-rig",
+    "bench",
+    "doctor",
+    "completion",
+)
 
 
 def notchflex(*arguments, cwd=None, stdin=""):

@@ -40,7 +40,7 @@ def test_it_begins_square_to_the_cut():
 def test_the_description_has_the_same_width():
     notch = ULink(0.275, 0.70, 2.0, "away")
     assert notch.end_width == pytest.approx(END.outer_length, rel=1e-14)
-    assert notch.span == pytest.approx(-2.0 * LINK.middle(0.0)[0], rel=1e-14)
+    assert notch.span == pytest.approx(-2.0 * LINK.course(0.0).along, rel=1e-14)
 
 
 def test_places_are_arc_lengths(margin):
@@ -54,16 +54,17 @@ def test_heading_and_curvature_are_derivatives(margin):
     joint = LINK.end.length()
     clear = np.minimum(abs(place - joint), abs(LINK.length - joint - place)) > 1e-4
     place, step = place[clear], 1e-5
-    ahead, behind = np.array(LINK.middle(place + step)), np.array(LINK.middle(place - step))
-    along, above = (ahead - behind) / (2.0 * step)
-    margin.within("speed", np.hypot(along, above) - 1.0, 1e-9)
-    margin.within("heading", np.arctan2(above, along) - LINK.heading(place), 1e-9)
-    turning = (LINK.heading(place + step) - LINK.heading(place - step)) / (2.0 * step)
-    margin.within("curvature", turning - LINK.curvature(place), 1e-8)
+    ahead, behind = LINK.course(place + step), LINK.course(place - step)
+    along, above = ahead.along - behind.along, ahead.above - behind.above
+    margin.within("speed", np.hypot(along, above) / (2.0 * step) - 1.0, 1e-9)
+    margin.within("heading", np.arctan2(above, along) - LINK.course(place).heading, 1e-9)
+    turning = (ahead.heading - behind.heading) / (2.0 * step)
+    margin.within("curvature", turning - LINK.course(place).curvature, 1e-8)
 
 
 def test_half_a_turn_takes_the_link_to_itself(margin):
     place = np.linspace(0.0, LINK.length, 31)
-    there, back = np.array(LINK.middle(place)), np.array(LINK.middle(LINK.length - place))
-    margin.within("points", there + back, 1e-15)
-    margin.within("rise", there[1, -1] - there[1, 0] - 0.275, 1e-15)
+    there, back = LINK.course(place), LINK.course(LINK.length - place)
+    margin.within("points along", there.along + back.along, 1e-15)
+    margin.within("points above", there.above + back.above, 1e-15)
+    margin.within("rise", there.above[-1] - there.above[0] - 0.275, 1e-15)

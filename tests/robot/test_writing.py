@@ -264,3 +264,51 @@ def test_a_copy_remembers_its_comments(tmp_path: Path):
     changed = dataclasses.replace(robot.material, poisson_ratio=0.3)
     nf.save_robot(robot.replace(material=changed), tmp_path / "a.toml")
     assert "Wrist A of Pacheco" in (tmp_path / "a.toml").read_text()
+
+
+def test_fitted_values_say_so_notch_by_notch():
+    source = (READY / "pacheco2021-a.toml").read_text()
+    robot = nf.load_robot("pacheco2021-a").with_values(
+        {"notch[2].depth": 1.3, "tendon[1].radius": 0.69}
+    )
+    notes = {
+        "notch[2].depth": "a.csv: 1.2 to 1.4 mm (95 %)",
+        "notch[2].precurvature_deg": "a.csv: any value fits",  # as it was
+        "tendon.radius": "a.csv: 0.6 to 0.7 mm (95 %)",
+    }
+    text = robot_text(robot, source, notes)
+    assert robot_from_text(text) == robot
+    assert text.count("fitted by notchflex") == 3
+    first, second, third = text.split("[[notch]]")[1:]
+    assert "fitted" not in first
+    assert (
+        "depth = 1.3  # mm; g of wrist A, Table 2; fitted by notchflex to a.csv: 1.2 to 1.4 mm "
+        "(95 %) (changed from 1.40)\n"
+    ) in second
+    assert "# nominal: straight; fitted by notchflex to a.csv: any value fits\n" in second
+    assert "depth" in third
+    assert "radius = 0.69" in third
+    assert "fitted by notchflex to a.csv: 0.6 to 0.7 mm (95 %) (changed from 0.70)" in third
+    # a value that is changed by hand is no longer a fitted one
+    by_hand = robot_text(robot.with_value("notch[2].depth", 1.2), text)
+    assert "depth = 1.2  # mm; g of wrist A, Table 2 (changed from 1.40)\n" in by_hand
+    assert by_hand.count("fitted by notchflex") == 2
+    # and what is fitted again has one note
+    again = robot_text(robot, text, {"notch[2].depth": "b.csv: 1.3 to 1.31 mm (95 %)"})
+    assert again.count("1.2 to 1.4") == 0
+    assert "; fitted by notchflex to b.csv: 1.3 to 1.31 mm (95 %) (changed from 1.40)" in again
+
+
+def test_fitted_values_without_comments_and_without_their_key():
+    bare = "\n".join(
+        line.partition("#")[0].rstrip()
+        for line in (READY / "pacheco2021-a.toml").read_text().splitlines()
+        if not line.startswith(("base_length", "name"))
+    ).replace("[tube]", 'name = "bare"\n[tube]', 1)
+    robot = robot_from_text(bare)
+    notes = {"tube.base_length": "a.csv: at most 0.1 mm (95 %)", "friction.coefficient": "a.csv: x"}
+    text = robot_text(robot.with_value("friction.coefficient", 0.12), bare, notes)
+    assert "base_length = 0.0  # fitted by notchflex to a.csv: at most 0.1 mm (95 %)\n" in text
+    assert "coefficient = 0.12  # fitted by notchflex to a.csv: x\n" in text
+    fresh = robot_text(robot, None, {"notch[*].depth": "a.csv: 1 to 2 mm (95 %)"})
+    assert "; fitted by notchflex to a.csv: 1 to 2 mm (95 %)\n" in fresh

@@ -159,6 +159,37 @@ def test_what_is_not_solved_has_no_slope():
     assert np.isnan(jax.grad(lambda v: draw(v)["total_angle"][0])(draw.start)["stroke"]).all()
 
 
+def test_what_loads_did_before_the_tendons_has_a_slope(margin):
+    robot = nf.load_robot("pacheco2021-a").with_value("friction.coefficient", 0.4)
+    # A push against the bend, see test_tip_response.py.
+    path = nf.pull(0.373, 0.373, steps=1).loaded(tip_force=(-0.114, -0.024, -0.189))
+    push = nf.differentiable(robot, path, ["friction.coefficient", "notch.depth", "tip_force"])
+    mine = jax.grad(lambda values: push(values)["total_angle"][0])(push.start)
+    for name in push.numbers:
+
+        def at(value: float, name=name) -> float:
+            return float(nf.simulate(robot.with_value(name, value), path).total_angle[0])
+
+        expected = differences(at, float(push.start[name]))
+        margin.within(name, float(mine[name]) / expected - 1.0, 1e-6)
+
+    def pushed(force: float) -> float:
+        return float(push({"tip_force": [[force, -0.024, -0.189]]})["total_angle"][0])
+
+    along = differences(pushed, -0.114)
+    margin.within("tip force", float(mine["tip_force"][0, 0]) / along - 1.0, 1e-6)
+
+
+def test_a_load_cut_into_many_parts_has_no_slope_with_friction():
+    robot = nf.load_robot("pacheco2021-a").with_value("friction.coefficient", 0.4)
+    # It is solved in three parts, see test_tip_response.py.
+    hard = nf.pull(0.122, 0.122, steps=1).loaded(tip_force=(0.574, -0.7, 0.597))
+    push = nf.differentiable(robot, hard, ["tension"])
+    angle, by = jax.value_and_grad(lambda values: push(values)["total_angle"][0])(push.start)
+    assert np.isfinite(angle)
+    assert np.isnan(by["tension"]).all()
+
+
 def test_numbers_at_the_end_of_their_range(margin):
     robot = nf.load_robot("pacheco2021-a").with_value("friction.coefficient", 0.0)
     bend = nf.differentiable(robot, nf.pull(0.9, 0.9, steps=1), ["friction.coefficient"])
@@ -200,6 +231,13 @@ def test_slopes_of_plain_functions(margin):
 def test_what_cannot_vary_is_said(parameters, said):
     with pytest.raises(nf.InputError, match=said):
         nf.differentiable(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 1.0, 2), parameters)
+
+
+@pytest.mark.parametrize("parameter", ["tension", "tip_force"])
+def test_a_refinement_that_is_none_is_said(parameter):
+    robot, load = nf.load_robot("pacheco2021-a"), nf.pull(0.0, 1.0, 2)
+    with pytest.raises(nf.InputError, match="refinement is a whole number from 0 to 3; got 7"):
+        nf.differentiable(robot, load, [parameter], refinement=7)
 
 
 def test_values_that_do_not_fit_are_said():

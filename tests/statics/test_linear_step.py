@@ -9,9 +9,9 @@ from jax.flatten_util import ravel_pytree
 import notchflex as nf
 from notchflex._jax import jax
 from notchflex.statics.actuation import command_residual
+from notchflex.statics.command import command
 from notchflex.statics.load import load_path
 from notchflex.statics.newton import Point
-from notchflex.statics.path import command
 from notchflex.statics.solve import prepared_for
 from notchflex.statics.sweep import linear_step
 from notchflex.statics.walk import evaluate

@@ -88,3 +88,53 @@ def test_what_is_not_solved_has_none(wrist):
     assert np.isfinite(response.compliance[0]).all()
     assert np.isnan(response.compliance[1]).all()
     assert np.isnan(response.jacobian[1]).all()
+
+
+# A push against the bend, before the tendon is pulled: contacts slide outward under the push alone,
+# and the pull then leaves some where the push put them.
+AGAINST = (-0.114, -0.024, -0.189)
+
+
+def test_slopes_go_through_what_loads_did_before_the_tendons(wrist, margin):
+    rubs = wrist.with_value("friction.coefficient", 0.4)
+    response = nf.tip_response(rubs, nf.pull(0.373, 0.373, steps=1).loaded(tip_force=AGAINST))
+    assert response.path.run.parts[0] == 2
+    width = 1e-5
+    cases = {"tension": (response.jacobian[0, :, 0], 1.0, np.zeros(3))}
+    for axis, push in enumerate(np.eye(3)):
+        cases[f"force {axis}"] = (response.compliance[0, :, 3 + axis], 0.0, push)
+    for name, (own, pull, push) in cases.items():
+        ends = [
+            nf.solve(rubs, nf.Load(tension=0.373 + by * pull, tip_force=AGAINST + by * push))
+            for by in (0.5 * width, -0.5 * width)
+        ]
+        expected = pose_slope(*ends, width)
+        margin.within(name, (own - expected) / np.abs(own).max(), 1e-6)
+
+
+# So hard a push that the load is solved in three parts: as others come, loads before tendons, and
+# these in two. What the contacts remember in between shows: slopes of the whole load were 5e-4 off.
+HARD = nf.pull(0.122, 0.122, steps=1).loaded(tip_force=(0.574, -0.7, 0.597))
+
+
+def test_slopes_that_nobody_knows_are_not_told(wrist):
+    rubs = wrist.with_value("friction.coefficient", 0.4)
+    response = nf.tip_response(rubs, HARD)
+    assert response.path.converged[0]
+    assert response.path.run.parts[0] == 3
+    assert np.isfinite(response.path.tip_position).all()
+    assert np.isnan(response.jacobian).all()
+    assert np.isnan(response.compliance).all()
+
+
+def test_without_friction_a_load_may_be_cut(wrist, margin):
+    smooth = wrist.with_value("friction.kind", "frictionless")
+    response = nf.tip_response(smooth, HARD)
+    assert response.path.run.parts[0] > 2
+    width = 1e-5
+    loads = [nf.pull(t, t, steps=1) for t in (0.122 + 0.5 * width, 0.122 - 0.5 * width)]
+    push = HARD.external[0].tip_force
+    ends = [nf.simulate(smooth, load.loaded(tip_force=push))[0] for load in loads]
+    expected = pose_slope(*ends, width)
+    own = response.jacobian[0, :, 0]
+    margin.within("jacobian", (own - expected) / np.abs(own).max(), 1e-6)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
-from typing import Any, cast
+from collections.abc import Sequence
+from functools import lru_cache, partial
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 import numpy as np
@@ -20,7 +21,7 @@ from notchflex.flexure import (
     fibre_stretch,
     flattened,
     flexure_state,
-    relative_pose,
+    free_pose,
     rod,
     stack,
     with_level,
@@ -29,8 +30,9 @@ from notchflex.flexure.plane import planar_points
 from notchflex.friction import FrictionLaw, friction_law
 from notchflex.material import SectionLaw, section_law
 from notchflex.motion import Motion, rotation_about
-from notchflex.robot import Robot
-from notchflex.tendon import Ground, TendonGroup, route
+from notchflex.robot import Robot, Tendon, Tube
+from notchflex.robot.kinds import Notch
+from notchflex.tendon import Ground, Laid, TendonGroup, route
 
 # Axial stiffness of a tendon that only tells apart how much has slid over two stuck contacts of
 # one rigid piece, between which an inextensible tendon would leave the tension open: so many
@@ -152,29 +154,14 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    notches = robot.notches
-    unlike = {
-        notch: with_level(rod(notch, robot.tube, refinement), level)
-        for notch in dict.fromkeys(notches)
-    }
-    # Notches that are alike are worked out once.
-    alike = stack(list(unlike.values()))
-    number = {notch: index for index, notch in enumerate(unlike)}
-    which = [number[notch] for notch in notches]
-    rods = jax.tree.map(lambda leaf: leaf[which], alike)
-    body_length = constant(body_lengths(robot))
-    lead = body_length[:-1, None] * _UP
-    rods = eqx.tree_at(lambda rods: rods.start_offset, rods, rods.start_offset + lead)
-    free = jax.tree.map(lambda leaf: leaf[which], _free_poses(alike))
-    free = Motion(free.rotation, free.translation + lead)
+    chord = getattr(robot.friction, "turning", None) == "chord"
+    shaped = _shaped(robot.tube, robot.notches, robot.tendon, level, refinement, chord)
+    rods, laid, body_length = shaped.rods, shaped.laid, shaped.body_length
     body_mass, body_centre = body_masses(robot, rods)
     law = section_law(robot.material)
-    elastic = _elastic(alike, law)[which]
+    elastic = _elastic(shaped.alike, law)[shaped.which]
     stiffness = np.einsum("nmm->nm", elastic)
     tendons = robot.tendon
-    chord = getattr(robot.friction, "turning", None) == "chord"
-    ground = Ground(notches, rods, free, body_length, turns_with_chord=chord)
-    laid = route(tendons, ground)
     lip_stiffness = _lip_stiffness(rods, stiffness, robot.tube.outer_radius)
     chain = Chain(
         rods=rods,
@@ -182,7 +169,7 @@ def assemble(
         law=law,
         friction=friction_law(robot.friction),
         groups=laid.groups,
-        lips=lay_lips(notches, robot.tube, rods, body_length),
+        lips=shaped.lips,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
         free_length=constant(laid.base_length + [tendon.free_length for tendon in tendons]),
         body_length=body_length,
@@ -192,24 +179,84 @@ def assemble(
         elastic=constant(elastic) if law.is_linear else None,
         lip_stiffness=constant(lip_stiffness),
         closing_force=constant(np.mean(lip_stiffness * rods.length.sum(axis=-1))),
-        drawn_stiffness=constant(np.mean(lip_stiffness) / len(notches)),
+        drawn_stiffness=constant(np.mean(lip_stiffness) / len(lip_stiffness)),
         frame=None,
-        notch_frame=constant(
-            [rotation_about(_UP * np.radians(notch.direction_deg)) for notch in notches]
-        ),
+        notch_frame=shaped.notch_frame,
         tendon_place=laid.place,
         contacts=_contacts(laid.groups, len(tendons)),
         level=level,
         loaded=loaded,
         refinement=refinement,
-        window=1,
+        window=max((int(np.max(part.back)) for part in (*laid.groups, *shaped.lips)), default=1),
     )
-    parts = (*chain.groups, *chain.lips)
-    chain = dataclasses.replace(chain, window=max((int(np.max(p.back)) for p in parts), default=1))
     normal = bending_normal(robot)
     if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
         return chain
     return _flat(chain, np.stack([np.cross(normal, _UP), normal, _UP], axis=1))
+
+
+class _Shaped(NamedTuple):
+    """What of a chain follows from the shape of the robot alone.
+
+    Attributes:
+        alike: The flexures that differ.
+        which: Which of them each notch is.
+        rods: All flexures.
+        laid: The tendons.
+        lips: The lips.
+        body_length: Length of each body on the tube axis, mm.
+        notch_frame: Rotation from the frame of every notch to the tube.
+    """
+
+    alike: Rod
+    which: list[int]
+    rods: Rod
+    laid: Laid
+    lips: tuple[LipGroup, ...]
+    body_length: Array
+    notch_frame: Array
+
+
+# A search for constants of the material or of friction assembles one shape hundreds of times.
+@lru_cache(maxsize=64)
+def _shaped(
+    tube: Tube,
+    notches: tuple[Notch, ...],
+    tendons: tuple[Tendon, ...],
+    level: str,
+    refinement: int,
+    turns_with_chord: bool,
+) -> _Shaped:
+    # Notches that are alike are worked out once.
+    unlike = {notch: _flexure(notch, tube, level, refinement) for notch in dict.fromkeys(notches)}
+    own_rods = list(unlike.values())
+    alike = stack(own_rods)
+    number = {notch: index for index, notch in enumerate(unlike)}
+    which = [number[notch] for notch in notches]
+    rods = jax.tree.map(lambda leaf: leaf[which], alike)
+    body_length = constant(body_lengths(tube, notches))
+    lead = body_length[:-1, None] * _UP
+    rods = dataclasses.replace(rods, start_offset=rods.start_offset + lead)
+    free = jax.tree.map(lambda leaf: leaf[which], _free_poses(own_rods))
+    free = Motion(free.rotation, free.translation + lead)
+    ground = Ground(notches, rods, free, body_length, turns_with_chord=turns_with_chord)
+    directions = {notch.direction_deg: np.empty(0) for notch in notches}
+    for side in directions:
+        directions[side] = np.asarray(rotation_about(constant(_UP * np.radians(side))))
+    return _Shaped(
+        alike,
+        which,
+        rods,
+        route(tendons, ground),
+        lay_lips(notches, tube, rods, body_length),
+        body_length,
+        constant(np.stack([directions[notch.direction_deg] for notch in notches])),
+    )
+
+
+@lru_cache(maxsize=512)
+def _flexure(notch: Notch, tube: Tube, level: str, refinement: int) -> Rod:
+    return with_level(rod(notch, tube, refinement), level)
 
 
 def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
@@ -237,29 +284,16 @@ def flexure_states(
     return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, chain.memory, modes)
 
 
-def _each(rods: Rod) -> list[Rod]:
-    """The flexures one by one: a robot is assembled once, and without compiling anything."""
-    return [jax.tree.map(lambda leaf, j=j: leaf[j], rods) for j in range(len(rods.length))]
-
-
-def _free_poses(rods: Rod) -> Motion:
-    poses = [relative_pose(rod, constant(np.zeros(rod.modes))) for rod in _each(rods)]
-    return jax.tree.map(lambda *leaves: np.stack(leaves), *poses)
+def _free_poses(rods: Sequence[Rod]) -> Motion:
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *(free_pose(rod) for rod in rods))
 
 
 def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
     """Stiffness of every flexure in the free robot; 1 for modes that fill up."""
-    stiffness = []
-    for rod_of_one in _each(rods):
-        sections = [
-            jax.tree.map(lambda leaf, i=i: leaf[i], rod_of_one.section)
-            for i in range(len(rod_of_one.length))
-        ]
-        of_section = np.stack([law.stiffness(section) for section in sections])
-        basis = rod_of_one.basis
-        own = np.einsum("i,iam,iab,ibk->mk", rod_of_one.length, basis, of_section, basis)
-        stiffness.append(own + np.diag(rod_of_one.idle))
-    return np.stack(stiffness)
+    basis = rods.basis
+    answered = rods.length[..., None, None] * (law.stiffness(rods.section) @ basis)
+    own = np.einsum("niam,niak->nmk", basis, answered)
+    return own + rods.idle[:, None] * np.eye(rods.modes)
 
 
 def _lip_stiffness(

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
 from notchflex.flexure import Rod
-from notchflex.robot import Robot
+from notchflex.robot import Robot, Tube
+from notchflex.robot.kinds import Notch
 
 # From kg/m3 to g/mm3.
 _GRAMS = 1e-6
 
 
-def body_lengths(robot: Robot) -> Float[np.ndarray, " bodies"]:
+def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bodies"]:
     """Length of each rigid piece on the tube axis, base first, mm."""
-    notches = robot.notches
     following = (*notches[1:], None)
     behind = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
-    return np.array([robot.tube.base_length, *behind])
+    return np.array([tube.base_length, *behind])
 
 
 def body_masses(
@@ -44,7 +46,7 @@ def body_masses(
     density = robot.material.density
     if density is None:
         return np.zeros(len(centre)), centre
-    length = body_lengths(robot)
+    length = body_lengths(robot.tube, robot.notches)
     wall = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2)
     piece = wall * length
     half = 0.5 * np.sum(np.asarray(rods.section.area) * np.asarray(rods.length), axis=-1)

@@ -64,17 +64,42 @@ VERBS = {
         "notchflex simulate pacheco2021-a --tension 0:3:31,3:0:31 --plot wrist.png\n"
         "    notchflex simulate pacheco2021-a --stroke 0:2:21 --set friction.coefficient=0.1\n"
         "    notchflex simulate my-wrist.toml --tension 1=0:2:21 --tension 2=0.1 --json -\n"
-        "    notchflex simulate gao2017 --tension 0:8:9,8:0:9 --tip-mass 20 --plot loop.png\n"
+        "    notchflex simulate pacheco2021-a --tension 0:3:31 --beside pacheco2021-b \\\n"
+        '        --beside "slick: friction.coefficient=0" --plot beside.html\n'
+        "    notchflex simulate gao2017 --tension 0:8:9,8:0:9 --tip-mass 20 --plot loop.gif\n"
         "    notchflex simulate liu2022 --tension 1=9 --tip-force 0,0,-0.5 --refinement 1",
+    ),
+    "view": (
+        "Show a robot in the browser, with sliders for its tendons and loads.",
+        "notchflex view pacheco2021-a --open\n    notchflex view my-wrist.toml --port 9000",
     ),
     "compare": (
         "Compare a robot with measured notch angles.",
         "notchflex compare pacheco2021-a-specimen wrist_A_measured.csv --plot compare.png\n"
         "    notchflex compare my-wrist.toml pulls.csv --path --set friction.coefficient=0.1",
     ),
+    "calibrate": (
+        "Find constants of robots from measurements, with how far to trust them.",
+        "notchflex calibrate my-wrist.toml=pulls.csv \\\n"
+        "        --fit friction.coefficient,material.elastic_modulus -o fitted\n"
+        "    notchflex calibrate a.toml=a.csv b.toml=b.csv --fit material.elastic_modulus \\\n"
+        "        --fit each:friction.coefficient --leave-out robot --plot fit.png",
+    ),
+    "friction-rig": (
+        "Find the coefficient of friction from two hanging weights.",
+        "notchflex friction-rig readings.csv --plot friction.png",
+    ),
     "bench": (
         "Time the solver on this machine.",
         "notchflex bench --json bench.json\n    notchflex bench --only wrist",
+    ),
+    "doctor": (
+        "Check the installation: versions, device, extras, a sum that some JAX get wrong.",
+        "notchflex doctor\n    notchflex doctor --json -",
+    ),
+    "completion": (
+        "Complete verbs and options in the shell.",
+        "notchflex completion --install\n    notchflex completion zsh > _notchflex",
     ),
 }
 """Verb to its one-line help and its examples."""
@@ -95,9 +120,10 @@ def build() -> App:
         print_error=False,
     )
     for order, (verb, (text, examples)) in enumerate(VERBS.items()):
+        name = verb.replace("-", "_")
         plural = "s" if examples.count("notchflex ") > 1 else ""
         app.command(
-            f"notchflex.cli.{verb}:{verb}",
+            f"notchflex.cli.{name}:{name}",
             name=verb,
             help=text,
             sort_key=order,
@@ -116,6 +142,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 done, 1 not converged, 2 bad input (told in one clear message).
     """
     tokens = list(sys.argv[1:] if arguments is None else arguments)
+    terminal.be_quiet(False)
     try:
         code = build()(tokens) or DONE
         sys.stdout.flush()

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from notchflex.cli import terminal
-from notchflex.cli.options import JsonFile
+from notchflex.cli.options import JsonFile, Quiet
 from notchflex.results.files import STANDARD_OUTPUT, check_output
 
 if TYPE_CHECKING:
@@ -20,12 +20,13 @@ Only = Annotated[
 ]
 
 
-def bench(*, only: Only = None, json: JsonFile = None) -> None:
+def bench(*, only: Only = None, json: JsonFile = None, quiet: Quiet = False) -> None:
     """Time the solver on this machine.
 
     Times are medians in multiples of LU135, one solution of 135 linear equations by NumPy on one
     core in the same run. All of it takes some minutes, on a machine that should do nothing else.
     """
+    terminal.be_quiet(quiet)
     if json is not None:
         check_output(json, "--json")
     with terminal.progress("timing") as told:
@@ -37,7 +38,7 @@ def bench(*, only: Only = None, json: JsonFile = None) -> None:
         rows = measured(only, told)
     if json is not None:
         write_json(json, bench_document(rows))
-    if json != STANDARD_OUTPUT:
+    if json != STANDARD_OUTPUT and not quiet:
         _print(rows)
 
 

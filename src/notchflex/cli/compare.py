@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -12,10 +12,12 @@ from notchflex.cli.options import (
     CsvFile,
     JsonFile,
     PlotFile,
+    Quiet,
     RobotName,
     Settings,
     chosen_robot,
     robot_files,
+    variant,
 )
 from notchflex.results.files import (
     STANDARD_OUTPUT,
@@ -27,6 +29,9 @@ from notchflex.results.quantities import DEGREES
 
 if TYPE_CHECKING:
     from notchflex.compare import Comparison
+
+MOST_COLUMNS = 6
+"""Notches of a robot side by side in one table; more of them go below."""
 
 
 def compare(
@@ -64,6 +69,7 @@ def compare(
     json: JsonFile = None,
     csv: CsvFile = None,
     plot: PlotFile = None,
+    quiet: Quiet = False,
 ) -> int:
     """Compare a robot with measured notch angles.
 
@@ -71,6 +77,7 @@ def compare(
     measured tip is the forward kinematics of the measured angles. A negative force is the offset
     of a sensor: it stays in the table, and the model is given 0 N.
     """
+    terminal.be_quiet(quiet)
     inputs = [*robot_files(robot), data]
     check_distinct({"--json": json, "--csv": csv, "--plot": plot})
     for option, target in (("--json", json), ("--csv", csv)):
@@ -88,40 +95,32 @@ def compare(
         label: chosen if values is None else chosen.with_values(values)
         for label, values in variants
     }
-    with terminal.working(f"solving {len(measured)} points of {chosen.name}"):
+    with terminal.counting(f"solving {len(measured)} points of {chosen.name}") as counted:
         from notchflex.cli.compile_cache import use_compile_cache
 
         use_compile_cache()
         from notchflex import compare as comparing
 
         comparison = comparing.compare(chosen, measured, from_rest=not path)
-        others = {
-            label: comparing.compare_kinematics(comparison)
-            if values is None
-            else comparing.compare(robots[label], measured, from_rest=not path)
-            for label, values in variants
-        }
+        others: dict[str, Comparison] = {}
+        for number, (label, values) in enumerate(variants, 1):
+            counted(number, 1 + len(variants))
+            others[label] = (
+                comparing.compare_kinematics(comparison)
+                if values is None
+                else comparing.compare(robots[label], measured, from_rest=not path)
+            )
     _write(comparison, others, json=json, csv=csv, plot=plot)
-    if STANDARD_OUTPUT not in (json, csv):
+    if STANDARD_OUTPUT not in (json, csv) and not quiet:
         _print(comparison, others)
     return _say_what_matters(comparison)
 
 
 def _variant(text: str) -> tuple[str, list[tuple[str, object]] | None]:
-    """Read `LABEL: PATH=VALUE, ...`; None stands for the kinematic model."""
-    from notchflex.errors import InputError
-    from notchflex.robot.paths import parse_assignment
-
-    label, colon, values = text.partition(":")
-    label = label.strip()
-    if not colon and label == "kinematics":
-        return label, None
-    if not colon or not label:
-        raise InputError(
-            f'--beside {text}: give kinematics, or "LABEL: PATH=VALUE, PATH=VALUE", for example '
-            '"linear: material.kind=linear".'
-        )
-    return label, [parse_assignment(part) for part in values.split(",")]
+    """Read what stands beside; None stands for the kinematic model."""
+    if text.strip() == "kinematics":
+        return "kinematics", None
+    return variant(text, "kinematics, or ")
 
 
 def _write(
@@ -148,9 +147,9 @@ def _write(
         write_csv(csv, list(columns), zip(*columns.values(), strict=True))
     if plot is not None:
         with terminal.working(f"drawing {plot}"):
-            from notchflex.plot import comparison_figure, save
+            from notchflex.plot import comparison_picture
 
-            save(comparison_figure(comparison, others), plot)
+            comparison_picture(comparison, others).save(plot)
 
 
 def _print(comparison: Comparison, others: dict[str, Comparison]) -> None:
@@ -164,17 +163,23 @@ def _print(comparison: Comparison, others: dict[str, Comparison]) -> None:
         f"{comparison.points} points of {trials} trial{'s' if trials > 1 else ''}, each "
         f"{'pulled from rest' if comparison.from_rest else 'trial one path with memory'}"
     )
-    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
-    table.add_column("root-mean-square error\n", no_wrap=True)
-    for notch in range(comparison.robot.number_of_notches):
-        table.add_column(f"n{notch + 1}\ndeg", justify="right")
-    table.add_column("total\ndeg", justify="right")
-    table.add_column("tip\nmm", justify="right")
-    for label, one in {"model": comparison, **others}.items():
-        numbers: list[Any] = [*(one.rmse_notches * DEGREES), one.rmse_total * DEGREES]
-        cells = [f"{number:.2f}" for number in numbers]
-        table.add_row(label, *cells, f"{one.tip_rmse:.3f}")
-    console.print(table)
+    models = {"model": comparison, **others}
+    notches = comparison.robot.number_of_notches
+    for first in range(0, notches, MOST_COLUMNS):  # a wide robot in parts, each of 80 columns
+        last = min(first + MOST_COLUMNS, notches)
+        table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
+        table.add_column("root-mean-square error\n", no_wrap=True, max_width=24)
+        for notch in range(first, last):
+            table.add_column(f"n{notch + 1}\ndeg", justify="right")
+        if last == notches:
+            table.add_column("total\ndeg", justify="right")
+            table.add_column("tip\nmm", justify="right")
+        for label, one in models.items():
+            cells = [f"{number:.2f}" for number in one.rmse_notches[first:last] * DEGREES]
+            if last == notches:
+                cells += [f"{one.rmse_total * DEGREES:.2f}", f"{one.tip_rmse:.3f}"]
+            table.add_row(label, *cells)
+        console.print(table)
 
 
 def _say_what_matters(comparison: Comparison) -> int:

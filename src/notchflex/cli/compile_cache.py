@@ -20,19 +20,27 @@ def use_compile_cache() -> None:
     """
     if VARIABLE in os.environ:
         return
-    folder = _user_cache() / "notchflex" / f"compiled-{_machine()}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        writable = os.access(folder, os.W_OK)
-    except OSError:
-        return
-    if not writable:
+    folder = cache_folder()
+    if folder is None:
         return
     from notchflex._jax import jax
 
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def cache_folder() -> Path | None:
+    """Return where compiled code is kept, made if need be; None where it is not kept."""
+    if VARIABLE in os.environ:
+        chosen = os.environ[VARIABLE]
+        return Path(chosen) if chosen else None
+    folder = _user_cache() / "notchflex" / f"compiled-{_machine()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder if os.access(folder, os.W_OK) else None
+    except OSError:
+        return None
 
 
 def _user_cache() -> Path:

@@ -10,6 +10,7 @@ from typing import Annotated
 from cyclopts import Group, Parameter
 
 from notchflex.cli import terminal
+from notchflex.errors import InputError
 from notchflex.robot import Robot, load_robot
 from notchflex.robot.paths import parse_assignment, set_values
 
@@ -48,13 +49,52 @@ CsvFile = Annotated[
         help="Write the result as a CSV table to this file; `-` prints it and nothing else.",
     ),
 ]
+NetcdfFile = Annotated[
+    str | None,
+    Parameter(
+        name="--nc",
+        group=OUTPUT,
+        allow_leading_hyphen=True,
+        help="Write the whole result as NetCDF to this file (extra `data`); "
+        "`notchflex.read_path` reads it back.",
+    ),
+]
+ParquetFile = Annotated[
+    str | None,
+    Parameter(
+        name="--parquet",
+        group=OUTPUT,
+        allow_leading_hyphen=True,
+        help="Write the columns of the CSV as a Parquet table to this file (extra `data`).",
+    ),
+]
+_PICTURE = "Draw a picture to this .png, .svg or .pdf file, or to an .html file to look into"
 PlotFile = Annotated[
     str | None,
     Parameter(
         name="--plot",
         group=OUTPUT,
         allow_leading_hyphen=True,
-        help="Draw a picture to this .png, .svg or .pdf file.",
+        help=f"{_PICTURE}.",
+    ),
+]
+MovingPlotFile = Annotated[
+    str | None,
+    Parameter(
+        name="--plot",
+        group=OUTPUT,
+        allow_leading_hyphen=True,
+        help=f"{_PICTURE}, or to a .gif file that moves.",
+    ),
+]
+Quiet = Annotated[
+    bool,
+    Parameter(
+        name="--quiet",
+        group=OUTPUT,
+        negative=(),
+        show_default=False,
+        help="Print no tables, notes or progress: only warnings, errors, and what `-` asks for.",
     ),
 ]
 
@@ -71,6 +111,29 @@ def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
         if dropped:
             terminal.note(f"the new kind has no {', '.join(dropped)}; dropped.")
     return robot
+
+
+def variant(text: str, other: str = "") -> tuple[str, list[tuple[str, object]]]:
+    """Read `LABEL: PATH=VALUE, PATH=VALUE`.
+
+    Args:
+        text: What was given.
+        other: What else may be given, as the message begins.
+
+    Raises:
+        InputError: Not of this form.
+
+    Example:
+        >>> variant("slick: friction.coefficient=0")
+        ('slick', [('friction.coefficient', 0)])
+    """
+    label, colon, values = text.partition(":")
+    if not colon or not label.strip():
+        raise InputError(
+            f'--beside {text}: give {other}"LABEL: PATH=VALUE, PATH=VALUE", for example '
+            '"linear: material.kind=linear".'
+        )
+    return label.strip(), [parse_assignment(part) for part in values.split(",")]
 
 
 def robot_files(name: str) -> list[Path]:

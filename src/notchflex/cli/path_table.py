@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 21
 NO_NUMBER = "–"
+NARROW_NUMBERS = terminal.NARROW - 6
+"""Characters that are left beside the number of the step."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,33 @@ def print_path(path: Path) -> None:
         console.print(f"Too wide to be shown: {', '.join(left_out)}.")
     if len(rows) < len(path) or left_out:
         console.print("--csv FILE or --json FILE writes everything.")
+
+
+def print_beside(paths: Mapping[str, Path]) -> None:
+    """Print the total angle of several paths under the same loads, side by side."""
+    first = next(iter(paths.values()))
+    rows = telling_rows(first)
+    quantity = QUANTITIES["total_angle"]
+    table = Table(
+        box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False, title_justify="left"
+    )
+    table.add_column("step\n", justify="right", no_wrap=True)
+    width = (NARROW_NUMBERS - len(paths)) // len(paths)
+    for label in paths:
+        head = label if len(label) <= width else f"{label[: width - 1]}…"
+        table.add_column(f"{head}\n{quantity.unit}", justify="right", no_wrap=True)
+    for row in rows:
+        cells = [
+            _rounded(float(path.total_angle[row]) * quantity.scale, ".2f")
+            if path.converged[row]
+            else NO_NUMBER
+            for path in paths.values()
+        ]
+        table.add_row(str(row + 1), *cells)
+    console = terminal.output()
+    console.print()
+    console.print(f"{quantity.title}, beside each other", style="bold")
+    console.print(table)
 
 
 def telling_rows(path: Path, most: int = MOST_ROWS) -> list[int]:

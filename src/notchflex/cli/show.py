@@ -9,18 +9,26 @@ import numpy as np
 
 from notchflex.cli import terminal
 from notchflex.cli.notch_tables import closing_legend, closing_table, description_tables
-from notchflex.cli.options import JsonFile, RobotName, Settings, chosen_robot, robot_files
+from notchflex.cli.options import JsonFile, Quiet, RobotName, Settings, chosen_robot, robot_files
 from notchflex.results.files import STANDARD_OUTPUT, check_output
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
 
-def show(robot: RobotName, /, *, settings: Settings = (), json: JsonFile = None) -> None:
+def show(
+    robot: RobotName,
+    /,
+    *,
+    settings: Settings = (),
+    json: JsonFile = None,
+    quiet: Quiet = False,
+) -> None:
     """Show every notch of a robot: section, closing angle and force, strain at closing.
 
     The closing force is the tension at which a notch closes while the tendon with the longest
     moment arm on it is pulled from rest with all others slack.
     """
+    terminal.be_quiet(quiet)
     if json is not None:
         check_output(json, "--json", inputs=robot_files(robot))
     chosen = chosen_robot(robot, settings)
@@ -38,7 +46,7 @@ def show(robot: RobotName, /, *, settings: Settings = (), json: JsonFile = None)
         from notchflex.results.json import document_head, write_json
 
         write_json(json, {**document_head(chosen), "notches": notches})
-    if json != STANDARD_OUTPUT:
+    if json != STANDARD_OUTPUT and not quiet:
         _print(chosen, length, notches)
 
 

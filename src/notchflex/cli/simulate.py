@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
 
+from notchflex._extras import need
 from notchflex.cli import terminal
+from notchflex.cli.beside import beside_files, beside_robots
 from notchflex.cli.loads import (
     BodyForces,
     Following,
@@ -23,7 +27,10 @@ from notchflex.cli.options import (
     OUTPUT,
     CsvFile,
     JsonFile,
-    PlotFile,
+    MovingPlotFile,
+    NetcdfFile,
+    ParquetFile,
+    Quiet,
     RobotName,
     Settings,
     chosen_robot,
@@ -32,6 +39,9 @@ from notchflex.cli.options import (
 from notchflex.cli.spec import load_columns, parse_vector
 from notchflex.errors import InputError
 from notchflex.results.files import (
+    BROWSER,
+    MOVING,
+    PAPER,
     STANDARD_OUTPUT,
     check_distinct,
     check_output,
@@ -101,9 +111,23 @@ def simulate(
         str | None,
         Parameter(group=OUTPUT, help="Write the last state to this file, to go on from it later."),
     ] = None,
+    beside: Annotated[
+        tuple[str, ...],
+        Parameter(
+            name="--beside",
+            negative=(),
+            show_default=False,
+            help="Also pull another robot in the same way: `ROBOT`, `LABEL: ROBOT`, or this one "
+            "with other values, `LABEL: PATH=VALUE, PATH=VALUE`. May be given up to four times. "
+            "Table, picture and JSON have all of them, other files the first.",
+        ),
+    ] = (),
     json: JsonFile = None,
     csv: CsvFile = None,
-    plot: PlotFile = None,
+    nc: NetcdfFile = None,
+    parquet: ParquetFile = None,
+    plot: MovingPlotFile = None,
+    quiet: Quiet = False,
 ) -> int:
     """Pull the tendons of a robot through a series of tensions or strokes.
 
@@ -111,14 +135,20 @@ def simulate(
     is let go differs from the same tension pulled. Prints a table of every step (thinned if it is
     long) unless `--json -` or `--csv -` prints something else.
     """
-    inputs = robot_files(robot)
-    check_distinct({"--json": json, "--csv": csv, "--plot": plot, "--save-state": save_state})
-    for option, target in (("--json", json), ("--csv", csv), ("--save-state", save_state)):
-        if target is not None:
-            check_output(target, option, inputs=inputs)
-    if plot is not None:
-        check_picture(plot, "--plot", inputs=inputs)
+    terminal.be_quiet(quiet)
+    inputs = [*robot_files(robot), *(file for text in beside for file in beside_files(text))]
+    outputs = {
+        "--json": json,
+        "--csv": csv,
+        "--nc": nc,
+        "--parquet": parquet,
+        "--plot": plot,
+        "--save-state": save_state,
+    }
+    check_distinct(outputs)
+    _check(outputs, inputs, moving=not beside)
     chosen = chosen_robot(robot, settings)
+    robots = beside_robots(chosen, robot, beside)
     loads = parse_loads(
         tip_force=tip_force,
         tip_moment=tip_moment,
@@ -132,25 +162,56 @@ def simulate(
         tensions = strokes = np.full((1, chosen.number_of_tendons), np.nan)
     else:
         tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
+    if len(tensions) < 2 and plot is not None and FilePath(plot).suffix.lower() in MOVING:
+        raise InputError(f"--plot {plot}: one step does not move; write a .png, .svg or .pdf.")
     finer = _refinement(refinement)
     turn = np.zeros(3)
     if base_rotation is not None:
         turn = np.radians(parse_vector(base_rotation, "--base-rotation", "angles in deg"))
 
-    with terminal.working(f"solving {len(tensions)} steps of {chosen.name}"):
+    with terminal.counting(f"solving {len(tensions)} steps of {chosen.name}") as counted:
         from notchflex import statics
         from notchflex.cli.compile_cache import use_compile_cache
 
         use_compile_cache()
         start = None if from_state is None else statics.State.load(from_state)
         pulled = statics.LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
-        path = statics.simulate(chosen, put_on(pulled, loads), from_state=start, refinement=finer)
-    _write(path, json=json, csv=csv, plot=plot, save_state=save_state)
-    if STANDARD_OUTPUT not in (json, csv):
-        from notchflex.cli.path_table import print_path
+        pulled = put_on(pulled, loads)
+        paths: dict[str, Path] = {}
+        for number, (label, one) in enumerate(robots.items()):
+            if number:
+                counted(number, len(robots))
+            state = None if number else start
+            paths[label] = statics.simulate(one, pulled, from_state=state, refinement=finer)
+    _write(paths, outputs)
+    if STANDARD_OUTPUT not in (json, csv) and not quiet:
+        from notchflex.cli.path_table import print_beside, print_path
 
-        print_path(path)
-    return _say_what_matters(path)
+        print_path(next(iter(paths.values())))
+        if beside:
+            print_beside(paths)
+    codes = [_say_what_matters(path, label if beside else "") for label, path in paths.items()]
+    return max(codes)
+
+
+def _check(outputs: dict[str, str | None], inputs: Sequence[FilePath], *, moving: bool) -> None:
+    """Raise if a file cannot be written, before anything is computed."""
+    for option, target in outputs.items():
+        if target is None:
+            continue
+        if option == "--plot":
+            kinds = PAPER + BROWSER + (MOVING if moving else ())
+            check_picture(target, option, inputs=inputs, kinds=kinds)
+            continue
+        if option in ("--nc", "--parquet") and target == STANDARD_OUTPUT:
+            raise InputError(f"{option} - : this is no text; name a file.")
+        check_output(target, option, inputs=inputs)
+        if option == "--nc":
+            from notchflex.results.carry import need_netcdf
+
+            need_netcdf(option)
+        if option == "--parquet":
+            need("polars", "data", option)
 
 
 def _refinement(text: str) -> int:
@@ -159,39 +220,64 @@ def _refinement(text: str) -> int:
     return int(text)
 
 
-def _write(
-    path: Path, *, json: str | None, csv: str | None, plot: str | None, save_state: str | None
-) -> None:
-    if json is not None:
-        from notchflex.results.json import path_document, write_json
+def _write(paths: dict[str, Path], outputs: dict[str, str | None]) -> None:
+    path, *others = paths.values()
+    if target := outputs["--json"]:
+        from notchflex.results.carry import whole_document
+        from notchflex.results.json import write_json
 
-        write_json(json, path_document(path))
-    if csv is not None:
+        document = whole_document(path)
+        if others:
+            told = list(paths.items())[1:]
+            document["beside"] = {label: whole_document(other) for label, other in told}
+        write_json(target, document)
+    if target := outputs["--csv"]:
         from notchflex.results.csv import write_path_csv
 
-        write_path_csv(csv, path)
-    if plot is not None:
-        with terminal.working(f"drawing {plot}"):
-            from notchflex.plot import path_figure, save
+        write_path_csv(target, path)
+    if target := outputs["--nc"]:
+        from notchflex.results.carry import write_netcdf
 
-            save(path_figure(path), plot)
-    if save_state is not None:
+        write_netcdf(target, path)
+    if target := outputs["--parquet"]:
+        from notchflex.results.parquet import write_parquet
+
+        write_parquet(target, path)
+    if target := outputs["--plot"]:
+        _draw(paths, target)
+    if target := outputs["--save-state"]:
         from notchflex.results.files import replacing
 
-        with replacing(save_state) as temporary:
+        with replacing(target) as temporary:
             path.state.save(temporary)
 
 
-def _say_what_matters(path: Path) -> int:
-    """Tell warnings and failures; return the exit code."""
+def _draw(paths: dict[str, Path], target: str) -> None:
+    path, *others = paths.values()
+    if FilePath(target).suffix.lower() in MOVING:
+        with terminal.counting(f"drawing {target}") as counted:
+            from notchflex.plot import save_animation
+
+            save_animation(path, target, progress=counted)
+        return
+    with terminal.working(f"drawing {target}"):
+        from notchflex.plot import beside_picture, path_picture
+
+        picture = beside_picture(paths) if others else path_picture(path)
+        picture.save(target)
+
+
+def _say_what_matters(path: Path, label: str) -> int:
+    """Tell warnings and failures, of one of several with its label; return the exit code."""
     from notchflex.cli.app import DONE, NOT_CONVERGED
     from notchflex.results.warnings import path_warnings
 
+    whose = f"{label}: " if label else ""
     for sentence in path_warnings(path):
-        terminal.warn(sentence)
+        terminal.warn(f"{whose}{sentence}")
     failed = np.flatnonzero(~np.asarray(path.converged))
     if not len(failed):
         return DONE
     first = int(failed[0])
-    terminal.error(f"not converged: step {first + 1} of {len(path)}: {path.reason[first]}.")
+    terminal.error(f"{whose}not converged: step {first + 1} of {len(path)}: {path.reason[first]}.")
     return NOT_CONVERGED

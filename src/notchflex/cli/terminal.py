@@ -15,6 +15,7 @@ from notchflex.results.streams import let_go
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import TaskID
 
 NARROW = 80
 """Columns of a terminal that every table fits; also the width when writing into a pipe."""
@@ -60,8 +61,9 @@ def messages() -> Console:
 
 
 def note(text: str) -> None:
-    """Write one line of information to standard error."""
-    _say("Note:", "cyan", text)
+    """Write one line of information to standard error; nothing with `--quiet`."""
+    if not _Manner.quiet:
+        _say("Note:", "cyan", text)
 
 
 def warn(text: str) -> None:
@@ -74,6 +76,22 @@ def error(text: str) -> None:
     _say("Error:", "bold red", text)
 
 
+class _Manner:
+    """How this call was asked to behave: set by `be_quiet`, once for each call."""
+
+    quiet = False
+
+
+def be_quiet(quiet: bool) -> None:
+    """Say whether only warnings, errors and documents that were asked for are written."""
+    _Manner.quiet = quiet
+
+
+def is_quiet() -> bool:
+    """Tell whether `--quiet` was given: no tables, notes and progress."""
+    return _Manner.quiet
+
+
 @contextlib.contextmanager
 def working(text: str) -> Generator[None]:
     """Show that something is being computed, on a terminal only, and take it away afterwards."""
@@ -84,11 +102,58 @@ def working(text: str) -> Generator[None]:
 @contextlib.contextmanager
 def progress(text: str) -> Generator[Callable[[str], None]]:
     """As `working`, for what takes minutes: yields a function that tells what is done now."""
-    if not sys.stderr.isatty():
+    if not _is_watched():
         yield lambda step: None
         return
     with messages().status(text) as status:
         yield lambda step: status.update(f"{text} {step}")
+
+
+@contextlib.contextmanager
+def counting(text: str) -> Generator[Callable[[int, int], None]]:
+    """Show a bar, on a terminal only: yields a function that takes what is done and all there is.
+
+    The bar goes when the work is done; in a pipe, in a log or with `--quiet` there is none.
+    """
+    if not _is_watched():
+        yield lambda done, total: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Remaining())
+    with Progress(*columns, console=messages(), transient=True) as bar:
+        task = bar.add_task(text, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextlib.contextmanager
+def bars() -> Generator[Callable[[str, int, int], None] | None]:
+    """Show how far each stage of a long computation is, on a terminal only.
+
+    Yields a function that is called with the stage, how much of it is done, and how much there is;
+    None where nobody watches.
+    """
+    if not _is_watched():
+        yield None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=messages(), transient=True) as shown:
+        stages: dict[str, TaskID] = {}
+
+        def tell(stage: str, done: int, total: int) -> None:
+            if stage not in stages:
+                stages[stage] = shown.add_task(stage, total=total)
+            shown.update(stages[stage], completed=done, total=total)
+
+        tell("searching", 0, 1)
+        yield tell
+
+
+def _is_watched() -> bool:
+    return not _Manner.quiet and sys.stderr.isatty()
 
 
 def _say(head: str, style: str, text: str) -> None:

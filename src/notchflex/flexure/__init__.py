@@ -6,7 +6,7 @@ from notchflex.flexure.elastica import Elastica, elastica, modulus_from_single_n
 from notchflex.flexure.plane import flattened
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
-from notchflex.flexure.shape import pull_change, relative_pose, rod_end
+from notchflex.flexure.shape import free_pose, pull_change, relative_pose, rod_end
 from notchflex.flexure.state import (
     FlexureState,
     fibre_slope,
@@ -28,6 +28,7 @@ __all__ = [
     "fibre_stretch",
     "flattened",
     "flexure_state",
+    "free_pose",
     "in_space",
     "modulus_from_single_notch",
     "of_rod",

@@ -21,7 +21,6 @@ from notchflex.flexure.places import Places
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
 from notchflex.material import FibreSection
-from notchflex.motion import identity
 from notchflex.robot import ArcNotch, Tube
 from notchflex.section import annular_sector, annular_segment
 
@@ -63,7 +62,7 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0) -> Rod:
     count = nodes[0]
     return Rod(
         # The followed curve is a point.
-        **places.fields([identity()] * len(place), basis, reference),
+        **places.fields(None, basis, reference),
         start_rotation=constant(turned),
         start_offset=constant(turned @ neutral_axis),
         curve_rotation=constant(np.eye(3)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Array
@@ -30,26 +30,18 @@ _AT_NODES = (
 def with_level(rod: Rod, level: str) -> Rod:
     """Keep the modes that a level of loads needs; strains that are constant keep one node."""
     modes = rod.levels[LEVELS.index(level)]
-    kept = dataclasses.replace(
-        rod,
-        basis=rod.basis[..., :modes],
-        idle=rod.idle[..., :modes],
-        turn_pair=None if rod.turn_pair is None else rod.turn_pair[..., : modes + 1, : modes + 1],
-        **{name: getattr(rod, name)[..., : modes + 1] for name in _HAT},
-    )
-    alike = (kept.reference_strain, kept.basis, *jax.tree.leaves(kept.section))
-    if all(np.all(leaf == leaf[:1]) for leaf in alike):
-        kept = _one_node(kept)
-    return kept
-
-
-def _one_node(rod: Rod) -> Rod:
-    """The rod with the one node of strains in its middle."""
-    middle = slice(len(rod.length) // 2, len(rod.length) // 2 + 1)
-    at_nodes = {name: getattr(rod, name)[middle] for name in _AT_NODES}
-    section = jax.tree.map(lambda leaf: leaf[middle], rod.section)
-    length = constant([rod.length.sum()])
-    return dataclasses.replace(rod, **at_nodes, section=section, length=length)
+    kept: dict[str, Any] = {name: getattr(rod, name)[..., : modes + 1] for name in _HAT}
+    kept |= {"basis": rod.basis[..., :modes], "idle": rod.idle[..., :modes]}
+    if rod.turn_pair is not None:
+        kept["turn_pair"] = rod.turn_pair[..., : modes + 1, : modes + 1]
+    alike = (rod.reference_strain, kept["basis"], *jax.tree.leaves(rod.section))
+    if all((leaf == leaf[:1]).all() for leaf in alike):
+        # The one node in the middle.
+        middle = slice(len(rod.length) // 2, len(rod.length) // 2 + 1)
+        kept |= {name: kept.get(name, getattr(rod, name))[middle] for name in _AT_NODES}
+        kept["section"] = jax.tree.map(lambda leaf: leaf[middle], rod.section)
+        kept["length"] = constant([rod.length.sum()])
+    return dataclasses.replace(rod, **kept)
 
 
 def stack(rods: Sequence[Rod]) -> Rod:
@@ -59,9 +51,14 @@ def stack(rods: Sequence[Rod]) -> Rod:
     poses = max(rod.step.shape[0] for rod in rods)
     levels = tuple(max(rod.levels[i] for rod in rods) for i in range(3))
     filled = [_filled(rod, modes, nodes, poses, levels) for rod in rods]
-    together = jax.tree.map(lambda *leaves: _stacked(np.stack(leaves)), *filled)
-    unused = {name: None for name in ("small", "chord") if not getattr(together, name).any()}
-    return dataclasses.replace(together, **unused)
+    unused: dict[str, Any] = {
+        name: None
+        for name in ("small", "chord")
+        if not any(np.any(getattr(rod, name)) for rod in filled)
+    }
+    used = [dataclasses.replace(rod, **unused) if unused else rod for rod in filled]
+    together: Rod = jax.tree.map(lambda *leaves: _stacked(np.stack(leaves)), *used)
+    return together
 
 
 def _stacked(values: np.ndarray) -> Array:
@@ -73,6 +70,8 @@ def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...
     """The rod with idle modes, nodes that stand for nothing, and steps that go nowhere."""
     more, further = modes - rod.modes, poses - rod.step.shape[0]
     count = rod.length.shape[0]
+    if (more, further, count, levels) == (0, 0, nodes, rod.levels):
+        return rod
     index = np.minimum(np.arange(nodes), count - 1)
     at_end = np.minimum(np.arange(poses + 1), rod.step.shape[0])
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,28 @@ from jaxtyping import Float
 from numpy.polynomial.legendre import leggauss
 
 from notchflex._jax import constant
-from notchflex.motion import Motion, adjoint
+from notchflex.motion import Motion, outer_twists
 
 # Gauss's points between neighbouring places of the turn.
 _BETWEEN = 4
+
+
+@lru_cache(maxsize=64)
+def _rule(count: int) -> tuple[Float[np.ndarray, " nodes"], Float[np.ndarray, " nodes"]]:
+    """Gauss's nodes from -1 to 1 and their weights: kept, as they are asked for again and again."""
+    found = leggauss(count)
+    for values in found:
+        values.setflags(write=False)
+    return found
+
+
+@lru_cache(maxsize=64)
+def _polynomials(count: int) -> Float[np.ndarray, "nodes nodes"]:
+    """Coefficients of the polynomials through Gauss's nodes from 0 to 1, kept likewise."""
+    points = 0.5 * (1.0 + _rule(count)[0])
+    found = np.linalg.inv(points[:, None] ** np.arange(count))
+    found.setflags(write=False)
+    return found
 
 
 def gauss_nodes(
@@ -40,9 +58,12 @@ def gauss_nodes(
         >>> print(f"{weights @ places**2:.6f}")
         9.000000
     """
-    counts = np.broadcast_to(per_interval, len(ends) - 1)
-    rules = [leggauss(count) for count in counts]
     half = 0.5 * np.diff(np.asarray(ends, float))
+    if isinstance(per_interval, int):
+        points, weight = _rule(per_interval)
+        places = np.asarray(ends[:-1])[:, None] + half[:, None] * (1.0 + points)
+        return places.ravel(), (half[:, None] * weight).ravel()
+    rules = [_rule(count) for count in per_interval]
     places = [low + h * (1.0 + x) for low, h, (x, _) in zip(ends, half, rules, strict=False)]
     weights = [h * w for h, (_, w) in zip(half, rules, strict=True)]
     return np.concatenate(places), np.concatenate(weights)
@@ -50,10 +71,9 @@ def gauss_nodes(
 
 def up_to(count: int, parts: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k nodes"]:
     """Integrals from 0 to parts of (0, 1) of the polynomials through Gauss's nodes there."""
-    points = 0.5 * (1.0 + leggauss(count)[0])
     powers = np.arange(1, count + 1)
     integrals = np.asarray(parts)[:, None] ** powers / powers
-    return integrals @ np.linalg.inv(points[:, None] ** (powers - 1))
+    return integrals @ _polynomials(count)
 
 
 @dataclass(frozen=True)
@@ -120,20 +140,25 @@ class Places:
 
     def fields(
         self,
-        curve: Sequence[Motion],
+        curve: Motion | None,
         basis: Float[np.ndarray, "every 6 modes"],
         reference: Float[np.ndarray, "every 6"] | None = None,
     ) -> dict[str, Any]:
         """The fields of a rod that tell its strains and its pose.
 
         Args:
-            curve: Pose of the followed curve at every place.
+            curve: Pose of the followed curve at every place, as leading axis; None for a point.
             basis: Strain at every place per unit of mode.
             reference: Strain of the free rod beyond that of the curve; none where not given.
         """
         free = np.zeros(basis.shape[:2]) if reference is None else reference
         hat = np.concatenate([free[..., None], basis], axis=-1)
-        beside = np.stack([adjoint(pose) @ own for pose, own in zip(curve, hat, strict=True)])
+        if curve is None:
+            count = len(hat)
+            beside = constant(hat)
+            curve = Motion(constant([np.eye(3)] * count), constant(np.zeros((count, 3))))
+        else:
+            beside = outer_twists(curve, constant(hat))
         counts = [len(part[0]) for part in (self.at_nodes, self.at_poses, self.between)]
         _, at_poses, between, before = np.split(beside, np.cumsum(counts))
         turns = _grouped(between[:, :3], self.between[1])
@@ -147,8 +172,8 @@ class Places:
             "node_turn": constant(self._to_nodes(_grouped(before[:, :3], self.before[1]))),
             "node_place": np.searchsorted(self.at_poses[0], self.at_nodes[0], side="right"),
             "node_reach": constant(self._reach()),
-            "node_rotation": constant(np.stack([pose.rotation for pose in curve[at_node]])),
-            "node_offset": constant(np.stack([pose.translation for pose in curve[at_node]])),
+            "node_rotation": constant(curve.rotation[at_node]),
+            "node_offset": constant(curve.translation[at_node]),
         }
 
     def _to_nodes(self, turns: Float[np.ndarray, "stops 3 hat"]) -> Any:
@@ -161,7 +186,7 @@ class Places:
         columns = []
         for low, high, count in zip(self.ends[:-1], self.ends[1:], self.poses, strict=True):
             part = np.clip((nodes - low) / (high - low), 0.0, 1.0)
-            columns += [up_to(count, part) / (0.5 * leggauss(count)[1]), np.zeros((len(nodes), 1))]
+            columns += [up_to(count, part) / (0.5 * _rule(count)[1]), np.zeros((len(nodes), 1))]
         return np.concatenate(columns[:-1], axis=1)
 
 
@@ -180,7 +205,7 @@ def _pairs(
     """
     own = turning.reshape(-1, _BETWEEN, *turning.shape[1:])
     weights = lengths.reshape(-1, _BETWEEN)
-    inner = up_to(_BETWEEN, 0.5 * (1.0 + leggauss(_BETWEEN)[0]))
+    inner = up_to(_BETWEEN, 0.5 * (1.0 + _rule(_BETWEEN)[0]))
     so_far = weights.sum(axis=1)[:, None, None, None] * np.einsum("ij,rjch->rich", inner, own)
     crossed = np.cross(so_far[..., :, None], own[..., None, :], axisa=2, axisb=2, axisc=2)
     pairs = 0.5 * np.einsum("ri,richk->rchk", weights, crossed)

@@ -52,12 +52,27 @@ def bent(rod: Rod, modes: Float[Array, " modes"]) -> Bent:
         rotation, turn = _in_plane(rod.turn[:, 0] @ hat), rod.turn[..., 1:]
     else:
         turns, slope = _turns(rod, hat)
-        parts = xp.stack([rotation_about(one) for one in turns]) if xp is np else _about(turns)
-        rotation = _products(parts)
+        rotation = _products(_about(turns))
         turn = xp.cumsum(_before(rotation) @ _left_slopes(turns) @ slope, axis=0)
-    at_nodes = rotation[:-1]
-    stepped = (at_nodes[..., None] * rod.step[:, None]).sum(axis=-2)
+    stepped = _stepped(rod, rotation)
     return Bent(rotation, turn, stepped @ hat, stepped[..., 1:])
+
+
+def free_pose(rod: Rod) -> Motion:
+    """Pose of the distal body as seen from the proximal one, of a rod in space that nothing bends.
+
+    The same as `relative_pose` without modes, and without what only its slopes need.
+    """
+    assert rod.turn_pair is not None
+    turns = np.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
+    rotation = _products(_about(constant(turns)))
+    end = Motion(rotation[-1], _stepped(rod, rotation)[..., 0].sum(axis=0))
+    return Motion(rod.start_rotation, rod.start_offset).then(end).then(_tail(rod))
+
+
+def _stepped(rod: Rod, rotation: Float[Array, "places d d"]) -> Float[Array, "gauss d hat"]:
+    """Steps at the nodes, turned, for (1, q)."""
+    return (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
 
 
 def _in_plane(angle: Float[Array, " places"]) -> Float[Array, "places 2 2"]:
@@ -77,12 +92,14 @@ def _turns(
 
 
 def _about(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
+    if array_module(turns) is np:
+        return rotation_about(turns)
     return jax.vmap(rotation_about)(turns)
 
 
 def _left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
     if array_module(turns) is np:
-        return constant([left_slope(one) for one in turns])
+        return left_slope(turns)
     return jax.vmap(left_slope)(turns)
 
 

@@ -62,7 +62,10 @@ def strip_rod(
     length = notch.strip_length_in(tube)
     places = Places((0.0, length), (nodes,), (nodes,))
     basis = _modes(2.0 * places.every / length - 1.0, bending_modes, more_sideways) / length
-    along = [Motion(constant(np.eye(3)), constant([0.0, 0.0, at])) for at in places.every]
+    along = Motion(
+        constant(np.tile(np.eye(3), (len(places.every), 1, 1))),
+        constant(places.every[:, None] * np.array([0.0, 0.0, 1.0])),
+    )
     turned = rotation_about(constant([0.0, 0.0, np.radians(notch.direction_deg)]))
     return Rod(
         start_rotation=constant(turned @ _LYING),

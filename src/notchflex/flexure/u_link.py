@@ -14,7 +14,7 @@ from notchflex._jax import constant, jax
 from notchflex.flexure.places import Places
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
-from notchflex.flexure.u_link_geometry import Link
+from notchflex.flexure.u_link_geometry import Course, Link
 from notchflex.flexure.wrench_modes import wrench_modes
 from notchflex.material import FibreSection
 from notchflex.motion import Motion, rotation_about
@@ -63,16 +63,18 @@ def u_link_rod(
     counts = (nodes[0], nodes[1], nodes[0])
     places = Places(ends, counts, counts)
     place = places.every
-    section = _section(link, tube, place, poisson_ratio)
+    course = link.course(np.array([*place, 0.0, link.length]))
+    section = _section(link, tube, Course(*(values[:-2] for values in course)), poisson_ratio)
     # A slot cut from the side away from the bend leaves the wall on the bend's side, where the
     # link then begins; over the slot that follows stands its mirror image.
     hand = 1.0 if notch.proximal_slot == "away" else -1.0
     # The strip lies above its proximal slot, whose lower edge is the proximal face.
     middle = np.array([0.0, 0.0, 2.0 * notch.slot_radius + 0.5 * notch.strip_thickness])
-    start, *poses, end = _poses(link, middle, hand, np.array([0.0, *place, link.length]))
+    every = _poses(course, middle, hand)
+    poses, start, end = (Motion(*(part[at] for part in every)) for at in (slice(-2), -2, -1))
     count = sum(counts)
     free = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (count, 1))
-    free[:, 1] = hand * link.curvature(place[:count])
+    free[:, 1] = hand * course.curvature[:count]
     basis = wrench_modes(
         poses,
         2.0 * place / link.length - 1.0,
@@ -83,7 +85,6 @@ def u_link_rod(
         force_modes,
         poisson_ratio,
     )
-    from_start = [_between(start, pose) for pose in poses]
     whole = _between(start, end)
     turned = rotation_about(constant([0.0, 0.0, np.radians(notch.direction_deg)]))
     # The distal body's frame: level with the strip's lower edge, on the tube axis.
@@ -97,7 +98,7 @@ def u_link_rod(
         curve_offset=constant(whole.translation),
         end_rotation=constant(last.rotation @ turned.T),
         end_offset=constant(last.translation),
-        **places.fields(from_start, basis),
+        **places.fields(_between(start, poses), basis),
         reference_strain=constant(free),
         section=jax.tree.map(lambda leaf: leaf[:count], section),
         lip=constant(np.zeros(2)),
@@ -109,27 +110,25 @@ def u_link_rod(
     )
 
 
-def _poses(link: Link, middle: np.ndarray, hand: float, places: np.ndarray) -> list[Motion]:
+def _poses(course: Course, middle: np.ndarray, hand: float) -> Motion:
     """Poses of the free middle line, z along it, y out of the plane, in the notch's frame."""
-    along, above = link.middle(places)
-    centres = middle + np.stack([-hand * along, np.zeros_like(along), above], axis=-1)
-    about_y = hand * (link.heading(places) - 0.5 * np.pi)
-    turns = [rotation_about(constant([0.0, angle, 0.0])) for angle in about_y]
-    return [Motion(turn, constant(at)) for turn, at in zip(turns, centres, strict=True)]
+    place = np.stack([-hand * course.along, 0.0 * course.along, course.above], axis=-1)
+    about_y = hand * (course.heading - 0.5 * np.pi)
+    turns = rotation_about(constant(about_y[:, None] * np.array([0.0, 1.0, 0.0])))
+    return Motion(turns, constant(middle + place))
 
 
 def _between(outer: Motion, inner: Motion) -> Motion:
-    """The inner pose as seen from the outer one."""
+    """The inner pose, or many, as seen from the outer one."""
     return Motion(outer.rotation.T @ inner.rotation, outer.point_inside(inner.translation))
 
 
-def _section(link: Link, tube: Tube, place: np.ndarray, poisson_ratio: float) -> FibreSection:
+def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> FibreSection:
     """Two walls as wide as the tube's wall there, which are one where the lumen ends."""
-    along, _ = link.middle(place)
-    outer = np.sqrt(tube.outer_radius**2 - along**2)
-    inner = np.sqrt(np.maximum(tube.inner_radius**2 - along**2, 0.0))
+    outer = np.sqrt(tube.outer_radius**2 - course.along**2)
+    inner = np.sqrt(np.maximum(tube.inner_radius**2 - course.along**2, 0.0))
     middle = 0.5 * (outer + inner)
-    walls = two_walls(outer - inner, link.thickness(place), middle)
+    walls = two_walls(outer - inner, course.thickness, middle)
     return FibreSection(
         area=walls.area,
         second_moment_weak=walls.second_moment_weak,

@@ -12,6 +12,8 @@ Lengths mm, angles rad. Formulas take t of any shape.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -112,6 +114,24 @@ class CurvedEnd:
         return t
 
 
+class Course(NamedTuple):
+    """The middle line at some places.
+
+    Attributes:
+        along: Its points, along the strip from the middle of the straight part, mm.
+        above: The same across the strip, along the tube, mm.
+        heading: Its direction, the same at both ends, rad.
+        curvature: Signed curvature, first negative, then positive, 1/mm (Gao 2017, eq. 11).
+        thickness: Thickness of the material, mm.
+    """
+
+    along: np.ndarray
+    above: np.ndarray
+    heading: np.ndarray
+    curvature: np.ndarray
+    thickness: np.ndarray
+
+
 @dataclass(frozen=True)
 class Link:
     """The whole link: S1, the straight part S2, and S3, which is S1 turned by half a turn.
@@ -126,8 +146,8 @@ class Link:
 
     Example:
         >>> link = Link(slot_radius=0.275, strip_thickness=0.70, strip_length=2.0)
-        >>> along, above = link.middle(0.0)
-        >>> print(f"{link.length:.6f} mm long, begins at {along:.6f}, {above:.4f} mm")
+        >>> start = link.course(0.0)
+        >>> print(f"{link.length:.6f} mm long, begins at {start.along:.6f}, {start.above:.4f} mm")
         3.122062 mm long, begins at -1.537941, -0.1375 mm
     """
 
@@ -135,45 +155,30 @@ class Link:
     strip_thickness: float
     strip_length: float
 
-    @property
+    @cached_property
     def end(self) -> CurvedEnd:
         """Its curved end."""
         return CurvedEnd(self.slot_radius, self.strip_thickness)
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Length of the middle line, mm."""
         return 2.0 * float(self.end.length()) + self.strip_length
 
-    def _parts(self, place: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Length from the nearer end, whether it is curved there, its t, +1 or -1 by the half."""
+    def course(self, place: ArrayLike) -> Course:
+        """Follow the middle line to some places."""
         place = np.asarray(place, dtype=float)
-        nearer = np.minimum(place, self.length - place)
-        curved = self.end.length()
-        t = self.end.at_length(np.minimum(nearer, curved))
-        return nearer, nearer < curved, t, np.where(place <= 0.5 * self.length, 1.0, -1.0)
-
-    def middle(self, place: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the points of the middle line, mm."""
-        nearer, curved, t, half = self._parts(place)
-        of_end = self.end.middle(t)
-        along = np.where(curved, of_end[..., 0], nearer - self.end.length())
-        above = np.where(
-            curved, of_end[..., 1] - self.slot_radius - 0.5 * self.strip_thickness, 0.0
+        end, nearer = self.end, np.minimum(place, self.length - place)
+        of_end = end.length()
+        curved, half = nearer < of_end, np.where(place <= 0.5 * self.length, 1.0, -1.0)
+        t = end.at_length(np.minimum(nearer, of_end))
+        points = end.middle(t)
+        along = np.where(curved, points[..., 0], nearer - of_end)
+        above = points[..., 1] - self.slot_radius - 0.5 * self.strip_thickness
+        return Course(
+            along=half * (along - 0.5 * self.strip_length),
+            above=half * np.where(curved, above, 0.0),
+            heading=np.where(curved, end.heading(t), 0.0),
+            curvature=np.where(curved, half * end.curvature(t), 0.0),
+            thickness=np.where(curved, end.thickness(t), self.strip_thickness),
         )
-        return half * (along - 0.5 * self.strip_length), half * above
-
-    def heading(self, place: ArrayLike) -> np.ndarray:
-        """Compute the direction of the middle line, the same at both ends."""
-        _, curved, t, _ = self._parts(place)
-        return np.where(curved, self.end.heading(t), 0.0)
-
-    def curvature(self, place: ArrayLike) -> np.ndarray:
-        """Compute the signed curvature, first negative, then positive, 1/mm (Gao 2017, eq. 11)."""
-        _, curved, t, half = self._parts(place)
-        return np.where(curved, half * self.end.curvature(t), 0.0)
-
-    def thickness(self, place: ArrayLike) -> np.ndarray:
-        """Compute the thickness of the material, mm."""
-        _, curved, t, _ = self._parts(place)
-        return np.where(curved, self.end.thickness(t), self.strip_thickness)

@@ -9,8 +9,6 @@ which is of second order. Stretch and shear in particular go together by the dir
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Float
 from numpy.polynomial.legendre import legvander
@@ -22,7 +20,7 @@ _X, _Y, _Z = np.eye(3)
 
 
 def wrench_modes(
-    poses: Sequence[Motion],
+    poses: Motion,
     part: Float[np.ndarray, " nodes"],
     length: Float[np.ndarray, " nodes"],
     section: FibreSection,
@@ -40,7 +38,7 @@ def wrench_modes(
     then moments about x and z times P_2, P_3 ... as far as in the plane, and that force.
 
     Args:
-        poses: Pose of the free rod at every node, base to tip.
+        poses: Pose of the free rod at every node, base to tip, as leading axis.
         part: Place of every node along the rod, from -1 to 1.
         length: Length that each node stands for, mm; 0 where it does not count.
         section: Its section at every node, with the shear centre in the centroid.
@@ -54,8 +52,7 @@ def wrench_modes(
         mean strain of 1 for a force.
     """
     whole = length.sum()
-    rotation = np.stack([pose.rotation for pose in poses])
-    lever = np.stack([pose.translation for pose in poses]) - middle
+    rotation, lever = poses.rotation, poses.translation - middle
     reach = np.abs(lever).max(axis=0)
     legendre = legvander(part, max(moment_modes - 2, force_modes - 1))
 

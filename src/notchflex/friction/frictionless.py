@@ -12,6 +12,8 @@ from notchflex.robot import Frictionless
 class FrictionlessLaw(FrictionLaw):
     """Contacts that hold nothing."""
 
+    remembers = False
+
     def bounds(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:

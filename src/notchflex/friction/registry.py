@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import singledispatch
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 from jaxtyping import Array, Bool, Float
@@ -17,7 +17,13 @@ from notchflex._jax import jnp
 
 
 class FrictionLaw(eqx.Module):
-    """Friction of a tendon at the two edges of a gap."""
+    """Friction of a tendon at the two edges of a gap.
+
+    Attributes:
+        remembers: Whether a solved state depends on the one before.
+    """
+
+    remembers: ClassVar[bool] = True
 
     @abstractmethod
     def bounds(

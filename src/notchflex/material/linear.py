@@ -19,7 +19,7 @@ class LinearLaw(SectionLaw):
     elastic_modulus: Float[Array, ""]
     shear_modulus: Float[Array, ""]
 
-    def stiffness(self, section: FibreSection) -> Float[Array, "6 6"]:
+    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Constant stiffness."""
         return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
 

@@ -73,8 +73,8 @@ class SectionLaw(eqx.Module):
         """Energy stored per length under given strains, N mm/mm."""
 
     @abstractmethod
-    def stiffness(self, section: FibreSection) -> Float[Array, "6 6"]:
-        """Resultants per strain in the free robot, of a section without leading axes."""
+    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
+        """Resultants per strain in the free robot, of a section or of many."""
 
     def tangent(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
@@ -85,7 +85,7 @@ class SectionLaw(eqx.Module):
 
 def elastic_stiffness(
     elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
-) -> Float[Array, "6 6"]:
+) -> Float[Array, "*shape 6 6"]:
     """Stiffness of a linear elastic section about its neutral axis.
 
     The axes through the centroid are principal, so bending and stretch do not couple. Shear
@@ -96,11 +96,12 @@ def elastic_stiffness(
     Args:
         elastic_modulus: Young's modulus, MPa.
         shear_modulus: Shear modulus, MPa.
-        section: The section, without leading axes.
+        section: The section, or many.
 
     Returns:
         Resultants per strain, in the order of the strains.
     """
+    xp = array_module(*jax.tree.leaves((elastic_modulus, shear_modulus, section)))
     shear = shear_modulus * section.area
     lever = section.shear_centre
     entries = [
@@ -111,7 +112,7 @@ def elastic_stiffness(
         shear,
         elastic_modulus * section.area,
     ]
-    return array_module(*entries).tensordot(array_module(*entries).stack(entries), _PLACES, 1)
+    return xp.tensordot(xp.stack(entries, axis=-1), _PLACES, 1)
 
 
 # Where the entries of `elastic_stiffness` stand.

@@ -71,7 +71,7 @@ class SuperelasticLaw(SectionLaw):
             + jnp.where(plastic == 0.0, 0.0, self.plastic_modulus * hardening)
         )
 
-    def stiffness(self, section: FibreSection) -> Float[Array, "6 6"]:
+    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Stiffness on the linear branch."""
         return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
 

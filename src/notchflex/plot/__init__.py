@@ -1,7 +1,29 @@
-"""Pictures of results, made with matplotlib (`pip install 'notchflex[plot]'`)."""
+"""Pictures of results, for paper and for a browser (`pip install 'notchflex[plot]'`)."""
 
-from notchflex.plot.comparison import comparison_figure
-from notchflex.plot.path import path_figure
+from notchflex.plot.animation import save_animation
+from notchflex.plot.batch import batch_picture
+from notchflex.plot.beside import beside_picture
+from notchflex.plot.calibration import calibration_figure
+from notchflex.plot.comparison import comparison_figure, comparison_picture
+from notchflex.plot.equilibrium import state_picture
+from notchflex.plot.friction import friction_figure
+from notchflex.plot.path import path_figure, path_picture
+from notchflex.plot.picture import picture
+from notchflex.plot.sheet import Picture
 from notchflex.plot.style import save
 
-__all__ = ["comparison_figure", "path_figure", "save"]
+__all__ = [
+    "Picture",
+    "batch_picture",
+    "beside_picture",
+    "calibration_figure",
+    "comparison_figure",
+    "comparison_picture",
+    "friction_figure",
+    "path_figure",
+    "path_picture",
+    "picture",
+    "save",
+    "save_animation",
+    "state_picture",
+]

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
 from notchflex.plot.curves import COLOUR, LINE
 from notchflex.plot.drive import LETTING_GO, PULLING, abscissa, branches, drive, way_of
+from notchflex.plot.sheet import INSIDE, Item, Line, Panel
 from notchflex.plot.style import sequence_colours
 from notchflex.results.quantities import QUANTITIES
 from notchflex.results.spans import spans_of
@@ -19,6 +17,9 @@ if TYPE_CHECKING:
     from notchflex.statics import Path
 
 MOST_STEPS = 6
+MOST_TENDONS = 8
+"""Tendons of one state whose tension is drawn."""
+
 SLACK = 1e-9
 """A tendon with less tension [N] all along a path has nothing to show."""
 
@@ -29,8 +30,8 @@ def pulled_tendons(path: Path) -> list[int]:
     return [int(i) for i in np.flatnonzero(tension.max(axis=0) > SLACK)]
 
 
-def draw_profile(axes: Axes, path: Path, tendon: int) -> None:
-    """Draw the tension of a tendon (from 0) from span to span, while pulling and letting go.
+def profile_panel(path: Path, tendon: int) -> Panel:
+    """Return the tension of a tendon (from 0) from span to span, while pulling and letting go.
 
     Steps of one tension have one colour; solid lines are pulling, dashed ones letting go.
     """
@@ -41,29 +42,36 @@ def draw_profile(axes: Axes, path: Path, tendon: int) -> None:
     drawn = [step for steps in ways.values() for step in steps]
     most = float(path.tension[drawn, tendon].max())
     colours = sequence_colours(101)
+    items: list[Item] = []
     for way, steps in ways.items():
         for step in steps:
             tension = float(path.tension[step, tendon])
-            axes.plot(
-                number,
-                path.span_tension[step, tendon, : len(number)],
-                color=colours[round(100 * tension / most)],
-                linestyle=LINE[way],
-                marker="o",
-                markersize=1.8,
-                linewidth=1.1,
+            items.append(
+                Line(
+                    np.stack([number, path.span_tension[step, tendon, : len(number)]], axis=1),
+                    colours[round(100 * tension / most)],
+                    LINE[way],
+                    marker="o",
+                    size=1.8,
+                    width=1.1,
+                    group=way,
+                    told=True,
+                )
             )
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_ylim(bottom=0.0)
+    items += [Line([], "#4c4c4c", LINE[way], name=way, group=way) for way in ways]
     which = f" {tendon + 1}" if path.tension.shape[1] > 1 else ""
-    axes.set_xlabel(f"span of tendon{which}, 0 at the base")
-    axes.set_ylabel(quantity.label)
-    entries = [Line2D([], [], color="0.3", linestyle=LINE[way], label=way) for way in ways]
-    axes.legend(handles=entries, loc="best")
+    return Panel(
+        items,
+        f"span of tendon{which}, 0 at the base",
+        quantity.label,
+        legend=INSIDE,
+        y_range=(0.0, None),
+        whole_x=True,
+    )
 
 
-def draw_front(axes: Axes, path: Path) -> None:
-    """Draw how far the friction of every pulled tendon has turned from pulling to letting go."""
+def front_panel(path: Path) -> Panel:
+    """Return how far the friction of every pulled tendon has turned from pulling to letting go."""
     x, label = abscissa(path)
     tendons = pulled_tendons(path)
     m, eta = (np.asarray(part, float) for part in path.front)
@@ -71,30 +79,37 @@ def draw_front(axes: Axes, path: Path) -> None:
     front = m + 0.5 * (1.0 - np.where(np.isnan(eta), 1.0, eta))
     front[~np.asarray(path.converged)] = np.nan
     front[path.tension <= SLACK] = np.nan  # without tension there is no friction
+    items: list[Item] = []
     for order, tendon in enumerate(tendons):
         named: set[str] = set()
         for part, growing in branches(drive(path)):
             way = PULLING if growing else LETTING_GO
             which = f", tendon {tendon + 1}" if len(tendons) > 1 else ""
-            axes.plot(
-                x[part],
-                front[part, tendon],
-                color=COLOUR[way],
-                linestyle=LINE[way],
-                marker="os^D"[order % 4],
-                markersize=2.2,
-                label=None if way in named else f"{way}{which}",
+            items.append(
+                Line(
+                    np.stack([x[part], front[part, tendon]], axis=1),
+                    COLOUR[way],
+                    LINE[way],
+                    marker="os^D"[order % 4],
+                    size=2.2,
+                    name="" if way in named else f"{way}{which}",
+                    group=f"{way}{which}",
+                    told=True,
+                )
             )
             named.add(way)
     # From where the other curves begin, although nothing rubs without tension.
     room = 0.05 * float(np.ptp(x))
-    axes.set_xlim(x.min() - room, x.max() + room)
     most = max(spans_of(path, tendon) for tendon in tendons)
-    axes.set_ylim(0.5, most + 0.5)
-    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel(label)
-    axes.set_ylabel(r"friction front $m + (1 - \eta)/2$, contact")
-    axes.legend(loc="best")
+    return Panel(
+        items,
+        label,
+        r"friction front $m + (1 - \eta)/2$, contact",
+        legend=INSIDE,
+        x_range=(float(x.min()) - room, float(x.max()) + room),
+        y_range=(0.5, most + 0.5),
+        whole_y=True,
+    )
 
 
 def has_friction(path: Path) -> bool:

@@ -6,6 +6,7 @@ openings of the notches, the flexures from their rods. A new notch shape needs n
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 Points = NDArray[np.float64]
 Walls = list[tuple[float, float] | None]
 
-FLEXURE_POINTS = 17  # a notch bends by less than a right angle; 2 degrees a piece look round
+FLEXURE_POINTS = 20  # a notch bends by less than a right angle; 2 degrees a piece look round
 UP = np.array([0.0, 0.0, 1.0])
 HELD = 0.8  # length of held tube drawn below the base, in outer radii
 
@@ -95,6 +96,19 @@ class Bent:
 
     def tendon(self, number: int) -> Points:
         """Return the line of a tendon (from 0) through its true points, from below the base."""
+        return np.concatenate([points for points, _ in self._along(number)])
+
+    def contacts(self, number: int) -> Points:
+        """Return the points of a tendon (from 0) where it rubs, base to tip, (contacts, 3).
+
+        Those are the edges of the bodies that it runs through, but for the one behind which it is
+        fixed.
+        """
+        edges = [points for points, on_body in self._along(number) if on_body]
+        return np.concatenate(edges)[1:-2]  # neither the foot, nor both edges of the last body
+
+    def _along(self, number: int) -> Iterator[tuple[Points, bool]]:
+        """Pieces of a tendon, and whether each lies on a body or crosses a notch."""
         from notchflex.tendon.wall_arc import WallArc
 
         group = next(group for group in self.chain.groups if number in group.numbers)
@@ -104,17 +118,15 @@ class Bent:
         )
         walls = self.walls(self.robot.tendon[number].direction_deg)
         place = np.asarray(self.chain.tendon_place)[number]
-        points: list[Points] = []
         for body in range(len(self.position)):
             if body and not present[body - 1]:
                 break
             if body and isinstance(group, WallArc):
                 across = np.asarray(group.across)[body - 1, column]
-                points.append(self.flexures[body - 1].fibre(*across))
+                yield self.flexures[body - 1].fibre(*across), False
             ends = walls[body]
             if ends is not None and (body == 0 or visits[body - 1]):
-                points.append(self.on_body(body, [place + at * UP for at in ends]))
-        return np.concatenate(points)
+                yield self.on_body(body, [place + at * UP for at in ends]), True
 
     def lips(self, notch: int) -> Points:
         """Return the point between the lips of a notch (from 0), where it closes."""
@@ -161,7 +173,12 @@ def _node_poses() -> Any:
 
 
 def bent(
-    robot: Robot, chain: Chain, modes: Any, body_position: Points, body_rotation: Points
+    robot: Robot,
+    chain: Chain,
+    modes: Any,
+    body_position: Points,
+    body_rotation: Points,
+    pieces: int = FLEXURE_POINTS,
 ) -> Bent:
     """Return a robot in one state, seen from its base: a turned base gives the same.
 
@@ -171,6 +188,8 @@ def bent(
         modes: Amplitudes of the strain modes of each flexure.
         body_position: Proximal face centre of each body [mm], (n + 1, 3).
         body_rotation: Rotation of each body, (n + 1, 3, 3).
+        pieces: Straight pieces that each flexure is drawn with, at least; the nodes of its rod may
+            ask for more.
     """
     from notchflex._jax import jax
 
@@ -178,33 +197,41 @@ def bent(
     rotation, position = turn.T @ body_rotation, (body_position - origin) @ turn
     rods = jax.tree.map(np.asarray, chain.rods)
     nodes = jax.tree.map(np.asarray, _node_poses()(chain.rods, np.asarray(modes)))
-    flexures: list[Sections] = []
-    for j in range(len(position) - 1):
-        there = np.flatnonzero(rods.length[j] > 0.0)
-        # From the proximal body's frame: start, nodes; from the distal one's: end.
-        first = np.stack([rods.start_rotation[j], *nodes.rotation[j, there]])
-        places = np.stack([rods.start_offset[j], *nodes.translation[j, there]])
-        last = rods.end_rotation[j].T
-        axes = np.concatenate([rotation[j] @ first, (rotation[j + 1] @ last)[None]])
-        end = position[j + 1] - rotation[j + 1] @ (last @ rods.end_offset[j])
-        line = np.concatenate([position[j] + places @ rotation[j].T, end[None]])
-        parts = max(2, -(-FLEXURE_POINTS // (len(line) - 1)))
-        axes, line = between(axes, line, parts)
-        at_node = np.arange(len(line)) / parts - 1.0
+    # From the proximal body's frame: start, nodes; from the distal one's: end.
+    first = np.concatenate([rods.start_rotation[:, None], nodes.rotation], axis=1)
+    places = np.concatenate([rods.start_offset[:, None], nodes.translation], axis=1)
+    last = np.swapaxes(rods.end_rotation, -1, -2)
+    axes = np.concatenate([rotation[:-1, None] @ first, (rotation[1:] @ last)[:, None]], axis=1)
+    end = position[1:] - np.einsum("nij,njk,nk->ni", rotation[1:], last, rods.end_offset)
+    along = position[:-1, None] + places @ np.swapaxes(rotation[:-1], -1, -2)
+    line = np.concatenate([along, end[:, None]], axis=1)
+    flexures: dict[int, Sections] = {}
+    counts = (rods.length > 0.0).sum(axis=1)
+    for count in np.unique(counts):  # flexures with equally many nodes are filled up at once
+        own = np.flatnonzero(counts == count)
+        there = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in own])
+        kept = np.concatenate([np.zeros((len(own), 1), int), there + 1], axis=1)
+        kept = np.concatenate([kept, np.full((len(own), 1), axes.shape[1] - 1)], axis=1)
+        parts = -(-pieces // (int(count) + 1))
+        row = own[:, None]
+        turned, points = between(axes[row, kept], line[row, kept], parts)
+        at_node = np.arange(points.shape[1]) / parts - 1.0
         section = rods.section
-        spine, near, area = (
-            np.interp(at_node, np.arange(len(there)), values[j, there])
-            for values in (section.edge_spine, section.edge_near, section.area)
-        )
-        flexures.append(Sections(axes, line, spine, near, area))
-    return Bent(robot, chain, rotation, position, flexures)
+        for j, nodes_there, frames, places_there in zip(own, there, turned, points, strict=True):
+            spine, near, area = (
+                np.interp(at_node, np.arange(count), values[j, nodes_there])
+                for values in (section.edge_spine, section.edge_near, section.area)
+            )
+            flexures[int(j)] = Sections(frames, places_there, spine, near, area)
+    return Bent(robot, chain, rotation, position, [flexures[j] for j in range(len(counts))])
 
 
-def bent_at(path: Path, step: int) -> Bent:
-    """Return the robot of a path at one of its steps."""
+def bent_at(path: Path, step: int, pieces: int = FLEXURE_POINTS) -> Bent:
+    """Return the robot of a path at one of its steps; for `pieces` see `bent`."""
     modes, own = path.run.solved.point.unknowns.modes[step], path.chain
     chain = _of_space(path.robot, own.level, own.refinement)
-    return bent(path.robot, chain, modes, path.body_position[step], path.body_rotation[step])
+    places, turns = path.body_position[step], path.body_rotation[step]
+    return bent(path.robot, chain, modes, places, turns, pieces)
 
 
 @lru_cache(maxsize=16)
@@ -215,13 +242,18 @@ def _of_space(robot: Robot, level: str, refinement: int) -> Chain:
     return assemble(robot, level, refinement=refinement, flat=False)
 
 
-def bent_by_angles(robot: Robot, notch_angle: Points) -> Bent:
-    """Return a robot whose notches have given angles [rad], (n,), as measured ones have."""
+def bent_by_angles(
+    robot: Robot, notch_angle: Points, pieces: int = FLEXURE_POINTS, level: str = "tendons"
+) -> Bent:
+    """Return a robot whose notches have given angles [rad], (n,), as measured ones have.
+
+    For `pieces` see `bent`; `level` is that of the chain, which decides on the nodes of its rods.
+    """
     from notchflex.contact import free_angle
     from notchflex.statics import bodies_from_angles
 
-    chain = _of_space(robot, "tendons", 0)
+    chain = _of_space(robot, level, 0)
     modes = np.zeros(np.shape(chain.stiffness))
     modes[:, 0] = notch_angle - free_angle(chain.rods)
     position, rotation = bodies_from_angles(robot, notch_angle[None])
-    return bent(robot, chain, modes, position[0], rotation[0])
+    return bent(robot, chain, modes, position[0], rotation[0], pieces)

@@ -7,12 +7,24 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from notchflex.plot.bent import bent_by_angles
 from notchflex.plot.outline import outline
+from notchflex.plot.sheet import (
+    DASH_DOT,
+    DASHED,
+    DOTTED,
+    MIXED,
+    SOLID,
+    Bars,
+    Cell,
+    Item,
+    Line,
+    Note,
+    Panel,
+    Picture,
+)
 from notchflex.plot.style import (
     BLUE,
     GREEN,
@@ -20,17 +32,17 @@ from notchflex.plot.style import (
     ORANGE,
     PURPLE,
     VERMILLION,
-    house_style,
-    new_figure,
     sequence_colours,
 )
 from notchflex.results.quantities import DEGREES, QUANTITIES
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from notchflex.compare import Comparison
 
 MODEL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
-MODEL_LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
+MODEL_LINES = (SOLID, DASHED, DASH_DOT, DOTTED, MIXED)
 TRIAL_MARKERS = "osD^vP*X"
 SHAPES = 6
 
@@ -38,7 +50,22 @@ SHAPES = 6
 def comparison_figure(
     comparison: Comparison, others: Mapping[str, Comparison] | None = None
 ) -> Figure:
-    """Draw a comparison: every notch, the total angle, the centre lines, and the errors.
+    """Draw a comparison with matplotlib; for what it shows see `comparison_picture`.
+
+    Args:
+        comparison: The model beside its measurement.
+        others: Label to comparison of other models with the same measurement, drawn with it.
+
+    Returns:
+        The figure; `notchflex.plot.save` writes it.
+    """
+    return comparison_picture(comparison, others).figure()
+
+
+def comparison_picture(
+    comparison: Comparison, others: Mapping[str, Comparison] | None = None
+) -> Picture:
+    """Describe a comparison: every notch, the total angle, the centre lines, and the errors.
 
     Measured points are open markers, one kind for each trial; lines are the model. Centre lines
     are those of the measured angles (dots) and of the model (lines) at points of one trial.
@@ -48,39 +75,24 @@ def comparison_figure(
         others: Label to comparison of other models with the same measurement, drawn with it.
 
     Returns:
-        The figure; `notchflex.plot.save` writes it.
+        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
     """
     models = {"model": comparison, **(others or {})}
-    panels = comparison.robot.number_of_notches + 2 + (1 if others else 0)
-    columns = min(5, math.ceil(panels / 2))
-    rows = math.ceil(panels / columns)
-    measured = comparison.measured
-    with house_style():
-        figure = new_figure(2.9 * columns, 2.7 * rows, f"{comparison.robot.name}: {_title(models)}")
-        grid = figure.add_gridspec(rows, columns)
-        cells = iter(grid[row, column] for row in range(rows) for column in range(columns))
-        x, x_label = _abscissa(comparison)
-        first: Axes | None = None
-        for title, given, pick, rmse in _angle_panels(comparison):
-            axes = figure.add_subplot(next(cells), sharex=first)
-            first = first or axes
-            _draw_points(axes, x, given * DEGREES, measured.trial)
-            for colour, line, one in zip(
-                MODEL_COLOURS * 9, MODEL_LINES * 9, models.values(), strict=False
-            ):
-                for part in _lines(one, x):
-                    axes.plot(
-                        x[part], pick(one)[part] * DEGREES, color=colour, linestyle=line, zorder=3
-                    )
-            axes.set_title(f"{title}, error {rmse * DEGREES:.2f}° rms", loc="left")
-            axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-            axes.set_xlabel(x_label)
-            axes.set_ylabel(f"angle [{QUANTITIES['notch_angle'].unit}]")
-        _draw_centre_lines(figure.add_subplot(next(cells)), comparison)
-        if others:
-            _draw_errors(figure.add_subplot(next(cells)), models)
-        _legend(figure, models, measured.trial)
-    return figure
+    panels = list(_angle_panels(comparison, models))
+    panels.append(_centre_lines(comparison))
+    if others:
+        panels.append(_errors(models))
+    columns = min(5, math.ceil(len(panels) / 2))
+    rows = math.ceil(len(panels) / columns)
+    cells = [
+        Cell(
+            panel, (index // columns, index // columns + 1), (index % columns, index % columns + 1)
+        )
+        for index, panel in enumerate(panels)
+    ]
+    title = f"{comparison.robot.name}: {_title(models)}"
+    legend = _legend(models, comparison.measured.trial)
+    return Picture(title, 2.9 * columns, 2.7 * rows, cells, legend)
 
 
 def _title(models: Mapping[str, Comparison]) -> str:
@@ -88,7 +100,31 @@ def _title(models: Mapping[str, Comparison]) -> str:
     return f"tip {one.tip_rmse:.2f} mm rms over {one.points} points"
 
 
-def _angle_panels(comparison: Comparison) -> Iterator[tuple[str, NDArray[np.float64], Any, float]]:
+def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> Iterator[Panel]:
+    """Yield the angles of every notch and the total, measured and of the models."""
+    measured = comparison.measured
+    x, x_label = _abscissa(comparison)
+    for title, given, pick, rmse in _angles(comparison):
+        items: list[Item] = list(_points(x, given * DEGREES, measured.trial))
+        for (label, one), colour, dash in zip(
+            models.items(), MODEL_COLOURS * 9, MODEL_LINES * 9, strict=False
+        ):
+            for part in _lines(one, x):
+                line = np.stack([x[part], pick(one)[part] * DEGREES], axis=1)
+                items.append(Line(line, colour, dash, group=label, layer=3, told=True))
+        drawn = np.concatenate([given, *(pick(one) for one in models.values())])
+        yield Panel(
+            items,
+            x_label,
+            f"angle [{QUANTITIES['notch_angle'].unit}]",
+            title=f"{title}, error {rmse * DEGREES:.2f}° rms",
+            # From 0 where nothing is bent the other way.
+            y_range=(0.0, None) if np.nanmin(drawn, initial=0.0) >= 0.0 else None,
+            shared_x=True,
+        )
+
+
+def _angles(comparison: Comparison) -> Iterator[tuple[str, NDArray[np.float64], Any, float]]:
     """Yield title, measured values, a picker of the model's values, and the error of each panel."""
     measured = comparison.measured
     for notch in range(comparison.robot.number_of_notches):
@@ -120,45 +156,50 @@ def _lines(comparison: Comparison, x: NDArray[np.float64]) -> list[NDArray[np.in
     return [good[trial[good] == label] for label in dict.fromkeys(comparison.measured.trial)]
 
 
-def _draw_points(
-    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], trial: tuple[str, ...]
-) -> None:
+def _points(
+    x: NDArray[np.float64], y: NDArray[np.float64], trial: tuple[str, ...]
+) -> Iterator[Line]:
     labels = np.array(trial)
     for index, label in enumerate(dict.fromkeys(trial)):
         there = labels == label
-        axes.plot(
-            x[there],
-            y[there],
-            linestyle="",
+        yield Line(
+            np.stack([x[there], y[there]], axis=1),
+            GREY,
+            None,
             marker=TRIAL_MARKERS[index % len(TRIAL_MARKERS)],
-            markersize=3.2,
-            markerfacecolor="none",
-            markeredgecolor=GREY,
-            markeredgewidth=0.8,
+            size=3.2,
+            hollow=True,
+            group=_trial_name(label, trial),
+            told=True,
         )
 
 
-def _draw_centre_lines(axes: Axes, comparison: Comparison) -> None:
-    """Draw measured and computed centre lines at some points of the longest trial."""
+def _trial_name(label: str, trial: tuple[str, ...]) -> str:
+    return f"measured, trial {label}" if len(set(trial)) > 1 else "measured"
+
+
+def _centre_lines(comparison: Comparison) -> Panel:
+    """Measured and computed centre lines at some points of the longest trial."""
     measured, robot = comparison.measured, comparison.robot
     view = np.radians(robot.notches[0].direction_deg)
     points = _telling_points(comparison)
-    colours = sequence_colours(len(points))
-    if not points:
-        axes.text(0.5, 0.5, "no point was solved", transform=axes.transAxes, ha="center")
-        return
-    for angles, style in ((comparison.notch_angle, "-"), (measured.notch_angle, (0, (1, 1.2)))):
-        for row, colour in zip(angles[points], colours, strict=True):
+    items: list[Item] = [] if points else [Note("no point was solved")]
+    for angles, dash, width in (
+        (comparison.notch_angle, SOLID, 1.4),
+        (measured.notch_angle, DOTTED, 2.4),
+    ):
+        for row, colour in zip(angles[points], sequence_colours(len(points)), strict=True):
             line = outline(bent_by_angles(robot, row), view).centre_line
-            axes.plot(
-                *line.T, color=colour, linestyle=style, linewidth=1.4 if style == "-" else 2.4
-            )
-            if style != "-":
-                axes.plot(*line[-1], "o", color=colour, markersize=4.0)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title("centre lines: model –, measured ··•", loc="left")
-    axes.set_xlabel("across the base [mm]")
-    axes.set_ylabel("along the base [mm]")
+            items.append(Line(line, colour, dash, width))
+            if dash:
+                items.append(Line(line[-1:], colour, None, marker="o", size=4.0))
+    return Panel(
+        items,
+        "across the base [mm]",
+        "along the base [mm]",
+        title="centre lines: model –, measured ··•" if points else "",
+        equal=bool(points),
+    )
 
 
 def _telling_points(comparison: Comparison) -> list[int]:
@@ -176,39 +217,22 @@ def _telling_points(comparison: Comparison) -> list[int]:
     return list(dict.fromkeys(nearest))
 
 
-def _draw_errors(axes: Axes, models: Mapping[str, Comparison]) -> None:
-    """Draw the tip error of every model as a bar, with its number."""
+def _errors(models: Mapping[str, Comparison]) -> Panel:
+    """The tip error of every model as a bar, with its number."""
     values = [one.tip_rmse for one in models.values()]
-    places = np.arange(len(values))
-    bars = axes.barh(places, values, color=[MODEL_COLOURS[i % 5] for i in places], height=0.6)
-    axes.bar_label(bars, fmt="%.2f", padding=3, fontsize=8.0)
-    axes.set_yticks(places, list(models))
-    axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.2 * max((v for v in values if v > 0.0), default=1.0))
-    axes.grid(visible=False, axis="y")
-    axes.set_title("tip error, rms", loc="left")
-    axes.set_xlabel("mm")
+    colours = [MODEL_COLOURS[index % 5] for index in range(len(values))]
+    most = 1.2 * max((value for value in values if value > 0.0), default=1.0)
+    return Panel(
+        [Bars(values, list(models), colours)], "mm", "", title="tip error, rms", x_range=(0.0, most)
+    )
 
 
-def _legend(figure: Figure, models: Mapping[str, Comparison], trial: tuple[str, ...]) -> None:
-    from matplotlib.lines import Line2D
-
-    trials = list(dict.fromkeys(trial))
-    entries = [
-        Line2D(
-            [],
-            [],
-            linestyle="",
-            marker=TRIAL_MARKERS[index % len(TRIAL_MARKERS)],
-            markerfacecolor="none",
-            markeredgecolor=GREY,
-            markersize=4.0,
-            label=f"measured, trial {label}" if len(trials) > 1 else "measured",
-        )
-        for index, label in enumerate(trials[: len(TRIAL_MARKERS)])
-    ]
-    entries += [
-        Line2D([], [], color=colour, linestyle=line, label=label)
-        for colour, line, label in zip(MODEL_COLOURS * 9, MODEL_LINES * 9, models, strict=False)
-    ]
-    figure.legend(handles=entries, loc="outside lower center", ncols=min(8, len(entries)))
+def _legend(models: Mapping[str, Comparison], trial: tuple[str, ...]) -> list[Line]:
+    entries: list[Line] = []
+    for label, marker in zip(dict.fromkeys(trial), TRIAL_MARKERS, strict=False):
+        name = _trial_name(label, trial)
+        options: dict[str, Any] = {"marker": marker, "size": 4.0, "hollow": True, "group": name}
+        entries.append(Line([], GREY, None, name=name, **options))
+    for label, colour, dash in zip(models, MODEL_COLOURS * 9, MODEL_LINES * 9, strict=False):
+        entries.append(Line([], colour, dash, name=label, group=label))
+    return entries

@@ -66,12 +66,9 @@ def outline(shape: Bent, view: float) -> Outline:
         return np.stack([points @ across, points[..., 2]], axis=-1)
 
     outer, inner = shape.robot.tube.outer_radius, shape.robot.tube.inner_radius
-    sides = {turn: shape.walls(np.degrees(view) + turn) for turn in (0.0, 180.0)}
     bodies, bores = [], []
     for body in range(len(shape.position)):
-        right, left = (sides[turn][body] for turn in (0.0, 180.0))
-        reach = _reach(shape, body, across, inner)
-        polygon = _body(right, left, outer, reach)
+        polygon = body_corners(shape, body, view)
 
         def place(points: Any, body: int = body) -> NDArray[np.float64]:
             local = np.asarray(points, float)
@@ -79,7 +76,7 @@ def outline(shape: Bent, view: float) -> Outline:
             return flat(shape.on_body(body, inside))
 
         bodies.append(place(polygon))
-        for sign, wall in ((1.0, right), (-1.0, left)):
+        for sign, wall in zip((1.0, -1.0), _sides(shape, body, view), strict=True):
             if wall is not None:
                 bores.append(place([(sign * inner, at) for at in wall]))
     foot = np.array([0.0, 0.0, -HELD * outer])
@@ -96,6 +93,25 @@ def outline(shape: Bent, view: float) -> Outline:
         centre_line=flat(_centre_line(shape)),
         held=flat(shape.on_body(0, [side * across + foot for side in (-outer, outer)])),
     )
+
+
+def body_corners(shape: Bent, body: int, view: float) -> list[tuple[float, float]]:
+    """Return the outline of a body in its own frame: corners (across, along) [mm], in order.
+
+    Args:
+        shape: The robot.
+        body: Which body, 0 is the base.
+        view: Direction across the tube that is drawn to the right [rad].
+    """
+    across = np.array([np.cos(view), np.sin(view), 0.0])
+    tube = shape.robot.tube
+    right, left = _sides(shape, body, view)
+    return _body(right, left, tube.outer_radius, _reach(shape, body, across, tube.inner_radius))
+
+
+def _sides(shape: Bent, body: int, view: float) -> list[tuple[float, float] | None]:
+    """From where to where a body has wall on the right and the left."""
+    return [shape.walls(np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
 
 
 def _centre_line(shape: Bent) -> NDArray[np.float64]:

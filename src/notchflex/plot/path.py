@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-from typing import TYPE_CHECKING, Any
-
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from notchflex.plot.acting import out_of_plane
-from notchflex.plot.along import draw_front, draw_profile, has_friction, pulled_tendons
+from notchflex.plot.along import front_panel, has_friction, profile_panel, pulled_tendons
 from notchflex.plot.bent import bent_at
-from notchflex.plot.curves import draw_notches, draw_total
+from notchflex.plot.curves import notches_panel, total_panel
 from notchflex.plot.drive import LETTING_GO, PULLING, way_of
 from notchflex.plot.outline import bending_plane
-from notchflex.plot.space import draw_space
-from notchflex.plot.style import house_style, new_figure
-from notchflex.plot.wrist import draw_wrist, telling_steps
+from notchflex.plot.sheet import Cell, Colour, Panel, Picture
+from notchflex.plot.space import space_panel
+from notchflex.plot.wrist import telling_steps, wrist_panel
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from notchflex.statics import Path
 
 MOST_PROFILES = 2
@@ -27,13 +25,7 @@ MOST_PROFILES = 2
 
 
 def path_figure(path: Path, *, title: str | None = None) -> Figure:
-    """Draw a solved path.
-
-    First the robot to scale at up to five loads: in its plane of bending, or in space where it
-    bends in several planes or a load leaves the plane. Arrows are loads from outside. One state
-    has nothing else. More steps have curves: the total angle, as a loop where the tendons are let
-    go again, and every notch. A path with pulling and letting go shows the shapes of both, the
-    tension along the tendon, and how far the friction has turned.
+    """Draw a solved path with matplotlib; for what it shows see `path_picture`.
 
     Args:
         path: Solved path.
@@ -49,46 +41,50 @@ def path_figure(path: Path, *, title: str | None = None) -> Figure:
         >>> len(path_figure(path).axes)
         6
     """
+    return path_picture(path, title=title).figure()
+
+
+def path_picture(path: Path, *, title: str | None = None) -> Picture:
+    """Describe the picture of a solved path, for paper and for a browser.
+
+    First the robot to scale at up to five loads: in its plane of bending, or in space where it
+    bends in several planes or a load leaves the plane. Arrows are loads from outside. One state
+    has nothing else. More steps have curves: the total angle, as a loop where the tendons are let
+    go again, and every notch. A path with pulling and letting go shows the shapes of both, the
+    tension along the tendon, and how far the friction has turned.
+
+    Args:
+        path: Solved path.
+        title: Heading; the name of the robot if None.
+
+    Returns:
+        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
+    """
     ways = way_of(path)
     view = plane_of(path)
     # What is drawn in a column of its own, beside the curves two to a column.
-    shapes = _shapes(path, ways)
+    shapes = [shape_panel(path, steps, view, name) for name, steps in _shapes(path, ways).items()]
+    cells = [Cell(panel, (0, 2), (column, column + 1)) for column, panel in enumerate(shapes)]
     panels = _panels(path, ways)
+    for index, panel in enumerate(panels):
+        row, column = index % 2, len(shapes) + index // 2
+        cells.append(Cell(panel, (row, row + 1), (column, column + 1)))
     columns = len(shapes) + -(-len(panels) // 2)
-    with house_style():
-        figure = new_figure(1.6 + 4.0 * columns, 6.4, path.robot.name if title is None else title)
-        grid = figure.add_gridspec(2, columns)
-        drawn: list[Any] = []
-        for column, (name, steps) in enumerate(shapes.items()):
-            place = grid[:, column]
-            if view is None:
-                axes: Any = figure.add_subplot(place, projection="3d")
-                draw_space(axes, path, steps)
-            else:
-                axes = figure.add_subplot(place)
-                draw_wrist(axes, path, steps, view)
-                drawn.append(axes)
-            if name:
-                axes.set_title(name, loc="left")
-            if steps:
-                _legend(axes, below=view is None)
-            else:
-                axes.text(0.5, 0.5, "no step was solved", transform=axes.transAxes, ha="center")
-        # Pulling and letting go to one scale (matplotlib shares no axes of equal scale).
-        for axes in drawn:
-            for other in drawn:
-                axes.update_datalim(other.dataLim.get_points())
-            axes.autoscale_view()
-        for index, draw in enumerate(panels):
-            draw(figure.add_subplot(grid[index % 2, len(shapes) + index // 2]))
-    return figure
+    heading = path.robot.name if title is None else title
+    return Picture(heading, 1.6 + 4.0 * columns, 6.4, cells)
 
 
-def _legend(axes: Any, *, below: bool) -> None:
-    if below:  # axes of three dimensions have no empty corner
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2)
-    else:
-        axes.legend(loc="best")
+def shape_panel(
+    path: Path,
+    steps: Sequence[int],
+    view: float | None,
+    title: str = "",
+    colours: Sequence[Colour] | None = None,
+) -> Panel:
+    """Return a robot at several steps: across its plane where it has one, otherwise in space."""
+    if view is None and steps:
+        return space_panel(path, steps, title=title, colours=colours)
+    return wrist_panel(path, steps, view or 0.0, title=title, colours=colours)
 
 
 def plane_of(path: Path) -> float | None:
@@ -108,17 +104,13 @@ def _shapes(path: Path, ways: dict[str, list[int]]) -> dict[str, list[int]]:
     return {way: telling_steps(path, among=ways[way]) for way in (PULLING, LETTING_GO)}
 
 
-def _panels(path: Path, ways: dict[str, list[int]]) -> list[Callable[[Axes], None]]:
-    """Return what draws each curve."""
+def _panels(path: Path, ways: dict[str, list[int]]) -> list[Panel]:
+    """Return the curves."""
     if len(path) == 1:
         return []
-    panels: list[Callable[[Axes], None]] = [
-        partial(draw_total, path=path),
-        partial(draw_notches, path=path),
-    ]
+    panels = [total_panel(path), notches_panel(path)]
     if len(ways) > 1 and pulled_tendons(path):
-        for tendon in pulled_tendons(path)[:MOST_PROFILES]:
-            panels.append(partial(draw_profile, path=path, tendon=tendon))
+        panels += [profile_panel(path, tendon) for tendon in pulled_tendons(path)[:MOST_PROFILES]]
         if has_friction(path):
-            panels.append(partial(draw_front, path=path))
+            panels.append(front_panel(path))
     return panels

@@ -13,10 +13,10 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from notchflex.results.files import check_picture, replacing
+from notchflex.results.files import PAPER, check_picture, replacing
 
 # notation: the eight colours of Okabe and Ito (2008), made for all kinds of colour vision.
 BLACK = "#000000"
@@ -64,15 +64,20 @@ def new_figure(width: float, height: float, title: str = "") -> Figure:
     return figure
 
 
+def rgb(colour: Any) -> tuple[float, float, float]:
+    """Return red, green and blue of a colour, each from 0 to 1.
+
+    Example:
+        >>> rgb("#ff0000")
+        (1.0, 0.0, 0.0)
+    """
+    return to_rgb(colour)
+
+
 def sequence_colours(count: int) -> list[tuple[float, float, float, float]]:
     """Return `count` colours in an order that the eye sees, dark to light, also in grey print."""
     # The lightest fifth of the map is too pale for lines on white paper.
     return [tuple(c) for c in matplotlib.colormaps["viridis"](np.linspace(0.0, 0.82, count))]
-
-
-def legend_beside(axes: Axes, **options: object) -> None:
-    """Put a legend right of the axes, where it hides nothing."""
-    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, **options)
 
 
 def save(figure: Figure, target: str | FilePath) -> None:
@@ -85,7 +90,7 @@ def save(figure: Figure, target: str | FilePath) -> None:
     Raises:
         InputError: Another suffix, or the file cannot be written.
     """
-    check_picture(str(target), "the picture")
+    check_picture(str(target), "the picture", kinds=PAPER)
     suffix = FilePath(target).suffix.lower()
     # Without dates the same picture is the same file, byte for byte.
     metadata: dict[str, None] = {

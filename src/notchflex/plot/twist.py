@@ -9,15 +9,15 @@ Array = NDArray[np.float64]
 
 
 def between(rotation: Array, position: Array, parts: int) -> tuple[Array, Array]:
-    """Fill up a row of poses.
+    """Fill up rows of poses, one row or many side by side.
 
     Args:
-        rotation: (k, 3, 3).
-        position: (k, 3).
+        rotation: (..., k, 3, 3).
+        position: (..., k, 3).
         parts: Pieces that the way from each pose to the next one is divided into.
 
     Returns:
-        Rotations and positions of (k - 1) parts + 1 poses, the given ones among them.
+        Rotations and positions of (k - 1) parts + 1 poses a row, the given ones among them.
 
     Example:
         >>> turned = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -25,21 +25,24 @@ def between(rotation: Array, position: Array, parts: int) -> tuple[Array, Array]
         >>> line.shape
         (3, 3)
     """
-    first, second = rotation[:-1], rotation[1:]
+    if parts == 1:
+        return rotation, position
+    first, second = rotation[..., :-1, :, :], rotation[..., 1:, :, :]
     vector = rotation_vector(np.swapaxes(first, -1, -2) @ second)
-    step = np.einsum("kba,kb->ka", first, np.diff(position, axis=0))
+    step = np.einsum("...ba,...b->...a", first, np.diff(position, axis=-2))
     # Solve V(1) v = step for the velocity v of the twist, then follow it.
     velocity = np.linalg.solve(_mean_rotation(vector), step[..., None])
-    rotations, positions = [], []
-    for part in np.arange(parts) / parts:
-        rotations.append(first @ rotation_of(part * vector))
-        moved = first @ (_mean_rotation(part * vector) @ velocity) * part
-        positions.append(position[:-1] + moved[..., 0])
-    along = (
-        np.stack(rotations, axis=1).reshape(-1, 3, 3),
-        np.stack(positions, axis=1).reshape(-1, 3),
+    part = (np.arange(parts) / parts)[:, None, None]
+    twist = part[..., 0] * vector[..., None, :]  # (..., k - 1, parts, 3)
+    from_first = first[..., None, :, :]
+    rotations = from_first @ rotation_of(twist)
+    moved = from_first @ (_mean_rotation(twist) @ velocity[..., None, :, :]) * part
+    positions = position[..., :-1, None, :] + moved[..., 0]
+    rows, count = rotation.shape[:-3], rotations.shape[-4] * parts
+    return (
+        np.concatenate([rotations.reshape(*rows, count, 3, 3), rotation[..., -1:, :, :]], axis=-3),
+        np.concatenate([positions.reshape(*rows, count, 3), position[..., -1:, :]], axis=-2),
     )
-    return np.concatenate([along[0], rotation[-1:]]), np.concatenate([along[1], position[-1:]])
 
 
 def rotation_of(vector: Array) -> Array:

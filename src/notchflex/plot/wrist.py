@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import FancyArrowPatch, Polygon
 from numpy.typing import NDArray
 
 from notchflex.plot.acting import COLOUR, Acting, acting_at
 from notchflex.plot.bent import bent_at
 from notchflex.plot.outline import Outline, outline
-from notchflex.plot.style import GREY, ORANGE, VERMILLION, sequence_colours
+from notchflex.plot.sheet import FINE, INSIDE, Area, Arrow, Colour, Item, Line, Note, Panel
+from notchflex.plot.style import GREY, ORANGE, VERMILLION, rgb, sequence_colours
 
 if TYPE_CHECKING:
     from notchflex.statics import Path
@@ -58,42 +57,64 @@ def telling_steps(
     return chosen
 
 
-def draw_wrist(axes: Axes, path: Path, steps: Sequence[int], view: float = 0.0) -> None:
-    """Draw a robot at several steps of a path into axes of equal scale, with its loads.
+def wrist_panel(
+    path: Path,
+    steps: Sequence[int],
+    view: float = 0.0,
+    *,
+    title: str = "",
+    scale: str = "shape",
+    colours: Sequence[Colour] | None = None,
+) -> Panel:
+    """Return a robot at several steps of a path, on axes of equal scale, with its loads.
 
     Args:
-        axes: Where to draw.
         path: Solved path.
         steps: Which of its steps.
         view: Direction across the base that is drawn to the right [rad].
+        title: What stands above it.
+        scale: Panels of one name show the same part of the plane.
+        colours: One for each step; from dark to light if None.
     """
-    top = 3 * len(steps) + 5
-    any_closed = False
+    items: list[Item] = []
+    closed_points: list[NDArray[np.float64]] = []
     loads: list[Acting] = []
-    for order, (step, colour) in enumerate(zip(steps, sequence_colours(len(steps)), strict=True)):
+    colours = sequence_colours(len(steps)) if colours is None else colours
+    for order, (step, colour) in enumerate(zip(steps, colours, strict=True)):
         bent = bent_at(path, step)
         shape = outline(bent, view)
-        _draw(axes, shape, colour, load_label(path, step), level=3 * order)
-        closed = np.flatnonzero(path.closed[step])
-        if len(closed):
-            points = np.array([shape.lips[notch] for notch in closed])
-            axes.plot(
-                *points.T,
-                "o",
-                color=VERMILLION,
-                markersize=3.5,
-                zorder=top,
-            )
-            any_closed = True
+        items += _robot(shape, colour, load_label(path, step), level=3 * order)
+        closed_points += [shape.lips[notch] for notch in np.flatnonzero(path.closed[step])]
         loads += acting_at(path, step, bent)
-    if any_closed:
-        axes.plot([], [], "o", color=VERMILLION, markersize=3.5, label="closed notch")
-    draw_loads(axes, loads, view, ARROW * extent_of(path), zorder=top + 1)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_ylabel("along the base, z [mm]")
+    top = 3 * len(steps) + 5
+    if closed_points:
+        dots = np.array(closed_points)
+        mark: dict[str, Any] = {
+            "dash": None,
+            "marker": "o",
+            "size": 3.5,
+            "group": "closed notch",
+            "layer": top,
+        }
+        items.append(Line(dots, VERMILLION, name="closed notch", **mark))
+    items += load_arrows(loads, view, ARROW * extent_of(path), layer=top + 1)
+    if not steps:
+        items.append(Note("no step was solved"))
+    return Panel(
+        items,
+        f"across the base, {across_name(view)} [mm]",
+        "along the base, z [mm]",
+        title=title,
+        legend=INSIDE if steps else "",
+        equal=True,
+        scale=scale,
+    )
+
+
+def across_name(view: float) -> str:
+    """Return what the direction across the base that is drawn to the right is called."""
     degrees = round(float(np.degrees(view)), 6) % 360
-    name = {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
-    axes.set_xlabel(f"across the base, {name} [mm]")
+    return {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
 
 
 def extent_of(path: Path) -> float:
@@ -107,17 +128,16 @@ def arrow_of(one: Acting, largest: float, longest: float) -> NDArray[np.float64]
     return longest * max(one.size / largest, SHORTEST) * one.vector / one.size
 
 
-def draw_loads(
-    axes: Axes, loads: Sequence[Acting], view: float, longest: float, zorder: int
-) -> None:
-    """Draw forces as arrows from where they act, moments as bent arrows about it.
+def load_arrows(
+    loads: Sequence[Acting], view: float, longest: float, layer: int
+) -> Iterator[Arrow]:
+    """Return forces as arrows from where they act, moments as bent arrows about it.
 
     Args:
-        axes: Where to draw.
         loads: The forces and moments of all shapes.
         view: Direction across the base that is drawn to the right [rad].
         longest: Length of the arrow of the largest force [mm].
-        zorder: Above what to draw.
+        layer: Above what they lie.
     """
     across = np.array([np.cos(view), np.sin(view), 0.0])
     normal = np.array([-np.sin(view), np.cos(view), 0.0])
@@ -125,41 +145,25 @@ def draw_loads(
     named: set[str] = set()
     for one in loads:
         start = np.array([one.point @ across, one.point[2]])
+        name = "" if one.label in named else one.label
+        named.add(one.label)
         if one.name == "force":
             arrow = arrow_of(one, largest, longest)
-            arrow = np.array([arrow @ across, arrow[2]])
-            _arrow(axes, start, start + arrow, COLOUR[one.kind], zorder)
-            reach = [start, start + arrow]
+            end = start + np.array([arrow @ across, arrow[2]])
+            yield Arrow(start, end, COLOUR[one.kind], name=name, layer=layer)
         else:
             # Seen with z up and the view's direction right, a moment about +normal turns z to it.
             turn = -1.0 if one.vector @ normal > 0.0 else 1.0
-            side = 0.4 * longest * np.array([1.0, 0.0])
-            _arrow(
-                axes, start - turn * side, start + turn * side, COLOUR[one.kind], zorder, bend=0.9
+            side = 0.4 * longest * turn * np.array([1.0, 0.0])
+            yield Arrow(
+                start - side,
+                start + side,
+                COLOUR[one.kind],
+                bend=0.9,
+                name=name,
+                layer=layer,
+                reach=np.array([start - longest, start + longest]),
             )
-            reach = [start - longest, start + longest]
-        axes.update_datalim(np.array(reach))
-        if one.label not in named:
-            axes.plot([], [], color=COLOUR[one.kind], marker=">", markersize=4.0, label=one.label)
-            named.add(one.label)
-    axes.autoscale_view()
-
-
-def _arrow(axes: Axes, start: Any, end: Any, colour: str, zorder: int, bend: float = 0.0) -> None:
-    axes.add_patch(
-        FancyArrowPatch(
-            tuple(start),
-            tuple(end),
-            arrowstyle="-|>",
-            connectionstyle=f"arc3,rad={bend}",
-            mutation_scale=9.0,
-            shrinkA=0.0,
-            shrinkB=0.0,
-            color=colour,
-            linewidth=1.4,
-            zorder=zorder,
-        )
-    )
 
 
 def load_label(path: Path, step: int) -> str:
@@ -169,23 +173,19 @@ def load_label(path: Path, step: int) -> str:
     return f"{tensions} N, {angle:.1f}°"
 
 
-def _draw(axes: Axes, shape: Outline, colour: tuple[float, ...], label: str, level: int) -> None:
+def _robot(shape: Outline, colour: Colour, label: str, level: int) -> Iterator[Item]:
     # Pale and nearly opaque: shapes further bent lie over the others, and lines stay readable.
-    pale = tuple(1.0 - 0.3 * (1.0 - part) for part in colour[:3])
-    for index, polygon in enumerate([*shape.flexures, *shape.bodies]):
-        axes.add_patch(
-            Polygon(
-                polygon,
-                facecolor=(*pale, 0.85),
-                edgecolor=colour,
-                linewidth=0.8,
-                joinstyle="round",
-                zorder=2 + level,
-                label=label if index == 0 else None,
-            )
-        )
-    for line in shape.bores:
-        axes.plot(*line.T, color=colour, linewidth=0.5, linestyle=(0, (3, 2)), zorder=3 + level)
+    pale = tuple(1.0 - 0.3 * (1.0 - part) for part in rgb(colour))
+    yield Area(
+        [*shape.flexures, *shape.bodies], pale, colour, name=label, group=label, layer=2 + level
+    )
+    bores = np.concatenate([_apart(line) for line in shape.bores])
+    yield Line(bores, colour, FINE, 0.5, group=label, layer=3 + level)
     for line in shape.tendons:
-        axes.plot(*line.T, color=ORANGE, linewidth=1.0, zorder=4 + level)
-    axes.plot(*shape.held.T, color=GREY, linewidth=4.0, zorder=2, solid_capstyle="butt")
+        yield Line(line, ORANGE, width=1.0, group=label, layer=4 + level)
+    yield Line(shape.held, GREY, width=4.0, blunt=True)
+
+
+def _apart(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A line and a gap behind it."""
+    return np.concatenate([line, np.full((1, 2), np.nan)])

@@ -7,18 +7,22 @@ that whoever reads it sees the old file or the new one and never half of either.
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import os
 import stat
 import tempfile
 from collections.abc import Generator, Iterable
 from pathlib import Path
 
+from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.results.streams import write_document
 
 STANDARD_OUTPUT = "-"
-PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
+PAPER = (".png", ".svg", ".pdf")
+BROWSER = (".html",)
+MOVING = (".gif",)
+_DRAWN_BY = {".html": ("matplotlib", "plotly"), ".gif": ("matplotlib", "PIL")}
+"""What has to be installed for a kind of picture, where that is more than matplotlib."""
 
 
 def check_output(target: str, option: str, *, inputs: Iterable[str | Path] = ()) -> None:
@@ -70,11 +74,56 @@ def check_output(target: str, option: str, *, inputs: Iterable[str | Path] = ())
         raise InputError(f"{option} {target!r} cannot be written: {words}.") from None
 
 
-def check_picture(target: str, option: str, *, inputs: Iterable[str | Path] = ()) -> None:
-    """Raise if a picture cannot be written at `target`: as `check_output`, and its kind too.
+def check_folder(
+    folder: str, names: Iterable[str], option: str, *, inputs: Iterable[str | Path] = ()
+) -> tuple[Path, ...]:
+    """Raise if files cannot be written in a folder, which may be missing; nothing is changed.
+
+    Args:
+        folder: The folder; if it is missing, the one that it would be made in must be there.
+        names: Names of the files.
+        option: The option that named the folder, for the message.
+        inputs: Files that are read; none of them may be replaced.
+
+    Returns:
+        The paths of the files.
 
     Raises:
-        InputError: The suffix is not .png, .svg or .pdf, or matplotlib is not installed.
+        InputError: A file cannot be written there, has no name of a file, or is an input.
+    """
+    if not folder.strip():
+        raise InputError(f"{option} needs the name of a folder, and got an empty one.")
+    if folder == STANDARD_OUTPUT:
+        raise InputError(f"{option} - : files cannot go to standard output; name a folder.")
+    files: list[Path] = []
+    for name in names:
+        if Path(name).name != name or "\0" in name:
+            raise InputError(f"{option} {folder}: a file cannot be called {name!r}.")
+        files.append(Path(folder) / name)
+    there = os.path.exists(folder) if "\0" not in folder else False
+    sources = list(inputs)
+    for target in files if there else [folder]:
+        check_output(str(target), option, inputs=sources)
+    return tuple(files)
+
+
+def check_picture(
+    target: str,
+    option: str,
+    *,
+    inputs: Iterable[str | Path] = (),
+    kinds: tuple[str, ...] = PAPER + BROWSER,
+) -> None:
+    """Raise if a picture cannot be written at `target`: as `check_output`, and its kind too.
+
+    Args:
+        target: A path.
+        option: The option that named it, for the message.
+        inputs: Files that are read; an output must not replace one of them.
+        kinds: The suffixes that this picture may have.
+
+    Raises:
+        InputError: The suffix is none of them, or what draws the picture is not installed.
     """
     if target == STANDARD_OUTPUT:
         raise InputError(
@@ -82,16 +131,13 @@ def check_picture(target: str, option: str, *, inputs: Iterable[str | Path] = ()
             "for example wrist.png."
         )
     suffix = Path(target).suffix.lower()
-    if suffix not in PICTURE_SUFFIXES:
+    if suffix not in kinds:
         got = f"the suffix {suffix}" if suffix else "no suffix"
-        raise InputError(
-            f"{option} {target}: got {got}; a picture is written as .png, .svg or .pdf."
-        )
+        known = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
+        raise InputError(f"{option} {target}: got {got}; a picture is written as {known}.")
     check_output(target, option, inputs=inputs)
-    if importlib.util.find_spec("matplotlib") is None:
-        raise InputError(
-            f"{option} needs matplotlib, which is not installed: pip install 'notchflex[plot]'"
-        )
+    for module in _DRAWN_BY.get(suffix, ("matplotlib",)):
+        need(module, "plot", option)
 
 
 def check_distinct(outputs: dict[str, str | None]) -> None:

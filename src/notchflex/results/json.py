@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PLAIN = tuple(
     q for q in QUANTITIES.values() if q.key and q.per not in (("tendon", "contact"),)
 )  # all but the contacts, which are gathered contact by contact
-CONTACTS = tuple(q for q in QUANTITIES.values() if q.per == ("tendon", "contact"))
+CONTACTS = tuple(q for q in QUANTITIES.values() if q.key and q.per == ("tendon", "contact"))
 
 # Loads from outside are what a user gave, and no result: they have no row in the table.
 LOAD_UNITS = {

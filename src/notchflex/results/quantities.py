@@ -75,6 +75,17 @@ def _rows() -> tuple[Quantity, ...]:
             "tip_rotation", "", ("row", "axis"),
         ),
         q(
+            "body_position", "body position", "p_b", "mm",
+            "Origin of every rigid body, on the tube axis at its proximal face, base first, in the "
+            "world.",
+            "", "", ("body", "axis"),
+        ),
+        q(
+            "body_rotation", "body rotation", "R_b", "",
+            "Rotation matrix of every rigid body, base first, in the world.",
+            "", "", ("body", "row", "axis"),
+        ),
+        q(
             "span_tension", "span tension", "T", "N",
             "Tension along a tendon: proximal, gap 1, body 1, gap 2, ... to its last gap, of the "
             "gaps and bodies that it runs through.",
@@ -129,6 +140,16 @@ def _rows() -> tuple[Quantity, ...]:
             "contact_state", "state of a contact", "", "",
             'What a friction contact does: "stick", "slip toward base" or "slip toward tip".',
             "contacts.state", "", ("tendon", "contact"),
+        ),
+        q(
+            "contact_bound", "largest tension ratio over a contact", "b_i", "",
+            "Largest magnitude that the friction law allows the tension ratio over a contact.",
+            "", "", ("tendon", "contact"),
+        ),
+        q(
+            "dissipation", "dissipation", "D_i", "N mm",
+            "Work that a friction contact has turned to heat since the start of the path.",
+            "", "", ("tendon", "contact"),
         ),
         q(
             "front_contact", "friction front", "m", "",

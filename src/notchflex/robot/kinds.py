@@ -6,6 +6,7 @@ a new kind needs: reading, writing, the JSON Schema and `--set` pick it up.
 """
 
 import dataclasses
+import functools
 import pkgutil
 from collections.abc import Iterator, Mapping
 from importlib import import_module
@@ -136,11 +137,16 @@ class Friction:
     kind: str
 
 
+@functools.cache  # asked for each value that is set by its name
+def _import_all(prefix: str) -> None:
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        if module.name.startswith(prefix):
+            import_module(f"notchflex.robot.{module.name}")
+
+
 def kinds_of(base: type) -> dict[str, type]:
     """Find every kind of notch, material or friction, by the word that names it."""
-    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
-        if module.name.startswith(f"{base.__name__.lower()}_"):
-            import_module(f"notchflex.robot.{module.name}")
+    _import_all(f"{base.__name__.lower()}_")
     return {kind_of(cls): cls for cls in sorted(base.__subclasses__(), key=kind_of)}
 
 

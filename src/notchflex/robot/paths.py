@@ -34,6 +34,14 @@ class Changed(NamedTuple):
     dropped: tuple[str, ...]
 
 
+class Described(NamedTuple):
+    """A number of a robot: its unit ("" for none) and between what it must lie."""
+
+    unit: str
+    lower: float
+    upper: float
+
+
 class _Target(NamedTuple):
     """A parsed path: `number` is None for the whole list and for sections that are no list."""
 
@@ -116,12 +124,15 @@ def number_at(robot: Robot, path: str) -> float:
         raise InputError(f"{path!r} is not the name of a value; {_EXAMPLES}.")
     target = _parse(path)
     found: set[object] = set()
+    allowed: dict[str, None] = {}
     for one in _chosen(to_table(robot), target) if target.section != "name" else ():
         keys = fields_of(_class_of(target.section, one))
+        allowed |= dict.fromkeys(keys)
         if target.key in keys:
             found.add(one.get(target.key, keys[target.key].default))
     if not found:
-        raise InputError(f"`{path}` is not the name of a number of this robot; {_EXAMPLES}.")
+        near = nearest(target.key, allowed)
+        raise InputError(f"`{path}` is not the name of a number of this robot{near}; {_EXAMPLES}.")
     if len(found) > 1:
         raise InputError(f"`{path}` has unlike values in this robot; name one, such as [1].")
     value = found.pop()
@@ -130,6 +141,37 @@ def number_at(robot: Robot, path: str) -> float:
             f"`{path}` is {value!r} in this robot, and no number that changes smoothly."
         )
     return value
+
+
+def described_at(robot: Robot, path: str) -> Described:
+    """Unit and limits of the number of a robot that has a name.
+
+    Args:
+        robot: The robot.
+        path: Its name, as for `Robot.with_value`.
+
+    Raises:
+        InputError: There is no such value.
+    """
+    target = _parse(path)
+    for one in _chosen(to_table(robot), target) if target.section != "name" else ():
+        field = fields_of(_class_of(target.section, one)).get(target.key)
+        if field is not None:
+            unit = str((field.json_schema_extra or {}).get("unit", ""))  # pyright: ignore
+            lower = [
+                getattr(one, key)
+                for one in field.metadata
+                for key in ("gt", "ge")
+                if hasattr(one, key)
+            ]
+            upper = [
+                getattr(one, key)
+                for one in field.metadata
+                for key in ("lt", "le")
+                if hasattr(one, key)
+            ]
+            return Described(unit, max(lower, default=-math.inf), min(upper, default=math.inf))
+    raise InputError(f"`{path}` is not the name of a number of this robot; {_EXAMPLES}.")
 
 
 def _value(text: str) -> object:

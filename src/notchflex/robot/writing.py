@@ -3,6 +3,7 @@
 import os
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
@@ -18,10 +19,20 @@ from notchflex.robot.robot import Robot, source_of, to_table
 
 _HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
 _CHANGED = re.compile(r"\s*\(changed from (.*)\)$")
+# What a fit said of a value, behind the comment that stood there before.
+_BY = "fitted by notchflex to"
+_FITTED = re.compile(rf"(?:;|#)\s*{_BY} .*$")
+_NUMBERED = re.compile(r"(\w+)(?:\[(\*|\d+)\])?\.(\w+)")
+
+_Notes = Mapping[str, str]
 
 
 def save_robot(
-    robot: Robot, path: str | os.PathLike[str], template: str | os.PathLike[str] | None = None
+    robot: Robot,
+    path: str | os.PathLike[str],
+    template: str | os.PathLike[str] | None = None,
+    *,
+    fitted: Mapping[str, str] | None = None,
 ) -> None:
     """Write a robot file in mm, N, MPa and deg.
 
@@ -33,6 +44,8 @@ def save_robot(
         path: The file to write; one that is there is replaced.
         template: The file whose comments and order are kept; None takes the file that the robot
             was read from, or a fresh layout with the meaning and unit of every key.
+        fitted: Of fitted values, by the names that `Robot.with_value` takes, to what and how
+            well: each is told beside its value.
 
     Raises:
         RobotFileError: The template cannot be read, or the file cannot be written.
@@ -50,29 +63,52 @@ def save_robot(
             reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
             raise RobotFileError(f"{template} cannot be read: {reason}.") from None
     try:
-        Path(path).write_text(robot_text(robot, source), encoding="utf-8", newline="\n")
+        Path(path).write_text(robot_text(robot, source, fitted), encoding="utf-8", newline="\n")
     except OSError as error:
         raise RobotFileError(f"{path} cannot be written: {error.strerror}.") from None
 
 
-def robot_text(robot: Robot, template: str | None = None) -> str:
+def robot_text(
+    robot: Robot, template: str | None = None, fitted: Mapping[str, str] | None = None
+) -> str:
     """Return the text of a robot file.
 
     Args:
         robot: The robot to write.
         template: Text of a robot file whose comments and order are kept.
+        fitted: As for `save_robot`.
+
+    Example:
+        >>> from notchflex.robot import load_robot
+        >>> softer = load_robot("pacheco2021-a").with_value("friction.coefficient", 0.12)
+        >>> text = robot_text(softer, fitted={"friction.coefficient": "a.csv: 0.1 to 0.14"})
+        >>> text.splitlines()[-2]
+        'coefficient = 0.12  # coefficient of friction; fitted by notchflex to a.csv: 0.1 to 0.14'
     """
+    notes = fitted or {}
     if template is not None:
         try:
-            text = _rewritten(robot, template)
+            text = _rewritten(robot, template, notes)
             if robot_from_text(text) == robot:
                 return text
         except (InputError, ParseError):
             pass  # a template laid out in an unusual way; a fresh file is right, if bare
-    return _fresh(robot)
+    return _fresh(robot, notes)
 
 
-def _fresh(robot: Robot) -> str:
+def _notes_of(notes: _Notes, section: str, first: int, count: int) -> dict[str, str]:
+    """Notes of the keys of a part; of notches or tendons of those from `first` (from 1) on."""
+    found: dict[str, str] = {}
+    for path, note in notes.items():
+        match = _NUMBERED.fullmatch(path.strip())
+        if match is None or match[1] != section:
+            continue
+        if match[2] in (None, "*") or first <= int(match[2]) < first + count:
+            found[match[3]] = note
+    return found
+
+
+def _fresh(robot: Robot, notes: _Notes) -> str:
     """Lay out a new file, with the meaning and unit of every key as its comment."""
     lines = [
         "# A notchflex robot file. Lengths in mm, forces in N, moduli in MPa, angles in deg.",
@@ -83,13 +119,16 @@ def _fresh(robot: Robot) -> str:
             lines += [f"name = {tomlkit.item(value).as_string()}"]
             continue
         parts = getattr(robot, key)
+        first = 1
         for one in parts if isinstance(parts, tuple) else (parts,):
             header = f"[[{key}]]" if isinstance(parts, tuple) else f"[{key}]"
-            lines += ["", header, *_fresh_part(one)]
+            count = getattr(one, "repeat", 1)
+            lines += ["", header, *_fresh_part(one, _notes_of(notes, key, first, count))]
+            first += count
     return "\n".join(lines) + "\n"
 
 
-def _fresh_part(part: Any) -> list[str]:
+def _fresh_part(part: Any, notes: _Notes) -> list[str]:
     lines: list[str] = []
     for key, record in fields_of(type(part)).items():
         value = getattr(part, key)
@@ -97,6 +136,8 @@ def _fresh_part(part: Any) -> list[str]:
             continue
         unit = (record.json_schema_extra or {}).get("unit", "")
         comment = ", ".join(word for word in (unit, record.description or "") if word)
+        if key in notes:
+            comment = "; ".join(word for word in (comment, f"{_BY} {notes[key]}") if word)
         line = f"{key} = {tomlkit.item(value).as_string()}"
         lines.append(f"{line}  # {comment}" if comment else line)
     return lines
@@ -111,14 +152,14 @@ class _Block:
     header: str
     body: list[str] = field(default_factory=list[str])
 
-    def text(self, values: dict[str, Any]) -> str:
-        """Return the piece with other values."""
+    def text(self, values: dict[str, Any], notes: _Notes) -> str:
+        """Return the piece with other values, and what is to be said of them."""
         body = tomlkit.parse("".join(self.body))
-        _update(body, values, self.name)
+        _update(body, values, self.name, notes)
         return "".join(self.lead) + self.header + tomlkit.dumps(body)
 
 
-def _rewritten(robot: Robot, template: str) -> str:
+def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
     """Put the values of a robot into the text of a file."""
     old = to_table(robot_from_text(template))
     new = to_table(robot)
@@ -136,7 +177,13 @@ def _rewritten(robot: Robot, template: str) -> str:
         else:  # the head of the file: the name, and whatever is not under a header of its own
             headed = {one.name for one in blocks}
             wanted.append((block, {k: v for k, v in new.items() if k not in headed}))
-    return "".join(block.text(table) for block, table in wanted)
+    texts: list[str] = []
+    first = {"notch": 1, "tendon": 1}
+    for block, table in wanted:
+        start, count = first.get(block.name, 1), table.get("repeat", 1)
+        first[block.name] = start + count
+        texts.append(block.text(table, _notes_of(notes, block.name, start, count)))
+    return "".join(texts)
 
 
 def _split(template: str) -> list[_Block]:
@@ -177,22 +224,24 @@ def _matched(
     return result
 
 
-def _update(table: Any, values: dict[str, Any], section: str) -> None:
+def _update(table: Any, values: dict[str, Any], section: str, notes: _Notes) -> None:
     """Bring a tomlkit table to the given values, touching only what differs."""
     for key in [key for key in table if key not in values]:
         del table[key]
     defaults = defaults_of(section, values) if section else {}
     for key, value in values.items():
         if key not in table:
-            if key not in defaults or defaults[key] != value:
+            if key in notes or key not in defaults or defaults[key] != value:
                 table[key] = value
         elif isinstance(value, dict):
-            _update(table[key], cast("dict[str, Any]", value), key)
+            _update(table[key], cast("dict[str, Any]", value), key, notes)
         elif isinstance(value, list):
             for item, one in zip(table[key], cast("list[Any]", value), strict=False):
-                _update(item, one, key)
+                _update(item, one, key, notes)
         elif table[key] != value:
             _set(table, key, value)
+        if key in notes and key in table:
+            _tell(table[key], notes[key])
 
 
 def _set(table: Any, key: str, value: object) -> None:
@@ -204,5 +253,27 @@ def _set(table: Any, key: str, value: object) -> None:
     changed = _CHANGED.search(comment)
     if changed:
         comment, was = comment[: changed.start()], changed[1]
+    # What a fit said of the value is not true of another.
+    comment = _FITTED.sub("", comment).rstrip()
     same = tomllib.loads(f"x = {was}")["x"] == value
-    table[key].trivia.comment = comment if same else f"{comment} (changed from {was})"
+    if not same:
+        comment = f"{comment or '#'} (changed from {was})"
+    _put(table[key], comment)
+
+
+def _tell(item: Any, note: str) -> None:
+    """Say of a value what it was fitted to, between its comment and what it was changed from."""
+    comment = item.trivia.comment
+    changed = _CHANGED.search(comment)
+    if changed:
+        comment = comment[: changed.start()]
+    comment = _FITTED.sub("", comment).rstrip()
+    comment = f"{comment}; {_BY} {note}" if comment.strip("# ") else f"# {_BY} {note}"
+    _put(item, comment + (changed[0] if changed else ""))
+
+
+def _put(item: Any, comment: str) -> None:
+    """Put a comment beside a value, two blanks behind it where there was none."""
+    if comment and not item.trivia.comment:
+        item.trivia.comment_ws = "  "
+    item.trivia.comment = comment

@@ -1,8 +1,10 @@
 """Statics: loads, balance, Newton's method, states with memory."""
 
+from notchflex.statics.axis_points import AxisPlaces, axis_places, axis_points, points_on_axis
 from notchflex.statics.batch import Batch, simulate_batch, solve_batch
 from notchflex.statics.closing import Closing, closing
 from notchflex.statics.differentiable import Differentiable, differentiable
+from notchflex.statics.equilibrium import ConvergenceError, Equilibrium
 from notchflex.statics.external import BodyForce, ExternalLoad
 from notchflex.statics.kinematics import (
     SharedStroke,
@@ -12,13 +14,18 @@ from notchflex.statics.kinematics import (
 )
 from notchflex.statics.load import Load, LoadPath
 from notchflex.statics.newton import Settings
-from notchflex.statics.path import ConvergenceError, Equilibrium, Path
+from notchflex.statics.path import Path
+from notchflex.statics.prepare import prepared
 from notchflex.statics.ramps import draw, pull
+from notchflex.statics.recorded import BEFORE, TOLD, Recorded
 from notchflex.statics.solve import simulate, solve, solve_each
 from notchflex.statics.state import SavedState, State
 from notchflex.statics.tip_response import TipResponse, tip_response
 
 __all__ = [
+    "BEFORE",
+    "TOLD",
+    "AxisPlaces",
     "Batch",
     "BodyForce",
     "Closing",
@@ -29,16 +36,21 @@ __all__ = [
     "Load",
     "LoadPath",
     "Path",
+    "Recorded",
     "SavedState",
     "Settings",
     "SharedStroke",
     "State",
     "TipResponse",
+    "axis_places",
+    "axis_points",
     "bodies_from_angles",
     "closing",
     "differentiable",
     "draw",
     "equal_stroke",
+    "points_on_axis",
+    "prepared",
     "pull",
     "simulate",
     "simulate_batch",

@@ -22,12 +22,12 @@ from notchflex.chain import Chain
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.statics.actuation import filled
+from notchflex.statics.command import command
 from notchflex.statics.given import shown
 from notchflex.statics.load import Load, LoadPath, joined_paths, load_path
 from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.outputs import DEFAULT_OUTPUTS, followed, known_outputs
 from notchflex.statics.packing import Form
-from notchflex.statics.path import command
 from notchflex.statics.prepare import Prepared, lengthened
 from notchflex.statics.solve import prepared_for
 from notchflex.statics.stepping import advance, at_rest
@@ -98,7 +98,7 @@ def solve_batch(
         loads: One load, or one per row (the steps of a `LoadPath` are loads of their own here).
         outputs: What to return, by names of `Path`; fewer names are less memory.
         settings: How hard the solver tries.
-        refinement: More strain modes, as for `solve`.
+        refinement: More strain modes, as for `simulate`.
         cores: How many cores to use; all where not given.
         progress: Called with the rows done and the rows of the whole batch.
 
@@ -136,11 +136,11 @@ def simulate_batch(
     Args:
         robots: One robot, or one per row.
         loads: One path, or one per row, of equally many steps.
-        outputs: What to return, by names of `Path`; fewer names are less memory.
+        outputs: What to return, as for `solve_batch`.
         settings: How hard the solver tries.
         refinement: More strain modes, as for `simulate`.
-        cores: How many cores to use; all where not given.
-        progress: Called with the rows done and the rows of the whole batch.
+        cores: As for `solve_batch`.
+        progress: As for `solve_batch`.
 
     Returns:
         Arrays by name, rows and then steps as leading axes.

@@ -16,16 +16,16 @@ from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.robot.paths import number_at
 from notchflex.statics.actuation import Command
+from notchflex.statics.command import command
 from notchflex.statics.given import robot_given, shown
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.numbers import with_slopes
 from notchflex.statics.outputs import followed, known_outputs
 from notchflex.statics.packing import Form
-from notchflex.statics.path import command
 from notchflex.statics.prepare import Prepared, prepared
-from notchflex.statics.sensitivity import advance_smoothly
-from notchflex.statics.solve import prepared_for
+from notchflex.statics.sensitivity import answered, solved_path
+from notchflex.statics.solve import check_refinement, prepared_for
 from notchflex.statics.stepping import at_rest
 
 _TENDONS = ("tension", "stroke")
@@ -47,7 +47,9 @@ def differentiable(
     `jax.grad`, `jax.vmap` and `jax.jit` compose with it. Loads are followed one after the other
     with friction that remembers, and so are the derivatives. Where a contact changes between
     sticking and sliding, lips meet or the material's law has a kink, so has the function, and the
-    derivative is that of one side.
+    derivative is that of one side. With friction it is NaN from a load on that was so hard that it
+    was solved in three parts or more: what contacts remember of the parts is not followed. Smaller
+    steps help.
 
     Args:
         robot: The robot.
@@ -63,7 +65,7 @@ def differentiable(
         The function; its `start` are the present values.
 
     Raises:
-        InputError: There is no such number or output, or the loads are none.
+        InputError: There is no such number, output or refinement, or the loads are none.
 
     Inside a program that JAX traces, numbers that no robot can have are told by `converged` being
     false, and by slopes that are NaN.
@@ -78,6 +80,7 @@ def differentiable(
         '13.30 rad/mm, 1.520 rad/N'
     """
     path = load_path(loads, robot_given(robot).number_of_tendons)
+    check_refinement(refinement)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if not names or len(set(names)) < len(names):
         raise InputError("parameters must name at least one number, and none of them twice")
@@ -233,7 +236,10 @@ def _followed(function: Differentiable, values: dict[str, Array]) -> dict[str, A
     chain = chain_form.unpack(arrays[: chain_form.size])
     commands = function.commands(arrays[chain_form.size :], values)
     start = at_rest(chain)
-    return followed(chain, commands, start, function.settings, function.outputs, advance_smoothly)
+    settings = function.settings
+    # Solved once, and looked at again for the slopes: nothing that iterates is differentiated.
+    items: Any = (commands, solved_path(chain, commands, start, settings))
+    return followed(chain, items, start, settings, function.outputs, answered)
 
 
 __all__ = ["Differentiable", "differentiable"]

@@ -75,15 +75,17 @@ def slope(
     vector_of: Callable[[Float[np.ndarray, " k"]], Float[np.ndarray, " chain"]],
     numbers: Float[np.ndarray, " k"],
     index: int,
+    halvings: int = _HALVINGS,
 ) -> Float[np.ndarray, " chain"]:
     """Derivative by one of the numbers.
 
-    At the end of the range that a number may have, such as a friction of 0, it is that inward.
+    With one halving less it takes a third less time, and is right to some 1e-9. At the end of the
+    range that a number may have, such as a friction of 0, it is that inward.
     """
     width = _WIDTH * (abs(numbers[index]) or 1.0)
     for points in (_CENTRAL, _FORWARD, -_FORWARD):
         try:
-            return _extrapolated(vector_of, np.array(numbers), index, width, points)
+            return _extrapolated(vector_of, np.array(numbers), index, width, points, halvings)
         except InputError:  # beyond what the number may be
             continue
     raise InputError(f"number {index + 1} cannot be varied around {numbers[index]:g}")
@@ -100,13 +102,14 @@ def _extrapolated(
     index: int,
     width: float,
     points: np.ndarray,
+    halvings: int,
 ) -> np.ndarray:
     """Differences of ever smaller widths, extrapolated to none."""
     # Weights that give the slope at 0 of the polynomial through the points.
     powers = np.vander(points, increasing=True).T
     weights = np.linalg.solve(powers, np.eye(len(points))[1])
     table: list[np.ndarray] = []
-    for halving in range(_HALVINGS + 1):
+    for halving in range(halvings + 1):
         own = width / 2**halving
         values = []
         for point in points:

@@ -10,7 +10,6 @@ from jaxtyping import Array
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
 from notchflex.errors import InputError
-from notchflex.statics.actuation import Command
 from notchflex.statics.given import shown
 from notchflex.statics.newton import Settings
 from notchflex.statics.quantities import Quantities, Shape, believable, quantities, shape
@@ -47,27 +46,31 @@ def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 
 def followed(
     chain: Chain,
-    commands: Command,
+    commands: Any,
     start: Solved,
     settings: Settings,
     outputs: tuple[str, ...],
-    stepping: Callable[[Chain, Command, Solved, Settings], Advance],
+    stepping: Callable[[Chain, Any, Solved, Settings], Advance],
 ) -> dict[str, Array]:
     """Follow a path of loads, and tell of every state what is asked.
 
+    Beside `run` this is a second loop over a path, and stays one: `run` goes on or starts anew,
+    skips what only fills up its table (a branch that rows side by side would both take), and packs
+    all that a `Path` may be asked for later; here nothing is kept but what is asked for.
+
     Args:
         chain: The chain.
-        commands: The loads, as leading axis.
+        commands: The loads, as leading axis; for `answered` with what came of them.
         start: The state before the first.
         settings: How hard to try.
         outputs: Names of what is asked.
-        stepping: `advance`, or the same with derivatives.
+        stepping: `advance`, or `answered` for derivatives of what is solved already.
 
     Returns:
         By name, loads as leading axis; after a load that failed the last good state.
     """
 
-    def step(state: tuple[Solved, Array], command: Command) -> tuple[Any, dict[str, Array]]:
+    def step(state: tuple[Solved, Array], command: Any) -> tuple[Any, dict[str, Array]]:
         last, alive = state
         came = stepping(chain, command, last, settings)
         solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), came.solved, last)

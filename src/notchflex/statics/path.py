@@ -1,38 +1,34 @@
-"""What a simulation returns: many states with memory, or one."""
+"""What a simulation returns: many states with memory."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast, overload
+from typing import TYPE_CHECKING, overload
 
 import jax.tree_util as tree_util
 import numpy as np
-from jaxtyping import Array
 
 from notchflex._jax import constant
 from notchflex.chain import Chain
 from notchflex.motion import rotation_about
 from notchflex.robot import Robot
-from notchflex.statics.actuation import Command, drawn_when_closed
-from notchflex.statics.applied import applied, in_frame, out_of_frame
+from notchflex.statics.applied import out_of_frame
+from notchflex.statics.command import command
+from notchflex.statics.equilibrium import ConvergenceError, Equilibrium
+from notchflex.statics.front import friction_front
 from notchflex.statics.load import LoadPath
+from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.prepare import Prepared
 from notchflex.statics.quantities import believable
-from notchflex.statics.run import Run, stability
+from notchflex.statics.reason import why_not
+from notchflex.statics.recorded import Recorded
+from notchflex.statics.run import Run
 from notchflex.statics.state import State
 from notchflex.statics.stepping import Solved
 
-
-class ConvergenceError(RuntimeError):
-    """A result was asked to be converged and is not."""
-
-
-# A stroke is followed up to the last good state before the last notch closes, which leaves it
-# open by less than this part of its height.
-_NEARLY_CLOSED = 1e-3
-# Log ratios this close to their bound are on it.
-_NEAR_BOUND = 1e-9
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +43,17 @@ class Path:
         robot: The robot.
         load: The loads.
         prepared: The robot as arrays.
-        run: What the solver returned, as arrays.
+        run: What the solver returned, as arrays, or what was read of it from a file.
         each_from_rest: Whether every state starts from the same one, not from its neighbour.
+        settings: How hard the solver tried.
     """
 
     robot: Robot
     load: LoadPath
     prepared: Prepared
-    run: Run
+    run: Run | Recorded
     each_from_rest: bool = False
+    settings: Settings = DEFAULT
 
     @property
     def chain(self) -> Chain:
@@ -225,26 +223,7 @@ class Path:
         base; m is one more than there are when all have turned (eta is then NaN). A tendon that
         is pulled for the first time has m = 1 and eta = 1.
         """
-        ratio, bound = self.contact_log_ratio, self.contact_bound
-        there = ~np.isnan(ratio)
-        rubs = there & (bound > 0.0)
-        # A contact without friction (a law may lay it all on one edge of a gap) is passed over, and
-        # one that hardly turns its tendon. Where none does more, all have gone the same way.
-        counts = rubs & (bound > _NEAR_BOUND)
-        turned = (ratio < 0.0) & (ratio <= _NEAR_BOUND - bound)
-        let_go = np.nansum(ratio, axis=-1, keepdims=True) < 0.0
-        nothing = ~counts.any(axis=-1, keepdims=True)
-        waits = np.where(nothing, rubs & ~let_go, counts & ~turned)
-        every = np.where(rubs.any(axis=-1), there.sum(axis=-1), 0)
-        count = np.where(waits.any(axis=-1), waits.argmax(axis=-1), every)
-        at_front = np.minimum(count, ratio.shape[-1] - 1)[..., None]
-        own, largest = (
-            np.take_along_axis(value, at_front, axis=-1)[..., 0] for value in (ratio, bound)
-        )
-        holds = waits.any(axis=-1)
-        # Friction over its largest at a corner is (1 - rho)/(1 + rho) over the same at the bound.
-        part = np.tanh(0.5 * own) / np.tanh(0.5 * np.where(holds, largest, 1.0))
-        return count + 1, np.where(holds, part, np.nan)
+        return friction_front(self.contact_log_ratio, self.contact_bound)
 
     @property
     def front_contact(self) -> np.ndarray:
@@ -332,59 +311,11 @@ class Path:
     @cached_property
     def reason(self) -> list[str]:
         """Why a step did not converge; empty where it did."""
-        return [self._reason(step) for step in range(len(self))]
-
-    def _reason(self, step: int) -> str:
-        if self.converged[step]:
-            return ""
-        if not self.run.tried[step]:
-            failed = int(np.argmin(self.converged))
-            return f"not tried, because step {failed + 1} of the path did not converge"
-        if self.run.converged[step] and not self._of("bend_possible")[step]:
-            return (
-                "a notch is bent by more than half a turn, or so sharply that a fibre would have "
-                "no length left; take smaller loads"
-            )
-        if self.run.converged[step] and self._of("friction_holds")[step]:
-            return (
-                "the strain modes miss the moment of the loads by "
-                f"{100 * self.moment_error[step]:.0f} % of the largest: the robot is bent beyond "
-                "what this model is for; take smaller loads, or a refinement of 1, 2 or 3"
-            )
-        if self.run.converged[step]:
-            return (
-                "a tendon turns so sharply at an edge that its friction would hold any pull "
-                "(coefficient * tan(turning / 2) is 1 or more), where the friction law says nothing"
-            )
-        tension = ", ".join(f"{value:.4g}" for value in self.tension[step])
-        drawn = ", ".join(f"{value:.4g}" for value in self.stroke[step])
-        last = f"the last good state has tension {tension} N and stroke {drawn} mm"
-        opening = np.asarray(self.chain.rods.length).sum(axis=-1)
-        all_closed = (self.gap[step] < _NEARLY_CLOSED * opening).all()
-        if (all_closed or self._past_closing(step)) and not np.isnan(self.load.stroke[step]).all():
-            return (
-                "every notch closed: the robot can't shorten the tendon further, so this stroke "
-                f"fixes no tension; {last}; command a smaller stroke, or a tension, or give the "
-                "tendon a finite axial_stiffness"
-            )
-        part = 100.0 * float(self.run.reached[step])
-        return (
-            f"no equilibrium found beyond {part:.3g} % of the way from the state before "
-            f"(imbalance {float(self.residual[step]):.2g}); {last}; take smaller steps, or the "
-            "robot has no equilibrium there"
-        )
-
-    def _past_closing(self, step: int) -> bool:
-        """Whether a stroke of a step is more than an inextensible tendon can lose."""
-        reach = drawn_when_closed(self.chain)
-        inextensible = np.isinf(np.asarray(self.chain.axial_stiffness))
-        return bool((inextensible & (self.load.stroke[step] >= reach)).any())
+        return [why_not(self, step) for step in range(len(self))]
 
     @cached_property
     def _stability(self) -> tuple[np.ndarray, np.ndarray]:
-        value, sign = stability(
-            self.prepared, command(self.load, self.robot, self.chain), self.run.solved
-        )
+        value, sign = self.run.stability(command(self.load, self.robot, self.chain))
         return np.asarray(value), np.asarray(sign)
 
     @property
@@ -396,9 +327,14 @@ class Path:
         return self._stability[0]
 
     @property
+    def determinant_sign(self) -> np.ndarray:
+        """Sign of the determinant of that stiffness, (s,)."""
+        return self._stability[1]
+
+    @property
     def stable(self) -> np.ndarray:
         """Whether the state is a stable equilibrium, (s,)."""
-        return (self.smallest_eigenvalue > 0.0) & (self._stability[1] > 0.0)
+        return (self.smallest_eigenvalue > 0.0) & (self.determinant_sign > 0.0)
 
     def state_at(self, step: int) -> State:
         """State after a step (or the last good one before it), to save or continue from."""
@@ -413,6 +349,25 @@ class Path:
         """State after the last converged step."""
         return self.state_at(-1)
 
+    def to_xarray(self) -> Dataset:
+        """The whole path as a labelled data set: every quantity, with its name and unit.
+
+        Its NetCDF file (`.to_netcdf`, or `notchflex.save_path`) is read back by
+        `notchflex.read_path`. Units are those of Python: mm, N, rad.
+
+        Raises:
+            InputError: xarray is not installed.
+
+        Example:
+            >>> from notchflex import load_robot, pull, simulate
+            >>> path = simulate(load_robot("pacheco2021-a"), pull(0.0, 1.0, steps=3))
+            >>> path.to_xarray()["notch_angle"].dims
+            ('step', 'notch')
+        """
+        from notchflex.results.dataset import dataset_of
+
+        return dataset_of(self)
+
     def raise_if_failed(self) -> Path:
         """Itself, if every step converged.
 
@@ -425,63 +380,4 @@ class Path:
         return self
 
 
-class Equilibrium:
-    """One state of a path: every quantity of `Path`, without the axis of steps.
-
-    Example:
-        >>> from notchflex import Load, load_robot, solve
-        >>> wrist = solve(load_robot("pacheco2021-a"), Load(tension=1.0))
-        >>> wrist.notch_angle.shape
-        (5,)
-    """
-
-    def __init__(self, path: Path, step: int) -> None:
-        """Look at one step of a path."""
-        self._path = path
-        self._step = step
-
-    def __getattr__(self, name: str) -> Any:
-        """A quantity of the path, at this step."""
-        if name.startswith("_") or name in {"run", "prepared", "chain", "load", "each_from_rest"}:
-            raise AttributeError(name)
-        value = getattr(self._path, name)
-        if isinstance(value, tuple):  # such as the friction front, m and eta
-            return tuple(part[self._step] for part in cast("tuple[Any, ...]", value))
-        return value if name == "robot" else value[self._step]
-
-    @property
-    def state(self) -> State:
-        """This state, to save or continue from."""
-        return self._path.state_at(self._step)
-
-    def raise_if_failed(self) -> Equilibrium:
-        """Itself, if it converged.
-
-        Raises:
-            ConvergenceError: It did not; the message says why.
-        """
-        if not self.converged:
-            raise ConvergenceError(self.reason)
-        return self
-
-
-def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
-    """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
-    by_stroke = ~np.isnan(load.stroke)
-    value = np.where(by_stroke, load.stroke, np.nan_to_num(load.tension))
-    others = None
-    if chain.loaded:
-        others = applied(
-            load,
-            robot,
-            np.asarray(chain.body_mass),
-            np.asarray(chain.body_centre),
-            np.asarray(chain.body_length),
-        )
-        if chain.frame is not None:
-            others = in_frame(others, chain.frame)
-    drawn = cast("Array", by_stroke) if by_stroke.any() else None
-    return Command(constant(value), drawn, others)
-
-
-__all__ = ["ConvergenceError", "Equilibrium", "Path", "command"]
+__all__ = ["Path"]

@@ -26,8 +26,8 @@ from notchflex.statics.walk import evaluate
 
 # Numbers of loads that programs are compiled for: a solve, a usual path, and longer ones.
 _SIZES = (1, 128, 4096)
-# Beside state and shape: residual, iterations, converged, tried, reached.
-_TOLD = 5
+# Beside states and shape: residual, iterations, converged, tried, reached, parts, part before.
+_TOLD = 7
 
 
 class Run:
@@ -39,6 +39,8 @@ class Run:
         converged: Whether the load was reached.
         tried: Whether it was tried at all; after a failure the rest of a path is not.
         reached: Part of the way from the load before that was reached.
+        parts: How many parts of that way were solved one after the other.
+        part_before: Part of the way at which the last of them began.
     """
 
     def __init__(
@@ -52,11 +54,19 @@ class Run:
         self.converged: Bool[np.ndarray, " s"] = told[:, 2] != 0.0
         self.tried: Bool[np.ndarray, " s"] = told[:, 3] != 0.0
         self.reached: Float[np.ndarray, " s"] = told[:, 4]
+        self.parts: Int[np.ndarray, " s"] = told[:, 5].astype(int)
+        self.part_before: Float[np.ndarray, " s"] = told[:, 6]
 
     @property
     def states(self) -> Float[np.ndarray, "s state"]:
         """The last solved state at each load, packed: its own, or as far as it was followed."""
         return self._table[: self._count, : self._prepared.state.size]
+
+    @property
+    def between(self) -> Float[np.ndarray, "s state"]:
+        """The state before the last part of the way to each load, packed."""
+        size = self._prepared.state.size
+        return self._table[: self._count, size : 2 * size]
 
     @cached_property
     def solved(self) -> Solved:
@@ -83,7 +93,7 @@ class Run:
         """What is reported of each state, by its name in `Shape` or `Quantities`."""
         if name not in Shape._fields:
             return getattr(self._more[0], name)
-        packed = self._table[: self._count, self._prepared.state.size : -_TOLD]
+        packed = self._table[: self._count, 2 * self._prepared.state.size : -_TOLD]
         return self._prepared.shape.leaf(packed, Shape._fields.index(name))
 
     def before(self, name: str) -> np.ndarray:
@@ -92,6 +102,10 @@ class Run:
             return np.asarray(getattr(self._more[1], name))
         start: Solved = self._prepared.state.unpack(self._first)
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
+
+    def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest real part of the stiffness's eigenvalues and sign of the determinant."""
+        return stability(self._prepared, commands, self.solved)
 
 
 def run(
@@ -219,21 +233,24 @@ def _follow(
         def try_it() -> tuple[Array, Array]:
             came = advance(chain, command_form.unpack(packed), state_form.unpack(before), settings)
             told = [came.residual, came.iterations, came.converged, True, came.reached]
-            return state_form.pack(came.solved), jnp.stack([jnp.asarray(x, float) for x in told])
+            told += [came.parts, came.part_before]
+            states = state_form.pack(came.solved), state_form.pack(came.between)
+            return jnp.concatenate(states), jnp.stack([jnp.asarray(x, float) for x in told])
 
         def skip() -> tuple[Array, Array]:
-            return before, jnp.zeros(_TOLD).at[0].set(jnp.nan)
+            return jnp.concatenate([before, before]), jnp.zeros(_TOLD).at[0].set(jnp.nan)
 
-        solved, told = jax.lax.cond(tried, try_it, skip)
-        return (solved, alive & (told[2] > 0.0)), jnp.concatenate([solved, told])
+        states, told = jax.lax.cond(tried, try_it, skip)
+        solved = states[: state_form.size]
+        return (solved, alive & (told[2] > 0.0)), jnp.concatenate([states, told])
 
     numbers = jnp.arange(len(commands), dtype=float)
     _, table = jax.lax.scan(follow, (start, jnp.array(True)), (commands, numbers))
 
     def with_shape(row: Array) -> Array:
-        size = state_form.size
-        found = shape(chain, state_form.unpack(row[:size]))
-        return jnp.concatenate([row[:size], Form.of(found).pack(found), row[size:]])
+        states, told = row[:-_TOLD], row[-_TOLD:]
+        found = shape(chain, state_form.unpack(states[: state_form.size]))
+        return jnp.concatenate([states, Form.of(found).pack(found), told])
 
     return jax.lax.map(with_shape, table)
 

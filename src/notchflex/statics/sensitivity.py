@@ -7,45 +7,115 @@ nothing; but its derivative, with the linear system held still, is the derivativ
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from jaxtyping import Array, Bool
+from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, stroke
 from notchflex.statics.element import Memory
 from notchflex.statics.newton import Point, Settings
-from notchflex.statics.stepping import Advance, Solved, advance
+from notchflex.statics.stepping import Advance, Solved, advance, on_the_way
 from notchflex.statics.sweep import linear_step
 from notchflex.statics.walk import evaluate
 
 
-def advance_smoothly(chain: Chain, command: Command, last: Solved, settings: Settings) -> Advance:
-    """Follow a load from a solved state, as `advance`, with derivatives by all it takes.
+def solved_path(chain: Chain, commands: Command, start: Solved, settings: Settings) -> Advance:
+    """Follow a path of loads without derivatives; `answered` gives what came of it some.
 
-    They are those of the load taken in one go, and NaN where it was not reached: memory of parts of
-    a load cut into several is not followed.
+    Args:
+        chain: The chain.
+        commands: The loads, as leading axis.
+        start: The state before the first.
+        settings: How hard to try.
+
+    Returns:
+        What came of every load, as leading axis; after one that failed each starts from the last
+        good state.
     """
-    came = advance(*_still((chain, command, last, settings)))
-    return came._replace(solved=answering(chain, command, last, came.solved, came.converged))
+    chain, commands, start, settings = _still((chain, commands, start, settings))
+
+    def step(last: Solved, command: Command) -> tuple[Solved, Advance]:
+        came = advance(chain, command, last, settings)
+        return came.solved, came
+
+    return jax.lax.scan(step, start, commands)[1]
 
 
-def answering(
-    chain: Chain, command: Command, last: Solved, solved: Solved, reached: Bool[Array, ""]
-) -> Solved:
+def answered(
+    chain: Chain, item: tuple[Command, Advance], last: Solved, settings: Settings
+) -> Advance:
+    """A load that is solved already, from a solved state, with derivatives by all it takes.
+
+    They are NaN where it was not reached, and where nobody knows them, see `answering`.
+    """
+    del settings  # it was needed to solve
+    command, came = item
+    way = Way(came.between, came.part_before, came.parts, came.converged)
+    return came._replace(solved=answering(chain, command, last, came.solved, way))
+
+
+class Way(NamedTuple):
+    """How a solved state was come to from the one before, told by `Advance`.
+
+    Attributes:
+        between: The state before the last part of the load.
+        part_before: Part of the way at which it is.
+        parts: How many parts the load was cut into.
+        reached: Whether the load was reached.
+    """
+
+    between: Solved
+    part_before: Float[Array, ""]
+    parts: Int[Array, ""]
+    reached: Bool[Array, ""]
+
+
+# A load and another before it: from rest, loads on the bodies come on before the tendons.
+_PARTS_FOLLOWED = 2
+
+
+def answering(chain: Chain, command: Command, last: Solved, solved: Solved, way: Way) -> Solved:
     """A solved state with its derivatives by chain, command and the state before.
+
+    Contacts remember: where loads on the bodies came on before the tendons, the derivatives go
+    through both parts of the way. Of more parts, and where tendons alone are pulled in more than
+    one, only the last states are known; with friction the derivatives are then NaN.
 
     Args:
         chain: The chain.
         command: The load.
         last: The state before, whose memory the contacts had.
         solved: The state that was found.
-        reached: Whether it is the answer to that load.
+        way: How it was found.
 
     Returns:
         The same state.
     """
+    if not (chain.friction.remembers and chain.loaded):
+        whole = (way.parts <= 1) | (not chain.friction.remembers)
+        return _answering_part(chain, command, last, solved, way.reached & whole)
+    known = way.reached & (way.parts <= _PARTS_FOLLOWED)
+    halfway = on_the_way(chain, command, last, _still(way.part_before))
+    items = (halfway, way.between, way.parts > 1), (command, solved, jnp.array(True))
+
+    def follow(before: Solved, item: tuple[Command, Solved, Array]) -> tuple[Solved, None]:
+        towards, found, taken = item
+
+        def answer() -> Solved:
+            return _answering_part(chain, towards, before, found, known)
+
+        return jax.lax.cond(taken, answer, lambda: before), None
+
+    both = jax.tree.map(lambda *leaves: jnp.stack(leaves), *items)
+    return jax.lax.scan(follow, last, both)[0]
+
+
+def _answering_part(
+    chain: Chain, command: Command, last: Solved, solved: Solved, reached: Bool[Array, ""]
+) -> Solved:
+    """The same of a load, or a part of one, that was solved in one go."""
     point = _still(solved.point)
     at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
     step = linear_step(chain, command, point.unknowns, last.memory, point.base_tension, at)
@@ -86,4 +156,4 @@ def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Arra
     return jnp.zeros_like(varied), tangents[1] * jnp.where(known, 1.0, jnp.nan)
 
 
-__all__ = ["advance_smoothly", "answering"]
+__all__ = ["Way", "answered", "answering", "solved_path"]

@@ -9,9 +9,11 @@ from notchflex.errors import InputError
 from notchflex.flexure import LEVELS
 from notchflex.robot import Robot
 from notchflex.statics.applied import is_planar, is_unloaded
+from notchflex.statics.command import command
+from notchflex.statics.equilibrium import Equilibrium
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
-from notchflex.statics.path import Equilibrium, Path, command
+from notchflex.statics.path import Path
 from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import run
 from notchflex.statics.state import SavedState, State, fitted
@@ -60,7 +62,7 @@ def simulate(
     start = None if from_state is None else fitted(from_state, ready.chain)
     commands = command(load, robot, ready.chain)
     came = run(ready, commands, start, settings or DEFAULT, each_from_start=False)
-    return Path(robot, load, ready, came)
+    return Path(robot, load, ready, came, settings=settings or DEFAULT)
 
 
 def solve(
@@ -78,8 +80,7 @@ def solve(
         load: Tension or stroke of its tendons.
         from_state: State to start from; rest where not given.
         settings: How hard the solver tries.
-        refinement: 0 has the strain modes that serve for usual loads, 1, 2, 3 more of them: a
-            result that stays the same can be trusted (`moment_error` tells how much is missing).
+        refinement: More strain modes, as for `simulate`.
 
     Returns:
         The equilibrium, or the last good state on the way with `converged` false and a reason.
@@ -110,8 +111,7 @@ def solve_each(
         robot: The robot.
         loads: The loads.
         settings: How hard the solver tries.
-        refinement: 0 has the strain modes that serve for usual loads, 1, 2, 3 more of them: a
-            result that stays the same can be trusted (`moment_error` tells how much is missing).
+        refinement: More strain modes, as for `simulate`.
 
     Returns:
         The states, one per load; a failure of one does not touch the others.
@@ -129,7 +129,7 @@ def solve_each(
     ready = prepared_for(robot, load, refinement=refinement)
     commands = command(load, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=True)
-    return Path(robot, load, ready, came, each_from_rest=True)
+    return Path(robot, load, ready, came, each_from_rest=True, settings=settings or DEFAULT)
 
 
 def check_refinement(refinement: int) -> None:

@@ -42,6 +42,9 @@ class Advance(NamedTuple):
         iterations: Newton iterations, all parts together.
         converged: Whether the load was reached.
         reached: Part of the way from the state before to the load that was reached.
+        parts: How many parts of the way were solved one after the other.
+        between: The state before the last of them, whose memory the contacts had in it.
+        part_before: Part of the way at which that state is.
     """
 
     solved: Solved
@@ -49,6 +52,9 @@ class Advance(NamedTuple):
     iterations: Int[Array, ""]
     converged: Bool[Array, ""]
     reached: Float[Array, ""]
+    parts: Int[Array, ""]
+    between: Solved
+    part_before: Float[Array, ""]
 
 
 # Part of the way at which the other loads are on, where they come before the tendons.
@@ -95,23 +101,10 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
     Returns:
         What came of it.
     """
-    from_here = command.either(last.stroke, last.point.base_tension)
-    slack = jnp.all(last.point.base_tension == 0.0)
-    loads_first = slack if chain.loaded else jnp.array(False)
-
-    def towards(part: Array) -> Command:
-        """The command at a part of the way; exactly the wanted one at its end."""
-        for_loads = jnp.where(loads_first, jnp.minimum(2.0 * part, 1.0), part)
-        for_tendons = jnp.where(loads_first, jnp.maximum(2.0 * part - 1.0, 0.0), part)
-        only_loads = loads_first & (for_tendons == 0.0)
-        return Command(
-            value=jnp.where(only_loads, 0.0, between(from_here, command.value, for_tendons)),
-            by_stroke=None if command.by_stroke is None else command.by_stroke & ~only_loads,
-            applied=jax.tree.map(partial(between, part=for_loads), last.applied, command.applied),
-        )
+    loads_first = _loads_first(chain, last)
 
     def attempt(solved: Solved, part: Array) -> tuple[NewtonResult, Command]:
-        wanted = towards(part)
+        wanted = on_the_way(chain, command, last, part)
         tension = wanted.either(solved.point.base_tension, wanted.value)
         guess = played(chain, solved.point.base_tension, tension, solved.memory)
         start = Point(solved.point.unknowns._replace(log_ratio=guess), tension)
@@ -144,6 +137,13 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
             iterations=advanced.iterations + found.iterations,
             converged=found.converged & (aim >= 1.0),
             reached=jnp.where(found.converged, aim, advanced.reached),
+            parts=advanced.parts + found.converged,
+            between=jax.tree.map(
+                lambda old, new: jnp.where(found.converged, new, old),
+                advanced.between,
+                advanced.solved,
+            ),
+            part_before=jnp.where(found.converged, advanced.reached, advanced.part_before),
         )
         return advanced, jnp.where(found.converged, 2.0 * part, 0.5 * part), tries + 1
 
@@ -153,9 +153,32 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
         iterations=jnp.zeros((), int),
         converged=jnp.array(False),
         reached=jnp.zeros(()),
+        parts=jnp.zeros((), int),
+        between=last,
+        part_before=jnp.zeros(()),
     )
     advanced, _, _ = jax.lax.while_loop(going, follow, (start, jnp.ones(()), jnp.zeros((), int)))
     return advanced
+
+
+def on_the_way(chain: Chain, command: Command, last: Solved, part: Float[Array, ""]) -> Command:
+    """The command at a part of the way from a solved state; exactly the wanted one at its end."""
+    loads_first = _loads_first(chain, last)
+    from_here = command.either(last.stroke, last.point.base_tension)
+    for_loads = jnp.where(loads_first, jnp.minimum(2.0 * part, 1.0), part)
+    for_tendons = jnp.where(loads_first, jnp.maximum(2.0 * part - 1.0, 0.0), part)
+    only_loads = loads_first & (for_tendons == 0.0)
+    return Command(
+        value=jnp.where(only_loads, 0.0, between(from_here, command.value, for_tendons)),
+        by_stroke=None if command.by_stroke is None else command.by_stroke & ~only_loads,
+        applied=jax.tree.map(partial(between, part=for_loads), last.applied, command.applied),
+    )
+
+
+def _loads_first(chain: Chain, last: Solved) -> Bool[Array, ""]:
+    """Whether other loads come on before the tendons."""
+    slack = jnp.all(last.point.base_tension == 0.0)
+    return slack if chain.loaded else jnp.array(False)
 
 
 def between(start: Float[Array, ...], end: Float[Array, ...], part: Array) -> Array:

@@ -7,22 +7,23 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import constant, jax, jit, jnp
 from notchflex.motion import rotation_about, unskew
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
 from notchflex.statics.applied import Applied
+from notchflex.statics.command import command
 from notchflex.statics.given import robot_given
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.packing import Form
-from notchflex.statics.path import Path, command
+from notchflex.statics.path import Path
 from notchflex.statics.prepare import prepared
 from notchflex.statics.quantities import shape
 from notchflex.statics.run import run
-from notchflex.statics.sensitivity import answering
+from notchflex.statics.sensitivity import Way, answering
 from notchflex.statics.solve import check_refinement
 
 
@@ -31,7 +32,8 @@ class TipResponse:
     """Slopes of the tip's pose along a path of loads; s steps, t tendons.
 
     Rows are (rotation vector, rad; position, mm), all in the world. NaN where a step did not
-    converge.
+    converge, and with friction where it was so hard that it was solved in three parts or more: what
+    contacts remember of the parts is not followed.
 
     Attributes:
         path: The states.
@@ -85,7 +87,8 @@ def tip_response(
     states = came.states
     before = np.concatenate([ready.rest_vector[None], states[:-1]])
     form = ready.command_form(commands)
-    items = (before, states, form.pack(commands, leading=1), found.converged)
+    way = (came.between, came.part_before, came.parts, found.converged)
+    items = (before, states, form.pack(commands, leading=1), *way)
     slopes = np.asarray(_slopes(ready.vector, *items, ready.chain_form, form, ready.state))
     base = np.asarray(rotation_about(constant(path.base_rotation)))
     turn = np.kron(np.eye(2), base)
@@ -93,13 +96,16 @@ def tip_response(
     return TipResponse(found, turn @ slopes[..., :tendons], turn @ slopes[..., tendons:] @ turn.T)
 
 
-@partial(jit, static_argnums=(5, 6, 7))
+@partial(jit, static_argnums=(8, 9, 10))
 def _slopes(
     vector: Float[Array, " chain"],
     before: Float[Array, "s state"],
     states: Float[Array, "s state"],
     commands: Float[Array, "s command"],
-    converged: Float[Array, " s"],
+    between: Float[Array, "s state"],
+    part_before: Float[Array, " s"],
+    parts: Int[Array, " s"],
+    converged: Bool[Array, " s"],
     chain_form: Form,
     command_form: Form,
     state_form: Form,
@@ -107,7 +113,7 @@ def _slopes(
     chain = chain_form.unpack(vector)
 
     def pose(change: Array, item: tuple[Array, ...]) -> tuple[Array, Array]:
-        last, state, packed, reached = item
+        last, state, packed, halfway, *way = item
         load: Command = command_form.unpack(packed)
         assert load.applied is not None  # the chain is assembled for loads
         drives, wrench = change[: chain.tendons], change[chain.tendons :]
@@ -115,9 +121,8 @@ def _slopes(
             value=load.value + drives,
             applied=_with_tip(load.applied, wrench, chain.body_length[-1]),
         )
-        answer = answering(
-            chain, varied, state_form.unpack(last), state_form.unpack(state), reached
-        )
+        last, state, halfway = (state_form.unpack(one) for one in (last, state, halfway))
+        answer = answering(chain, varied, last, state, Way(halfway, *way))
         own = shape(chain, answer)
         return own.body_rotation[-1], own.tip_position
 
@@ -128,7 +133,7 @@ def _slopes(
         turn = jax.vmap(lambda slope: unskew(slope @ rotation.T), in_axes=-1, out_axes=-1)
         return jnp.concatenate([turn(turned), moved])
 
-    return jax.lax.map(one, (before, states, commands, converged))
+    return jax.lax.map(one, (before, states, commands, between, part_before, parts, converged))
 
 
 def _with_tip(applied: Applied, wrench: Float[Array, " 6"], length: Float[Array, ""]) -> Applied:

@@ -1,0 +1,85 @@
+"""The robot of Gao 2017 against every link integrated by shooting with a Runge-Kutta method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from differences import Difference, difference, joined, told
+
+import gao2017
+import notchflex as nf
+from notchflex.plot.style import BLUE, VERMILLION, house_style, new_figure, save, sequence_colours
+from reference_data import reference
+
+CASES = (
+    gao2017.TIP_ONLY,
+    gao2017.TIP_AWAY,
+    gao2017.TIP_TOWARD,
+    gao2017.BODY_AWAY,
+    gao2017.BODY_TOWARD,
+)
+
+
+def differences(refinement: int) -> list[Difference]:
+    """Compare the loop, its tensions and front, the friction, and weights on the robot."""
+    path, rows = gao2017.pulled_and_let_go(refinement), reference("gao_free_bending.csv")
+    profile = reference("gao_tension_profiles.csv")
+    found = [
+        difference("tip, pulled to 13 N and let go", gao2017.tip(path), rows[:, 2:4], "mm"),
+        difference("rotation of the tip", path.total_angle, rows[:, 4], "rad"),
+        difference("tension of every span", path.span_tension[:, 0], profile[:, 2:], "N"),
+    ]
+    m = path.front[0][gao2017.PULLED :, 0]
+    found.append(
+        difference("contact at the friction front", m, rows[gao2017.PULLED :, 7], "contacts")
+    )
+    if not refinement:
+        for mu, pull, y, z, _, _ in reference("gao_mu_sweep.csv"):
+            robot = gao2017.robot().with_value("friction.coefficient", mu)
+            bent = nf.simulate(robot, nf.pull(0.0, pull, gao2017.PULLED)).raise_if_failed()
+            name = "tip at 13 N, nine coefficients of friction"
+            found.append(difference(name, gao2017.tip(bent)[-1], [y, z], "mm"))
+        for case in CASES:
+            rows = gao2017.external_rows(case)
+            tip = gao2017.tip(gao2017.under_weight(case))
+            found.append(difference("tip under weights, five cases", tip, rows[:, 3:5], "mm"))
+    return joined(found)
+
+
+def tables() -> dict[str, str]:
+    """Return what stands on the page."""
+    return {"gao2017": told(differences(0)), "gao2017_finer": told(differences(1))}
+
+
+def pictures(folder: Path) -> None:
+    """Draw the loop and the tension along the tendon."""
+    path, rows = gao2017.pulled_and_let_go(), reference("gao_free_bending.csv")
+    profile = reference("gao_tension_profiles.csv")
+    half = gao2017.PULLED
+    with house_style():
+        figure = new_figure(9.0, 3.4)
+        left, right = figure.subplots(1, 2)
+        for steps, colour, way in (
+            (slice(0, half), BLUE, "pulling"),
+            (slice(half, None), VERMILLION, "letting go"),
+        ):
+            tension, angle = path.tension[steps, 0], np.degrees(path.total_angle[steps])
+            left.plot(tension, angle, color=colour)
+            left.plot(
+                rows[steps, 1], np.degrees(rows[steps, 4]), "o", ms=3.5, mfc="none", color=colour
+            )
+            left.plot([], [], "o-", ms=3.5, mfc="none", color=colour, label=way)
+        left.set_xlabel("tendon tension [N]")
+        left.set_ylabel("rotation of the tip [deg]")
+        left.legend()
+        chosen = (half - 1, half + 2, half + 4, half + 6, half + 8, half + 10)
+        for step, colour in zip(chosen, sequence_colours(len(chosen)), strict=True):
+            right.plot(path.span_tension[step, 0], color=colour)
+            label = f"{path.tension[step, 0]:.0f} N" + (", pulled" if step < half else ", let go")
+            right.plot(profile[step, 2:], "o", ms=3.0, mfc="none", color=colour)
+            right.plot([], [], "o-", ms=3.0, mfc="none", color=colour, label=label)
+        right.set_xlabel("span of the tendon, 0 at the base")
+        right.set_ylabel("tension [N]")
+        right.legend(fontsize=7.0)
+    save(figure, folder / "gao2017.svg")

@@ -1,0 +1,99 @@
+"""Wrists A, B, C of Pacheco 2021 against its equations, solved in closed form."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from differences import Difference, difference, joined, told
+
+import notchflex as nf
+from loads import tensions
+from notchflex.plot.style import house_style, new_figure, save, sequence_colours
+from reference_data import CUTS, choose, reference
+from robots import linear_copy, ready
+
+MODELS = ("full", "linear, with friction", "linear, frictionless", "kinematic (equal strokes)")
+
+
+def curves() -> dict[tuple[str, int], tuple[nf.Path, np.ndarray]]:
+    """Pull every wrist, cut in either way, to 3 N, and read the rows of the table beside it."""
+    table = reference("pacheco_force_curves.csv")
+    found = {}
+    for number, cut in enumerate(CUTS):
+        for wrist, name in enumerate("ABC"):
+            robot = ready(name).with_value("notch[*].cut", cut)
+            path = nf.simulate(robot, nf.pull(0.0, 3.0, steps=61)).raise_if_failed()
+            found[name, number] = path, choose(table, cut=(0, number), wrist=(1, wrist))
+    return found
+
+
+def differences() -> list[Difference]:
+    """Compare the curves, the closing of every notch, and the simpler models."""
+    rows = []
+    for path, wanted in curves().values():
+        n = path.robot.number_of_notches
+        angles = np.radians(wanted[:, 3 : 3 + n])
+        rows += [
+            difference("angle of every notch, 0 to 3 N", path.notch_angle, angles, "rad"),
+            difference("tip", path.tip_position[:, [0, 2]], wanted[:, 9:11], "mm"),
+            difference("stroke", path.stroke[:, 0], wanted[:, 11], "mm"),
+            difference("tension at the tip", path.span_tension[:, 0, -1], wanted[:, 12], "N"),
+        ]
+    closing = reference("pacheco_closing.csv")
+    for number, cut in enumerate(CUTS):
+        for wrist, name in enumerate("ABC"):
+            found = nf.closing(ready(name).with_value("notch[*].cut", cut))
+            wanted = choose(closing, cut=(0, number), wrist=(1, wrist))
+            angle = np.radians(wanted[:, 7])
+            rows.append(difference("closing angle of every notch", found.angle, angle, ""))
+            rows.append(difference("closing tension", found.tension, wanted[:, 8], ""))
+    for wrist, name in enumerate("ABC"):
+        for model, (angle, wanted) in simpler(name, wrist).items():
+            rows.append(difference(f"model: {MODELS[model]}", angle, wanted, "rad"))
+    return joined(rows)
+
+
+def simpler(name: str, wrist: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Notch angles of the paper's four models, and those of the table."""
+    found = {}
+    table = choose(reference("pacheco_simplified.csv"), wrist=(0, wrist))
+    full = ready(name)
+    linear = linear_copy(full)
+    robots = full, linear, linear.replace(friction=nf.Frictionless())
+    stroke = np.zeros(0)
+    for model in range(4):
+        rows = choose(table, model=(2, model))
+        if model < 3:
+            path = nf.simulate(robots[model], tensions(rows[:, 1])).raise_if_failed()
+            stroke = stroke if model else path.stroke[:, 0]
+            angle = path.notch_angle
+        else:
+            angle = nf.equal_stroke(full, stroke).notch_angle
+        found[model] = angle, np.radians(rows[:, 3 : 3 + full.number_of_notches])
+    return found
+
+
+def tables() -> dict[str, str]:
+    """Return what stands on the page."""
+    return {"pacheco2021": told(differences())}
+
+
+def pictures(folder: Path) -> None:
+    """Draw the total angles of the curves."""
+    every = curves()
+    with house_style():
+        figure = new_figure(8.0, 3.4)
+        places = figure.subplots(1, 2, sharey=True)
+        for number, (axes, cut) in enumerate(zip(places, CUTS, strict=True)):
+            for name, colour in zip("ABC", sequence_colours(3), strict=True):
+                path, wanted = every[name, number]
+                axes.plot(path.tension[:, 0], np.degrees(path.total_angle), color=colour)
+                dots = wanted[::3]
+                axes.plot(dots[:, 2], dots[:, 8], "o", ms=3.5, mfc="none", color=colour)
+                axes.plot([], [], "o-", ms=3.5, mfc="none", color=colour, label=f"wrist {name}")
+            axes.set_title(f'cut = "{cut}"', loc="left")
+            axes.set_xlabel("tendon tension [N]")
+        places[0].set_ylabel("total bending angle [deg]")
+        places[0].legend(loc="lower right")
+    save(figure, folder / "pacheco2021.svg")

@@ -1,0 +1,45 @@
+"""How griffe, which reads the sources for the Python reference, is to take what is ours.
+
+A class under `@part` (notchflex.robot) is a dataclass whose annotations carry units and limits; the
+reference shows its plain types. A section `Example:` of a docstring is one that is executed.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import griffe
+
+_DATACLASS = griffe.ExprName("dataclasses.dataclass", None)
+
+
+class House(griffe.Extension):
+    """Take `@part` as a dataclass, `Annotated` as its plain type, `Example:` as code."""
+
+    def on_class_instance(self, *, cls: griffe.Class, **_: Any) -> None:
+        """Take `@part` and `@part(kw_only=True)` as `@dataclass`."""
+        for decorator in cls.decorators:
+            value = decorator.value
+            called = isinstance(value, griffe.ExprCall)
+            if str(value.function if called else value) != "part":
+                continue
+            if called:
+                decorator.value = griffe.ExprCall(_DATACLASS, value.arguments)
+            else:
+                decorator.value = _DATACLASS
+
+    def on_attribute_instance(self, *, attr: griffe.Attribute, **_: Any) -> None:
+        """Show `float` for `Annotated[Float, quantity("mm", ...)]`."""
+        annotation = attr.annotation
+        if isinstance(annotation, griffe.ExprSubscript) and str(annotation.left) == "Annotated":
+            inner = annotation.slice
+            plain = inner.elements[0] if isinstance(inner, griffe.ExprTuple) else inner
+            known = {"Float": "float", "FloatOrInf": "float", "Int": "int"}
+            attr.annotation = known.get(str(plain), plain)
+
+    def on_instance(self, *, obj: griffe.Object, **_: Any) -> None:
+        """Let griffe find the examples."""
+        if obj.docstring is not None:
+            text = re.sub(r"(?m)^(\s*)Example:$", r"\1Examples:", obj.docstring.value)
+            obj.docstring.value = text

@@ -1,0 +1,41 @@
+"""Writes the table of docs/units_and_frames.md from the one table of quantities.
+
+`python docs/make/quantities.py`; a test compares the page with `tables()`.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from notchflex.results.quantities import describe
+
+PAGE = "../units_and_frames.md"  # from the folder of page.py
+
+
+def tables() -> dict[str, str]:
+    """Return the table of all quantities by the name of its mark."""
+    head = ("Python", "unit in files", "JSON key", "CSV column", "meaning")
+    rows = [
+        (
+            _code(one["name"]),
+            one["unit"],
+            _code(one["key"]),
+            _code(one["column"]),
+            one["description"],
+        )
+        for one in describe()
+    ]
+    text = "\n".join(f"| {' | '.join(row)} |" for row in [head, ("---",) * len(head), *rows])
+    return {"quantities": f"\n\n{text.replace('|  |', '| |')}\n\n"}
+
+
+def _code(text: str) -> str:
+    return f"`{text}`" if text else ""
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "papers"))
+    from page import rewrite
+
+    rewrite(PAGE, tables())

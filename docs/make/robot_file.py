@@ -1,0 +1,113 @@
+"""Writes the tables of docs/robot_file.md from the JSON Schema of robot files.
+
+`python docs/make/robot_file.py`; a test compares the page with `tables()`.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import notchflex as nf
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = "../robot_file.md"  # from the folder of page.py
+SINGLE = ("Tube", "Tendon")
+LISTS = {"notch": "notch", "material": "material", "friction": "friction"}
+
+
+def tables() -> dict[str, str]:
+    """Return the tables by the name of their mark: a part, or all kinds of one."""
+    schema = nf.json_schema()
+    parts = schema["$defs"]
+    found = {name.lower(): _part(parts[name]) for name in SINGLE}
+    for key in LISTS:
+        found[key] = "\n" + "\n".join(_kind(key, parts[name]) for name in _kinds(schema, key))
+    found["top"] = _top(schema)
+    return found
+
+
+def _top(schema: dict[str, Any]) -> str:
+    rows = []
+    for key, value in schema["properties"].items():
+        several = value.get("type") == "array"
+        if "$ref" in value or "discriminator" in value:
+            written = f"`[{key}]`"
+        else:
+            written = f"`[[{key}]]`" if several else f'`{key} = "..."`'
+        rows.append((written, "one or more" if several else "one", MEANING[key]))
+    return _table(("written", "how many", "meaning"), rows)
+
+
+MEANING = {
+    "name": "what tables and pictures call the robot",
+    "tube": "the tube before it is cut",
+    "notch": "the notches, base to tip; `repeat` stands for several equal ones",
+    "tendon": "the tendons",
+    "material": "the material of the tube",
+    "friction": "the friction between tendon and tube",
+}
+
+
+def _kinds(schema: dict[str, Any], key: str) -> list[str]:
+    """Return the names of the definitions of all kinds of a part."""
+    value = schema["properties"][key]
+    mapping = value.get("items", value)["discriminator"]["mapping"]
+    return [reference.rsplit("/", 1)[1] for reference in mapping.values()]
+
+
+def _kind(key: str, part: dict[str, Any]) -> str:
+    kind = part["properties"]["kind"]["const"]
+    return f'\n#### {key}: `kind = "{kind}"`\n\n{part["description"]}{_part(part)}'
+
+
+def _part(part: dict[str, Any]) -> str:
+    required = set(part.get("required", ()))
+    rows = [
+        (
+            f"`{key}`",
+            value.get("unit", ""),
+            _allowed(value),
+            "required" if key in required else _default(part["title"], key),
+            value.get("description", ""),
+        )
+        for key, value in part["properties"].items()
+        if key != "kind"
+    ]
+    if not rows:
+        return "\n\nIt has no keys but `kind`.\n"
+    rows.sort(key=lambda row: row[3] != "required")
+    return _table(("key", "unit", "allowed", "if left out", "meaning"), rows)
+
+
+def _default(title: str, key: str) -> str:
+    """Return the default of the class itself: the schema cannot say infinite."""
+    default = getattr(nf, title).__dataclass_fields__[key].default
+    if default is None:
+        return "none"
+    return f'`"{default}"`' if isinstance(default, str) else f"`{default}`"
+
+
+def _allowed(value: dict[str, Any]) -> str:
+    if "enum" in value:
+        return " or ".join(f'`"{one}"`' for one in value["enum"])
+    if "anyOf" in value:
+        return " or ".join(filter(None, map(_allowed, value["anyOf"])))
+    word = {"integer": "whole number", "number": "number", "string": "text"}[value["type"]]
+    ends = (("exclusiveMinimum", "above"), ("minimum", "from"), ("maximum", "to"))
+    limits = [f"{name} {value[key]:g}" for key, name in ends if key in value]
+    return " ".join([word, *limits])
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    text = "\n".join(f"| {' | '.join(line)} |" for line in [head, ("---",) * len(head), *rows])
+    return f"\n\n{re.sub(' +', ' ', text)}\n\n"
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT / "docs" / "papers"))
+    from page import rewrite
+
+    rewrite(PAGE, tables())

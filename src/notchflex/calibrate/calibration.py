@@ -1,0 +1,189 @@
+"""What a fit found: constants, robots, and how far to trust them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import chi2, t
+
+from notchflex.calibrate.intervals import LEVEL, Interval
+from notchflex.calibrate.minimise import Cost, Minimum
+from notchflex.calibrate.noise import Noise
+from notchflex.calibrate.problem import Problem, unit_free
+from notchflex.calibrate.residuals import Residuals
+from notchflex.robot import Robot
+
+# A misfit this unlikely for the noise that was told means that the model misses something.
+_UNLIKELY = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a fit found.
+
+    Attributes:
+        given: The robots as they were, by label.
+        problem: What was fitted to what.
+        best: Where the best search ended.
+        reached: The objective there.
+        searches: Where every search ended, the first from the robots as they were.
+        intervals: 95 % intervals by constant; of `LeastSquares` only.
+    """
+
+    given: Mapping[str, Robot]
+    problem: Problem
+    best: Minimum
+    reached: Cost
+    searches: tuple[Minimum, ...]
+    intervals: dict[str, Interval]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The constants."""
+        return tuple(one.name for one in self.problem.unknowns)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """What they were found to be, in the units of the robot file."""
+        return dict(zip(self.names, self.best.values.tolist(), strict=True))
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Their units, "" for a pure number."""
+        return {one.name: one.unit for one in self.problem.unknowns}
+
+    @property
+    def converged(self) -> bool:
+        """Whether the best search settled."""
+        return self.best.converged
+
+    @property
+    def reason(self) -> str:
+        """Why it did not, "" where it did."""
+        return self.best.reason
+
+    @property
+    def cost(self) -> float:
+        """The objective that was reached: half a chi squared, or a sum of norms (deg or mm)."""
+        return self.reached.value
+
+    @property
+    def residuals(self) -> Residuals:
+        """Model less measurement."""
+        return self.reached.residuals
+
+    @property
+    def noise(self) -> Noise:
+        """Standard deviations of what was measured."""
+        assert self.problem.noise is not None
+        return self.problem.noise
+
+    @property
+    def solves(self) -> int:
+        """How many rows of measurements were solved for all this."""
+        return self.problem.samples.solves
+
+    @cached_property
+    def robots(self) -> dict[str, Robot]:
+        """The robots with the constants that were found."""
+        found: dict[str, Robot] = {}
+        for sample in self.problem.samples.every:
+            if sample.label not in found:
+                own = self.best.values[list(sample.columns)]
+                found[sample.label] = sample.rows.robot_with(own.tolist())
+        return found
+
+    @property
+    def freedom(self) -> int:
+        """How many more numbers were measured than fitted."""
+        return self.noise.counted - len(self.names)
+
+    @property
+    def reduced_chi_squared(self) -> float:
+        """Mean square of residuals over their noise; about 1 where the model is right.
+
+        Of numbers whose noise is known otherwise than by the fit; NaN where there are none.
+        """
+        known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
+        left = int(known.sum()) - len(self.names)
+        if left <= 0:
+            return float("nan")
+        scaled = self.residuals.values[known] / self.noise.deviation[known]
+        return float(np.sum(scaled**2)) / left
+
+    @property
+    def misses(self) -> bool:
+        """Whether the model misses what was measured by more than noise can explain."""
+        value = self.reduced_chi_squared
+        return bool(value > 1.0 and chi2.sf(value * self.freedom, self.freedom) < _UNLIKELY)
+
+    @property
+    def widened(self) -> float:
+        """By how much intervals are wider than noise alone makes them: the model misses more."""
+        return float(np.sqrt(self.reduced_chi_squared)) if self.misses else 1.0
+
+    @cached_property
+    def covariance(self) -> Float[np.ndarray, "k k"]:
+        """Covariance of the constants, in a straight-line view of the model.
+
+        Infinite where nothing measured depends on a constant. For objectives that are no
+        likelihood, and nowhere else, from how unlike the pulls are (Huber's sandwich by pulls).
+        """
+        inverse = _inverse(self.reached.curvature)
+        if self.problem.objective.is_likelihood:
+            return inverse * self.widened**2
+        return self.covariance_by_pulls
+
+    @cached_property
+    def covariance_by_pulls(self) -> Float[np.ndarray, "k k"]:
+        """Covariance from how unlike the pulls are, whatever the noise of a row (Huber 1967).
+
+        What the model misses is much alike within a pull: rows are not worth as much as their
+        number. NaN where there are fewer pulls than constants and one more.
+        """
+        cost = self.reached
+        pull = self.residuals.pull
+        pulls = np.unique(pull)
+        if len(pulls) <= len(self.names):
+            return np.full((len(self.names),) * 2, np.nan)
+        shares = np.stack([cost.shares[pull == one].sum(axis=0) for one in pulls])
+        inverse = _inverse(cost.curvature)
+        with np.errstate(invalid="ignore"):
+            middle = shares.T @ shares * len(pulls) / (len(pulls) - len(self.names))
+            return inverse @ middle @ inverse
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviations of the constants, in a straight-line view of the model."""
+        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def correlation(self) -> Float[np.ndarray, "k k"]:
+        """Correlations of the constants; NaN for one that nothing depends on."""
+        size = np.sqrt(np.diag(self.covariance))
+        size = np.where(np.isfinite(size), size, np.nan)
+        return self.covariance / np.outer(size, size)
+
+    def half_width(self, name: str) -> float:
+        """Half of a constant's 95 % interval in a straight-line view of the model."""
+        return float(t.ppf(0.5 + LEVEL / 2.0, max(self.freedom, 1)) * self.deviations[name])
+
+
+def _inverse(curvature: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
+    """The inverse; infinite for what has no curvature at all."""
+    size = np.sqrt(np.maximum(np.diag(curvature), 0.0))
+    known = size > 0.0
+    found = np.diag(np.where(known, 0.0, np.inf))
+    scale = np.outer(size[known], size[known])
+    own = unit_free(curvature[np.ix_(known, known)])
+    values, vectors = np.linalg.eigh(own) if len(own) else (np.zeros(0), np.zeros((0, 0)))
+    # What rounding makes of no curvature at all is a very wide interval, not a narrow one.
+    found[np.ix_(known, known)] = (vectors / np.maximum(values, 1e-15)) @ vectors.T / scale
+    return found
+
+
+__all__ = ["Calibration"]

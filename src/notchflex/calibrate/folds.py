@@ -1,0 +1,178 @@
+"""Honest testing: constants fitted without a pull, or a robot, tried on what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from notchflex.calibrate.calibration import Calibration
+from notchflex.calibrate.constants import Constant
+from notchflex.calibrate.fit import calibrate, given
+from notchflex.calibrate.measurements import OBSERVED, Measurements
+from notchflex.calibrate.objective import FitObjective
+from notchflex.calibrate.problem import Progress
+from notchflex.calibrate.residuals import Residuals
+from notchflex.calibrate.samples import Samples
+from notchflex.errors import InputError
+from notchflex.robot import Robot
+from notchflex.statics.newton import Settings
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """One thing left out.
+
+    Attributes:
+        label: The robot, and the pull where a pull was left out.
+        found: The fit to all the rest.
+        errors: Root-mean-square error on what was left out by quantity (rad, mm, N).
+        errors_of_all: The same of constants that were fitted to everything.
+        converged: Whether every row left out was solved.
+    """
+
+    label: str
+    found: Calibration
+    errors: dict[str, float]
+    errors_of_all: dict[str, float]
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """A fit to everything, and one without each part.
+
+    Attributes:
+        by: "pull" or "robot".
+        whole: The fit to everything.
+        folds: One per part.
+    """
+
+    by: str
+    whole: Calibration
+    folds: tuple[Fold, ...]
+
+
+def leave_out(
+    robots: Robot | Mapping[str, Robot],
+    measurements: Measurements
+    | Sequence[Measurements]
+    | Mapping[str, Measurements | Sequence[Measurements]],
+    fit: str | Sequence[str | Constant],
+    *,
+    by: Literal["pull", "robot"],
+    objective: FitObjective | None = None,
+    starts: int = 1,
+    seed: int = 0,
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+) -> LeftOut:
+    """Fit without each pull, or each robot, and try the constants on it.
+
+    Args:
+        robots: As for `calibrate`.
+        measurements: As for `calibrate`.
+        fit: As for `calibrate`.
+        by: "pull" or "robot".
+        objective: As for `calibrate`.
+        starts: From how many places to search each time.
+        seed: Of the places.
+        settings: How hard the solver tries.
+        progress: Called with what is done, how much of it, and how much there is.
+
+    Returns:
+        The fit to everything, and what each part makes of constants fitted without it.
+
+    Raises:
+        InputError: There is only one part, or a constant belongs to the one left out alone.
+    """
+    named, data = given(robots, measurements)
+    parts = _parts(data, by)
+    if len(parts) < 2:
+        raise InputError(f"there is only one {by}; leaving it out leaves nothing to fit to")
+    ways = {"objective": objective, "starts": starts, "seed": seed, "settings": settings}
+    whole = calibrate(named, data, fit, intervals=False, **ways)  # pyright: ignore
+    folds: list[Fold] = []
+    for number, part in enumerate(parts):
+        rest = {label: _without(data[label], label, part) for label in named}
+        kept = {label: robot for label, robot in named.items() if rest[label]}
+        rest = {label: rest[label] for label in kept}
+        found = calibrate(kept, rest, fit, intervals=False, **ways)  # pyright: ignore
+        own = (named[part.robot], data[part.robot], part)
+        errors, of_all = _errors(*own, found), _errors(*own, whole)
+        folds.append(
+            Fold(part.told(data[part.robot]), found, errors or {}, of_all or {}, errors is not None)
+        )
+        if progress is not None:
+            progress("leaving out", number + 1, len(parts))
+    return LeftOut(by, whole, tuple(folds))
+
+
+def root_mean_squares(residuals: Residuals) -> dict[str, float]:
+    """Root-mean-square residuals by quantity (rad, mm, N)."""
+    return {
+        OBSERVED[quantity]: float(
+            np.sqrt(np.mean(residuals.values[residuals.quantity == quantity] ** 2))
+        )
+        for quantity in np.unique(residuals.quantity)
+    }
+
+
+class _Part(NamedTuple):
+    """A robot, or one of its pulls: the number of its measurement and the pull's label."""
+
+    robot: str
+    measurement: int = -1
+    pull: str = ""
+
+    def is_in(self, label: str, number: int) -> bool:
+        """Whether it is, or lies in, a measurement of a robot."""
+        return label == self.robot and self.measurement in (-1, number)
+
+    def told(self, every: Sequence[Measurements]) -> str:
+        """What it is called."""
+        if self.measurement < 0:
+            return self.robot
+        source = f", {every[self.measurement].source}" if len(every) > 1 else ""
+        return f"{self.robot}{source}, pull {self.pull}"
+
+
+def _parts(data: Mapping[str, Sequence[Measurements]], by: str) -> list[_Part]:
+    if by == "robot":
+        return [_Part(label) for label in data]
+    if by != "pull":
+        raise InputError(f'leave out by "pull" or by "robot"; got {by!r}')
+    return [
+        _Part(label, number, pull)
+        for label, every in data.items()
+        for number, measured in enumerate(every)
+        for pull in measured.pulls
+    ]
+
+
+def _without(every: Sequence[Measurements], label: str, part: _Part) -> tuple[Measurements, ...]:
+    kept: list[Measurements] = []
+    for number, measured in enumerate(every):
+        if not part.is_in(label, number):
+            kept.append(measured)
+        elif part.pull and len(measured.pulls) > 1:
+            kept.append(measured.of_pulls([pull for pull in measured.pulls if pull != part.pull]))
+    return tuple(kept)
+
+
+def _errors(
+    robot: Robot, every: Sequence[Measurements], part: _Part, found: Calibration
+) -> dict[str, float] | None:
+    """Errors on the part left out; None where a row of it has no solution."""
+    label = part.robot
+    if part.pull:
+        every = [every[part.measurement].of_pulls([part.pull])]
+    constants = tuple(one.shared_with(label) for one in found.problem.unknowns)
+    samples = Samples.of({label: robot}, {label: every}, constants)
+    residuals = samples.residuals(found.best.values)
+    return None if residuals is None else root_mean_squares(residuals)
+
+
+__all__ = ["Fold", "LeftOut", "leave_out", "root_mean_squares"]

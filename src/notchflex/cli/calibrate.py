@@ -1,0 +1,307 @@
+"""`notchflex calibrate`: from measurements to constants with error bars."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Group, Parameter
+
+from notchflex.cli import terminal
+from notchflex.cli.calibrate_words import PAIR, Given, parse_fit, parse_pairs, robots_of
+from notchflex.cli.options import OUTPUT, JsonFile, PlotFile, Settings, robot_files
+from notchflex.cli.spec import load_columns
+from notchflex.errors import InputError
+from notchflex.results.files import (
+    PAPER,
+    STANDARD_OUTPUT,
+    check_distinct,
+    check_folder,
+    check_output,
+    check_picture,
+)
+
+if TYPE_CHECKING:
+    from notchflex.calibrate import Calibration, LeftOut, NextMeasurement, Posterior
+    from notchflex.calibrate.objective import FitObjective
+    from notchflex.robot import Robot
+
+MORE = Group("Beyond the fit", sort_key=8)
+
+_MANY: Any = Parameter(negative=(), show_default=False)
+Named = Annotated[tuple[str, ...], _MANY]
+
+
+def calibrate(
+    *pairs: Annotated[
+        str,
+        Parameter(
+            help=f"{PAIR}: a robot (ready, or a file) and what was measured of it (the columns of "
+            "`notchflex.read_measurements`). The same robot again adds more data; a label tells "
+            "two robots of one file apart."
+        ),
+    ],
+    fit: Annotated[
+        Named,
+        Parameter(
+            help="Constants to find, joined by commas: values of the robot file, shared by all "
+            "robots; `LABEL:` before one for a single robot, `each:` for one in every robot, "
+            "`notch[each].` for one in every notch; `sensor.force_offset`, `sensor.stroke_slack`."
+        ),
+    ],
+    bounds: Annotated[
+        Named, Parameter(help="Limits of a constant, `NAME=LOW:HIGH`, in its unit.")
+    ] = (),
+    prior: Annotated[
+        Named, Parameter(help="What is known of a constant beforehand, `NAME=MEAN+-SD`.")
+    ] = (),
+    objective: Annotated[
+        Literal["least-squares", "robot-errors", "distances"],
+        Parameter(
+            help="What is made small: squares over their noise; eq. 17 of Pacheco 2021; the sum of "
+            "distances of points (Gao 2017, eq. 27). Only the first gives intervals."
+        ),
+    ] = "least-squares",
+    huber: Annotated[
+        float | None,
+        Parameter(help="Outliers beyond so many standard deviations count less; about 1.5."),
+    ] = None,
+    starts: Annotated[int, Parameter(help="From how many places to search.")] = 4,
+    seed: Annotated[int, Parameter(help="Of the places.")] = 0,
+    path: Annotated[
+        bool,
+        Parameter(
+            negative=(),
+            help="Take the rows of each pull as one path with memory of friction; without it as "
+            "the file says, and each from rest where it says nothing.",
+        ),
+    ] = False,
+    leave_out: Annotated[
+        Literal["pull", "robot"] | None,
+        Parameter(group=MORE, help="Also fit without each pull or robot, and try that on it."),
+    ] = None,
+    next_: Annotated[
+        Named,
+        Parameter(
+            name="--next",
+            group=MORE,
+            help="Candidates for the next measurement: tensions [N] as in `simulate --tension`. "
+            "Tells which narrows the intervals most.",
+        ),
+    ] = (),
+    next_robot: Annotated[
+        str | None,
+        Parameter(group=MORE, help="Label of the robot of `--next`; the first if left out."),
+    ] = None,
+    narrow: Annotated[
+        Named,
+        Parameter(
+            group=MORE, help="Constant that `--next` is to narrow; all together if left out."
+        ),
+    ] = (),
+    posterior: Annotated[
+        bool,
+        Parameter(negative=(), group=MORE, help="Also draw from the posterior (extra `bayes`)."),
+    ] = False,
+    draws: Annotated[
+        int, Parameter(group=MORE, help="Draws of each of the two chains of `--posterior`.")
+    ] = 500,
+    settings: Settings = (),
+    output: Annotated[
+        str | None,
+        Parameter(
+            name=("--output", "-o"),
+            group=OUTPUT,
+            help="Write the fitted robots into this folder, LABEL.toml each, with their comments.",
+        ),
+    ] = None,
+    json: JsonFile = None,
+    plot: PlotFile = None,
+) -> int:
+    """Find constants of robots from measurements, with how far to trust them.
+
+    Prints every constant with its 95 % interval (profile likelihood; `open` where the data set no
+    end), what the data cannot tell, and the errors of every notch beside how well it repeats.
+    """
+    given = parse_pairs(pairs)
+    wanted = parse_fit(fit, bounds, prior)
+    _check_options(objective, huber, starts, draws, next_, next_robot, narrow, given)
+    inputs = _inputs(given)
+    _check_targets(given, inputs, output, json, plot)
+    robots = robots_of(given, settings)
+    candidates = None
+    if next_:
+        one = robots[next_robot or next(iter(robots))]
+        candidates = load_columns(next_, (), one.number_of_tendons)
+
+    with terminal.working("loading the solver"):
+        from notchflex.cli.compile_cache import use_compile_cache
+
+        use_compile_cache()
+        import notchflex.calibrate as fitting
+        from notchflex.statics import LoadPath
+
+    _check_sensor([one.name for one in wanted])
+    measured = {
+        label: [
+            fitting.read_measurements(file, robots[label], from_rest=False if path else None)
+            for file in files
+        ]
+        for label, files in given.data.items()
+    }
+    constants = [fitting.Constant(*one) for one in wanted]
+    aim = _objective(objective, huber)
+    told: NextMeasurement | None = None
+    drawn: Posterior | None = None
+    left: LeftOut | None = None
+    with terminal.bars() as progress:
+        ways: dict[str, Any] = {"objective": aim, "seed": seed, "progress": progress}
+        found = fitting.calibrate(robots, measured, constants, starts=starts, **ways)
+        if leave_out is not None:
+            left = fitting.leave_out(robots, measured, constants, by=leave_out, **ways)
+        if candidates is not None:
+            loads = LoadPath(*candidates)
+            told = fitting.next_measurement(found, loads, robot=next_robot, narrow=narrow)
+        if posterior:
+            drawn = fitting.posterior(found, draws=draws, seed=seed, progress=progress)
+    _write(found, left, told, drawn, inputs, output=output, json=json, plot=plot)
+    if json != STANDARD_OUTPUT:
+        _print(found, left, told, drawn)
+    return _say_what_matters(found, robots)
+
+
+def _check_options(
+    objective: str,
+    huber: float | None,
+    starts: int,
+    draws: int,
+    next_: tuple[str, ...],
+    next_robot: str | None,
+    narrow: tuple[str, ...],
+    given: Given,
+) -> None:
+    """Refuse what does not go together before anything is loaded."""
+    if huber is not None and objective != "least-squares":
+        raise InputError(f"--huber {huber:g} belongs to least-squares; leave out one of the two.")
+    for option, number in (("--starts", starts), ("--draws", draws)):
+        if number < 1:
+            raise InputError(f"{option} {number}: give 1 or more.")
+    if (next_robot is not None or narrow) and not next_:
+        raise InputError("--next-robot and --narrow belong to --next; give candidates with it.")
+    if next_robot is not None and next_robot not in given.robot:
+        raise InputError(
+            f"--next-robot {next_robot}: no robot of this fit is called so; there are "
+            f"{', '.join(given.robot)}."
+        )
+
+
+def _inputs(given: Given) -> list[Path]:
+    """The files that are read."""
+    data = [Path(file) for files in given.data.values() for file in files]
+    return data + [file for name in given.robot.values() for file in robot_files(name)]
+
+
+def _check_targets(
+    given: Given, inputs: list[Path], output: str | None, json: str | None, plot: str | None
+) -> None:
+    """Check where results go; no file that is read may be replaced."""
+    targets = {"--json": json, "--plot": plot}
+    if output is not None:
+        names = [f"{label}.toml" for label in given.robot]
+        files = check_folder(output, names, "--output", inputs=inputs)
+        targets |= {f"--output ({file.name})": str(file) for file in files}
+    check_distinct(targets)
+    if json is not None:
+        check_output(json, "--json", inputs=inputs)
+    if plot is not None:
+        check_picture(plot, "--plot", inputs=inputs, kinds=PAPER)
+
+
+def _check_sensor(names: list[str]) -> None:
+    """Tell a wrong name of a constant of the measurement, which is in no robot file."""
+    from notchflex.calibrate.rows import SENSOR
+
+    for name in names:
+        path = name.rpartition(":")[2]
+        if path.startswith("sensor.") and path not in SENSOR:
+            raise InputError(f"--fit {name}: there are {' and '.join(SENSOR)}.")
+
+
+def _objective(name: str, huber: float | None) -> FitObjective:
+    from notchflex.calibrate import LeastSquares, SumOfDistances, SumOfRobotErrors
+
+    if name == "robot-errors":
+        return SumOfRobotErrors()
+    return SumOfDistances() if name == "distances" else LeastSquares(huber)
+
+
+def _write(
+    found: Calibration,
+    left: LeftOut | None,
+    told: NextMeasurement | None,
+    drawn: Posterior | None,
+    inputs: list[Path],
+    *,
+    output: str | None,
+    json: str | None,
+    plot: str | None,
+) -> None:
+    from notchflex.calibrate import documents
+
+    if output is not None:
+        from notchflex.calibrate.fitted_robots import write_fitted
+
+        files = write_fitted(found, output, inputs=inputs)
+        terminal.note(f"written: {', '.join(map(str, files))}.")
+    if json is not None:
+        from notchflex.results.json import write_json
+
+        document = documents.calibration_document(found)
+        if left is not None:
+            document["left_out"] = documents.left_out_document(left)
+        if told is not None:
+            document["next_measurement"] = documents.next_measurement_document(told)
+        if drawn is not None:
+            document["posterior"] = documents.posterior_document(drawn)
+        write_json(json, document)
+    if plot is not None:
+        with terminal.working(f"drawing {plot}"):
+            from notchflex.plot import calibration_figure, save
+
+            save(calibration_figure(found), plot)
+
+
+def _print(
+    found: Calibration,
+    left: LeftOut | None,
+    told: NextMeasurement | None,
+    drawn: Posterior | None,
+) -> None:
+    from notchflex.cli import calibrate_tables as tables
+
+    tables.print_calibration(found)
+    if left is not None:
+        tables.print_left_out(left)
+    if told is not None:
+        tables.print_next(told)
+    if drawn is not None:
+        tables.print_posterior(drawn)
+
+
+def _say_what_matters(found: Calibration, robots: dict[str, Robot]) -> int:
+    from notchflex.cli.app import DONE, NOT_CONVERGED
+
+    for sample in found.problem.samples.every:
+        measured = sample.measured
+        if measured.ignored:
+            terminal.note(f"ignored columns of {measured.source}: {', '.join(measured.ignored)}.")
+        if measured.negative_forces:
+            count = measured.negative_forces
+            terminal.note(
+                f"{measured.source}: {count} measured force{'s are' if count > 1 else ' is'} "
+                "negative (sensor offset); the model is given 0 N."
+            )
+    if found.converged:
+        return DONE
+    terminal.error(f"not converged: {found.reason}. Try --starts or --bounds.")
+    return NOT_CONVERGED

@@ -1,0 +1,37 @@
+"""From the loads that a person gives to what the solver demands."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+from jaxtyping import Array
+
+from notchflex._jax import constant
+from notchflex.chain import Chain
+from notchflex.robot import Robot
+from notchflex.statics.actuation import Command
+from notchflex.statics.applied import applied, in_frame
+from notchflex.statics.load import LoadPath
+
+
+def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
+    """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
+    by_stroke = ~np.isnan(load.stroke)
+    value = np.where(by_stroke, load.stroke, np.nan_to_num(load.tension))
+    others = None
+    if chain.loaded:
+        others = applied(
+            load,
+            robot,
+            np.asarray(chain.body_mass),
+            np.asarray(chain.body_centre),
+            np.asarray(chain.body_length),
+        )
+        if chain.frame is not None:
+            others = in_frame(others, chain.frame)
+    drawn = cast("Array", by_stroke) if by_stroke.any() else None
+    return Command(constant(value), drawn, others)
+
+
+__all__ = ["command"]

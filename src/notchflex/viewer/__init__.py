@@ -1,0 +1,38 @@
+"""A robot in the browser, with sliders for its loads (`pip install 'notchflex[viewer]'`).
+
+The model of the viewer (`Session`, `Way`, `Controls`) and its checks need no browser and none of
+the libraries of the extra; `Viewer` needs them.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from notchflex.viewer.address import HOST, PORT, check_host, check_installed, exposed
+
+if TYPE_CHECKING:
+    from notchflex.viewer.controls import Controls
+    from notchflex.viewer.session import Session
+    from notchflex.viewer.viewer import Viewer
+    from notchflex.viewer.way import Way
+
+__all__ = [
+    "HOST",
+    "PORT",
+    "Controls",
+    "Session",
+    "Viewer",
+    "Way",
+    "check_host",
+    "check_installed",
+    "exposed",
+]
+
+_HOME = {"Controls": "controls", "Session": "session", "Viewer": "viewer", "Way": "way"}
+
+
+def __getattr__(name: str) -> Any:
+    """Load what computes on first use: the command line only checks whether it could."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

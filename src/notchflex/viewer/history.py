@@ -1,0 +1,46 @@
+"""What has been done to the robot so far, and what came of it: the loop that a plot shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from notchflex.statics import Equilibrium
+from notchflex.viewer.controls import Controls
+
+
+@dataclass
+class History:
+    """Solved steps in order; each is one entry of every list.
+
+    Attributes:
+        controls: What was set.
+        tension: Tension of every tendon at the base, N, (t,).
+        stroke: Tendon drawn out at the base, mm, (t,).
+        total_angle: Bending angle of the whole robot, rad.
+    """
+
+    controls: list[Controls] = field(default_factory=list[Controls])
+    tension: list[np.ndarray] = field(default_factory=list[np.ndarray])
+    stroke: list[np.ndarray] = field(default_factory=list[np.ndarray])
+    total_angle: list[float] = field(default_factory=list[float])
+
+    def __len__(self) -> int:
+        """Number of steps."""
+        return len(self.controls)
+
+    def add(self, controls: Controls, state: Equilibrium) -> None:
+        """Take up a solved step."""
+        self.controls.append(controls)
+        self.tension.append(np.asarray(state.tension, float))
+        self.stroke.append(np.asarray(state.stroke, float))
+        self.total_angle.append(float(state.total_angle))
+
+    def loop(self, tendon: int) -> tuple[np.ndarray, np.ndarray]:
+        """Tension of a tendon (from 0), N, and total angle, rad, step by step."""
+        tension = [values[tendon] for values in self.tension if tendon < len(values)]
+        return np.array(tension), np.array(self.total_angle[: len(tension)])
+
+
+__all__ = ["History"]

@@ -1,0 +1,93 @@
+"""How far sliders go: far enough to bend a robot well, in round numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from notchflex.robot import Robot
+from notchflex.statics import Load, solve
+
+# Tensions from 1/64 N on are tried, each twice the one before, until the robot is well bent; a
+# slider goes half as far again.
+FIRST, MOST = 2.0**-6, 2.0**12
+WELL_BENT = math.radians(60.0)
+ROOM = 1.5
+# A force across a robot bends it as much as its tendon with a small part of the tension, because
+# its lever is the length of the robot and not its radius.
+FORCE_PART = 0.05
+GRAVITY = 9.81e-3  # N/g
+STRIDES = 60
+"""Steps from one end of a slider to the other."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Ends of the sliders of a robot of t tendons; those of forces go as far both ways.
+
+    Attributes:
+        tension: Of each tendon, N, (t,).
+        stroke: Of each tendon, mm, (t,).
+        force: At the tip, N.
+        mass: At the tip, g.
+    """
+
+    tension: tuple[float, ...]
+    stroke: tuple[float, ...]
+    force: float
+    mass: float
+
+    def stride(self, by_stroke: list[bool]) -> np.ndarray:
+        """Largest step of each number of `Controls`."""
+        pairs = zip(by_stroke, self.stroke, self.tension, strict=True)
+        tendons = [stroke if drawn else tension for drawn, stroke, tension in pairs]
+        return np.array([*tendons, *[2.0 * self.force] * 3, self.mass]) / STRIDES
+
+
+def reach_of(robot: Robot) -> Reach:
+    """Find out how far the sliders of a robot should go, by pulling each of its tendons."""
+    ends = [_pulled(robot, tendon) for tendon in range(robot.number_of_tendons)]
+    tension, stroke = zip(*ends, strict=True)
+    force = round_up(FORCE_PART * max(tension))
+    return Reach(tension, stroke, force, round_up(force / GRAVITY))
+
+
+def round_up(value: float) -> float:
+    """The next number above that is 1, 1.5, 2, 3, 4, 5, 6 or 8 times a power of ten.
+
+    Example:
+        >>> [round_up(value) for value in (0.031, 2.0, 9.0)]
+        [0.04, 2.0, 10.0]
+    """
+    power = 10.0 ** math.floor(math.log10(value))
+    for factor in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0):
+        if factor * power >= value * (1.0 - 1e-9):
+            return float(f"{factor * power:.12g}")
+    return float(f"{10.0 * power:.12g}")
+
+
+def _pulled(robot: Robot, tendon: int) -> tuple[float, float]:
+    """Tension and stroke at the ends of the sliders of a tendon."""
+    tension, drawn = FIRST, 0.0
+    while tension <= MOST:
+        state = solve(robot, Load(tension=[None] * tendon + [tension]))
+        if not state.converged:
+            tension *= 0.5 if drawn > 0.0 else 1.0
+            break
+        drawn = float(state.stroke[tendon])
+        if np.abs(state.notch_angle).sum() >= WELL_BENT or _closed(state.closed, state.gap):
+            break
+        tension *= 2.0
+    tension = round_up(ROOM * min(tension, MOST))
+    return tension, round_up(ROOM * max(drawn, 1e-3))
+
+
+def _closed(closed: np.ndarray, gap: np.ndarray) -> bool:
+    """Whether every notch that can close has closed: more tension hardly bends it further."""
+    can = np.isfinite(gap)
+    return bool(can.any() and closed[can].all())
+
+
+__all__ = ["STRIDES", "Reach", "reach_of", "round_up"]

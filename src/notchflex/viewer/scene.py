@@ -1,0 +1,295 @@
+"""The robot in the browser's space: solids that were sent once and are moved from then on.
+
+Everything hangs on one node that is turned as the tube points; below it all is in the frame of the
+base, in mm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plot.acting import Acting, acting_at
+from notchflex.plot.bent import HELD, Bent, bent_at
+from notchflex.robot import Robot
+from notchflex.statics import Path
+from notchflex.viewer.colours import CLOSED, LOAD, METAL, TENDON, of_contacts, of_strain, rgb
+from notchflex.viewer.controls import POINTING, Controls
+from notchflex.viewer.reach import GRAVITY, Reach, round_up
+from notchflex.viewer.skins import PIECES, Skin, at_rest, skins
+from notchflex.viewer.solids import body_solids
+
+if TYPE_CHECKING:
+    import viser
+
+# As parts of the outer radius of the tube.
+_TENDON, _CONTACT, _LIPS, _FRAME = 0.09, 0.22, 0.15, 2.2
+# As parts of the length of the robot.
+_ARROW, _SHORTEST = 0.35, 0.06
+_SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
+SEE_THROUGH = 0.35
+# Where lamps stand, and how bright they are.
+_LIGHTS = (((0.6, -1.0, 0.8), 1.6), ((-1.0, -0.3, 0.5), 0.7), ((0.3, 1.0, 0.4), 0.7))
+ROOT = "/robot"
+
+
+@dataclass
+class Shown:
+    """What a person wants to see."""
+
+    tendons: bool = True
+    contacts: bool = True
+    frames: bool = True
+    loads: bool = True
+    see_through: bool = False
+
+
+class Scene:
+    """A robot in the scene of a viser server.
+
+    Args:
+        server: The server; what its scene holds under `/robot` is replaced.
+        robot: The robot.
+        reach: How far its sliders go, for the length of arrows.
+        shown: What is shown.
+    """
+
+    def __init__(self, server: viser.ViserServer, robot: Robot, reach: Reach, shown: Shown) -> None:
+        """Send the solids."""
+        self.server, self.robot, self.reach, self.shown = server, robot, reach, shown
+        self.rest = at_rest(robot)
+        self.length = float(np.linalg.norm(np.diff(self.rest.position, axis=0), axis=1).sum())
+        self.length += float(self.rest.body_length[-1])
+        with server.atomic():
+            self._build()
+
+    def _build(self) -> None:
+        """Add every node once."""
+        scene, rest = self.server.scene, self.rest
+        # Without the picture of a room around it: a browser without a graphics card needs half a
+        # minute to take that in, and shadows cost it more than all the rest.
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_hemisphere(
+            "/lights/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.2
+        )
+        for number, (place, intensity) in enumerate(_LIGHTS):
+            scene.add_light_directional(
+                f"/lights/lamp_{number}", intensity=intensity, position=place
+            )
+        outer = self.robot.tube.outer_radius
+        self._root = scene.add_frame(ROOT, show_axes=False)
+        self._bodies = [
+            _solid(scene, f"{ROOT}/body_{number}", mesh.vertices, mesh.faces)
+            for number, mesh in enumerate(body_solids(rest))
+        ]
+        self._skins: list[Skin] = skins(rest)
+        self._skins_of: dict[str, list[Skin]] = {}
+        self._flexures = [
+            scene.add_mesh_simple(
+                f"{ROOT}/flexure_{number + 1}",
+                skin.at(sections),
+                skin.faces,
+                color=METAL,
+                flat_shading=True,
+            )
+            for number, (skin, sections) in enumerate(zip(self._skins, rest.flexures, strict=True))
+        ]
+        self._see_through = False
+        self._colours: list[Any] = [METAL] * len(self._flexures)
+        self._closed = [
+            scene.add_icosphere(f"{ROOT}/closed_{number + 1}", _LIPS * outer, color=CLOSED)
+            for number in range(len(self._flexures))
+        ]
+        self._tendons = [
+            scene.add_line_segments(
+                f"{ROOT}/tendon_{number + 1}",
+                _segments(rest.tendon(number)),
+                TENDON,
+                thickness=_TENDON * outer,
+            )
+            for number in range(self.robot.number_of_tendons)
+        ]
+        self._contacts = [
+            scene.add_point_cloud(
+                f"{ROOT}/contacts_{number + 1}",
+                rest.contacts(number).astype(np.float32),
+                TENDON,
+                point_size=_CONTACT * outer,
+                point_shape="circle",
+                precision="float32",
+            )
+            for number in range(self.robot.number_of_tendons)
+        ]
+        long, thin = _FRAME * outer, 0.05 * outer
+        self._base_frame = scene.add_frame(f"{ROOT}/base", axes_length=long, axes_radius=thin)
+        self._tip_frame = scene.add_frame(f"{ROOT}/tip", axes_length=long, axes_radius=thin)
+        self._arrows = scene.add_arrows(
+            f"{ROOT}/loads",
+            np.zeros((1, 2, 3)),
+            np.array([LOAD["force"]]),
+            shaft_radius=0.12 * outer,
+            head_radius=0.32 * outer,
+            head_length=0.8 * outer,
+            visible=False,
+        )
+        self._labels = [
+            scene.add_label(f"{ROOT}/load_{number}", "", visible=False, anchor="bottom-center")
+            for number in range(2)
+        ]
+        self._grid_cell = round_up(0.05 * self.length)
+        self._grid = scene.add_grid(
+            "/grid",
+            width=3.0 * self.length,
+            height=3.0 * self.length,
+            cell_size=self._grid_cell,
+            section_size=5.0 * self._grid_cell,
+            shadow_opacity=0.0,
+        )
+
+    @property
+    def grid_cell(self) -> float:
+        """Width of a cell of the grid on the floor, mm."""
+        return self._grid_cell
+
+    def update(self, path: Path, controls: Controls) -> Bent:
+        """Move everything to a new state.
+
+        Args:
+            path: The state, as a path of one step.
+            controls: What was set.
+
+        Returns:
+            The robot in that state.
+        """
+        shape = bent_at(path, 0, PIECES)
+        with self.server.atomic():
+            self._turn(controls.pointing)
+            self._dress(path, shape)
+            self._move(shape)
+            self._paint(path)
+            self._move_tendons(path, shape)
+            self._move_loads(path, shape)
+            self._base_frame.visible = self._tip_frame.visible = self.shown.frames
+        return shape
+
+    def _turn(self, pointing: str) -> None:
+        turn = _matrix(np.array(POINTING[pointing]))
+        self._root.wxyz = _quaternions(turn[None])[0]
+        outer = self.robot.tube.outer_radius
+        lowest = {"up": HELD * outer, "sideways": 0.35 * self.length, "down": 1.1 * self.length}
+        self._grid.position = (0.0, 0.0, -lowest[pointing])
+
+    def _dress(self, path: Path, shape: Bent) -> None:
+        """Take other triangles for the flexures where other loads ask for more sections of them."""
+        if len(self._skins[0].across.T) == len(shape.flexures[0].area):
+            return
+        level = path.chain.level
+        if level not in self._skins_of:
+            self._skins_of[level] = skins(at_rest(self.robot, level))
+        self._skins = self._skins_of[level]
+        for node, skin, sections in zip(self._flexures, self._skins, shape.flexures, strict=True):
+            corners = skin.at(sections).astype(np.float32)
+            more = len(corners) > len(node.vertices)
+            # Never a triangle without its corners, not even between two messages.
+            if more:
+                node.vertices = corners
+            node.faces = skin.faces.astype(np.uint32)
+            if not more:
+                node.vertices = corners
+
+    def _move(self, shape: Bent) -> None:
+        turned = _quaternions(shape.rotation)
+        for node, place, turn in zip(self._bodies, shape.position, turned, strict=True):
+            node.position, node.wxyz = place, turn
+        if self._see_through != self.shown.see_through:
+            self._see_through = self.shown.see_through
+            for node in self._bodies:
+                node.opacity = SEE_THROUGH if self._see_through else None
+        self._tip_frame.position, self._tip_frame.wxyz = shape.tip, turned[-1]
+        for node, skin, sections in zip(self._flexures, self._skins, shape.flexures, strict=True):
+            node.vertices = skin.at(sections).astype(np.float32)
+
+    def _paint(self, path: Path) -> None:
+        allowed = self.robot.material.allowed_strain
+        for number, strain in enumerate(path.peak_strain[0]):
+            colour = of_strain(None if allowed is None else float(strain) / allowed)
+            if colour != self._colours[number]:
+                self._flexures[number].color = self._colours[number] = colour
+
+    def _move_tendons(self, path: Path, shape: Bent) -> None:
+        for number, (line, dots) in enumerate(zip(self._tendons, self._contacts, strict=True)):
+            line.visible, dots.visible = self.shown.tendons, self.shown.contacts
+            if self.shown.tendons:
+                line.points = _segments(shape.tendon(number)).astype(np.float32)
+            if self.shown.contacts:
+                points = shape.contacts(number)
+                dots.points = points.astype(np.float32)
+                codes = of_contacts(path[0], number)
+                dots.colors = np.array([rgb(code) for code in codes], np.uint8)
+        for number, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
+            ball.visible = bool(closed)
+            if closed:
+                ball.position = shape.lips(number)
+
+    def _move_loads(self, path: Path, shape: Bent) -> None:
+        loads = acting_at(path, 0, shape) if self.shown.loads else []
+        self._arrows.visible = bool(loads)
+        for label in self._labels[len(loads) :]:
+            label.visible = False
+        if not loads:
+            return
+        ends = np.stack([np.stack([one.point, one.point + self._arrow(one)]) for one in loads])
+        self._arrows.colors = np.array([LOAD[one.name] for one in loads], np.uint8)
+        self._arrows.points = ends.astype(np.float32)
+        for label, one, (_, end) in zip(self._labels, loads, ends, strict=False):
+            label.text, label.position, label.visible = one.label, end, True
+
+    def _arrow(self, one: Acting) -> NDArray[np.float64]:
+        most = max(self.reach.force, GRAVITY * self.reach.mass)
+        size = max(one.size / most, _SHORTEST / _ARROW) * _ARROW * self.length
+        return size * one.vector / one.size
+
+    def look(self, pointing: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where a camera should stand, and where it should look to, mm in the world."""
+        turn = _matrix(np.array(POINTING[pointing]))
+        middle = self.length * (turn @ np.array([0.2, 0.0, 0.42]))
+        return middle + self.length * np.array([0.45, -1.5, 0.5]), middle
+
+    def remove(self) -> None:
+        """Take everything away again."""
+        self._root.remove()
+        self._grid.remove()
+
+
+def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
+    """A solid with its sharp edges sharp and its round faces round."""
+    import trimesh
+
+    whole = trimesh.Trimesh(vertices, faces, process=False)
+    shaded = trimesh.graph.smooth_shade(whole, angle=_SMOOTH)
+    return scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
+
+
+def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points in a row as the straight pieces between them, (pieces, 2, 3)."""
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def _matrix(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    from notchflex.plot.twist import rotation_of
+
+    return rotation_of(vector)
+
+
+def _quaternions(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations as (w, x, y, z)."""
+    import viser.transforms as transforms
+
+    return np.asarray(transforms.SO3.from_matrix(rotation).wxyz, np.float64)
+
+
+__all__ = ["Scene", "Shown"]

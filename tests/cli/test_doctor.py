@@ -1,0 +1,113 @@
+"""`notchflex doctor` and `completion`."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from notchflex import _canary
+from notchflex.cli import run
+from notchflex.cli.doctor import folder_size, requirements
+
+
+@pytest.fixture
+def call(capsys):
+    def runner(*arguments):
+        code = run(list(arguments))
+        return (code, *capsys.readouterr())
+
+    return runner
+
+
+def test_healthy_installation(call):
+    code, out, err = call("doctor", "--json", "-")
+    found = json.loads(out)
+    assert code == 0
+    assert err == ""
+    assert found["healthy"] is True
+    assert found["device"]["x64"] is True
+    assert found["canary"] == {"expected": 268_435_456.0, "computed": 268_435_456.0}
+    assert {"jax", "jaxlib", "numpy", "cyclopts"} <= found["packages"].keys()
+    assert all(found["packages"].values())
+    assert "matplotlib" in found["extras"]["plot"]["packages"]
+
+
+def test_table_has_what_is_asked_and_fits(call):
+    code, out, _ = call("doctor")
+    assert code == 0
+    for words in ("python", "jaxlib", "known sum", "right", "compiled code", "plot"):
+        assert words in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_wrong_sums_end_with_code_1(call, monkeypatch):
+    wrong = _canary.Canary(268_435_456.0, 266_342_400.0)
+    monkeypatch.setattr(_canary, "canary", lambda: wrong)
+    code, out, err = call("doctor")
+    assert code == 1
+    assert "WRONG" in out
+    assert "a sum that is 268435456 came out as 266342400" in err
+    assert call("doctor", "--quiet")[:2] == (1, "")
+
+
+def test_missing_extras_are_told_with_their_command(call, monkeypatch):
+    lines = ["numpy", "nothing-like-it>=2; extra == 'data'", "notchflex[data]; extra == 'all'"]
+    monkeypatch.setattr("importlib.metadata.requires", lambda name: lines)
+    out = " ".join(call("doctor")[1].split())
+    assert "nothing-like-it missing: pip install 'notchflex[data]'" in out
+    found = json.loads(call("doctor", "--json", "-")[1])
+    assert found["extras"]["data"]["installed"] is False
+    assert list(found["extras"]) == ["data"]
+
+
+def test_requirements_of_this_wheel():
+    found = requirements()
+    assert "jax" in found[""]
+    assert "matplotlib" in found["plot"]
+    assert "ruff" not in found[""]
+
+
+def test_size_of_a_folder(tmp_path):
+    assert folder_size(tmp_path / "none") == 0
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "b").write_bytes(b"123")
+    assert folder_size(tmp_path) == 3
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_knows_verbs_and_options(call, shell):
+    code, out, _ = call("completion", shell)
+    assert code == 0
+    for word in ("simulate", "doctor", "tension", "beside"):
+        assert word in out
+
+
+def test_completion_in_a_real_bash(call, tmp_path):
+    script = tmp_path / "complete.sh"
+    script.write_text(call("completion", "bash")[1])
+    line = (
+        f"source {script}; COMP_WORDS=(notchflex sim); COMP_CWORD=1; _notchflex; "
+        'echo "${COMPREPLY[@]}"; COMP_WORDS=(notchflex simulate --tens); COMP_CWORD=2; '
+        '_notchflex; echo "${COMPREPLY[@]}"; complete -p notchflex'
+    )
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True)
+    first, second, how = done.stdout.splitlines()
+    assert (first.strip(), second.strip()) == ("simulate", "--tension")
+    assert "-o default" in how  # robots and data are files
+
+
+def test_completion_is_installed_for_this_user(call, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    code, out, _ = call("completion", "bash", "--install")
+    assert code == 0
+    written = Path(out.split("Written: ")[1].split(". It works")[0])
+    assert tmp_path in written.parents
+    assert "complete -o default" in written.read_text(encoding="utf-8")
+    assert str(written) in (tmp_path / ".bashrc").read_text()
+
+
+def test_other_shells_are_refused(call):
+    code, _, err = call("completion", "tcsh")
+    assert code == 2
+    assert "Choose from" in err

@@ -1,0 +1,164 @@
+"""What is written where: progress on a terminal only, quiet, colours, tables of 80 columns."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+
+import pytest
+
+import notchflex as nf
+from notchflex.cli import run
+
+PULL = ("simulate", "pacheco2021-a", "--tension", "0:3:4")
+BESIDE = (*PULL, "--beside", "slick: friction.coefficient=0", "--beside", "Y: york2015")
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def runner(*arguments):
+        code = run(list(arguments))
+        return (code, *capsys.readouterr())
+
+    return runner
+
+
+def on_a_terminal(*arguments, **variables):
+    """Run the command with standard output and error on a terminal; return what it shows."""
+    own, its = pty.openpty()
+    environment = {key: value for key, value in os.environ.items() if key != "NO_COLOR"}
+    with subprocess.Popen(
+        [sys.executable, "-m", "notchflex", *arguments],
+        stdin=subprocess.DEVNULL, stdout=its, stderr=its,
+        env=environment | {"TERM": "xterm-256color", "COLUMNS": "80"} | variables,
+    ) as process:  # fmt: skip
+        os.close(its)
+        shown = b""
+        try:
+            while part := os.read(own, 65536):
+                shown += part
+        except OSError:  # the other end was closed
+            pass
+        assert process.wait(timeout=120) == 0
+    os.close(own)
+    return shown.decode()
+
+
+def test_colours_on_a_terminal_only_and_not_where_unwanted():
+    assert "\x1b[1m" in on_a_terminal("robots")
+    for variables in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
+        assert "\x1b[36m" not in on_a_terminal("robots", **variables)
+
+
+def test_progress_is_shown_on_a_terminal_and_taken_away():
+    shown = on_a_terminal(*PULL)
+    assert "solving 4 steps" in shown
+    assert "solving 4 steps" not in on_a_terminal(*PULL, "--quiet")
+
+
+def test_nothing_but_the_table_in_a_pipe(call):
+    code, out, err = call(*PULL)
+    assert code == 0
+    assert "\x1b" not in out + err
+    assert "solving" not in out + err
+    assert "153.14" in out
+
+
+def test_quiet_keeps_warnings_errors_and_documents(call):
+    code, out, err = call(*PULL, "--quiet", "--csv", "a.csv")
+    assert (code, out) == (0, "")
+    assert "Warning: the peak strain passes" in err
+    assert json.loads(call(*PULL, "--quiet", "--json", "-")[1])["converged"] is True
+    code, out, err = call("simulate", "pacheco2021-a", "--stroke", "9", "--quiet")
+    assert (code, out) == (1, "")
+    assert "Error: not converged" in err
+    assert call("show", "pacheco2021-a", "--quiet") == (0, "", "")
+    assert call("robots")[1]  # the next call is not quiet
+
+
+@pytest.mark.parametrize("robot", ["pacheco2021-a", "gao2017", "two-axis-wrist", "liu2022"])
+def test_tables_fit_80_columns(call, robot):
+    out = call("show", robot)[1]
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_comparison_of_many_notches_fits_80_columns(call, tmp_path):
+    code, out, _ = call("simulate", "gao2017", "--tension", "1=1,2", "--csv", "g.csv")
+    assert code == 0
+    assert max(map(len, out.splitlines())) <= 80
+    code, out, _ = call("compare", "gao2017", "g.csv")
+    assert code == 0
+    assert max(map(len, out.splitlines())) <= 80
+    for notch in range(1, 28):
+        assert f"n{notch} " in out.replace("\n", " ")
+
+
+def test_robots_beside_each_other(call, tmp_path):
+    files = ("--json", "b.json", "--plot", "b.html", "--csv", "b.csv")
+    code, out, err = call(*BESIDE, *files)
+    assert code == 0
+    head = next(line for line in out.splitlines() if "slick" in line)
+    assert head.split() == ["step", "pacheco2021-a", "slick", "Y"]
+    assert "slick: the peak strain" in err
+    document = json.loads((tmp_path / "b.json").read_text())
+    assert list(document["beside"]) == ["slick", "Y"]
+    wrist = nf.load_robot("pacheco2021-a").with_value("friction.coefficient", 0.0)
+    wanted = nf.simulate(wrist, nf.pull(0.0, 3.0, steps=4)).total_angle[1]
+    found = document["beside"]["slick"]["steps"][1]["total_angle_deg"]
+    assert found == pytest.approx(wanted * 57.29577951308232)
+    assert "slick" in (tmp_path / "b.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["slick"], "neither a ready robot"),
+        (["a: friction.nothing=0"], "nothing"),
+        (["=1"], 'or "LABEL: PATH=VALUE'),
+        (["pacheco2021-a"], "already a robot called pacheco2021-a"),
+        (["a: york2015", "a: pacheco2021-b"], "already a robot called a"),
+        (["1: york2015", "2: york2015", "3: york2015", "4: york2015", "5: york2015"], "at most"),
+    ],
+)
+def test_what_cannot_stand_beside_is_told(call, given, words):
+    beside = [part for text in given for part in ("--beside", text)]
+    code, out, err = call(*PULL, *beside)
+    assert (code, out) == (2, "")
+    assert words in err
+
+
+def test_a_robot_with_fewer_tendons_cannot_be_pulled_alike(call):
+    pull = ("simulate", "two-axis-wrist", "--tension", "2=1", "--beside", "york2015")
+    code, _, err = call(*pull)
+    assert code == 2
+    assert "the robot has 1" in err
+
+
+def test_every_kind_of_file(call, tmp_path):
+    files = ("--nc", "a.nc", "--parquet", "a.parquet", "--json", "a.json", "--plot", "a.gif")
+    assert call(*PULL, *files)[0] == 0
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 3.0, steps=4))
+    for name in ("a.nc", "a.parquet", "a.json"):
+        assert (nf.read_path(tmp_path / name).notch_angle == path.notch_angle).all()
+    assert (tmp_path / "a.gif").read_bytes().startswith(b"GIF89a")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--nc", "-"), "this is no text"),
+        (("--parquet", "-"), "this is no text"),
+        (("--nc", "missing/a.nc"), "does not exist"),
+        (("--plot", "a.jpg"), ".png, .svg, .pdf, .html or .gif"),
+        (("--plot", "a.gif", "--beside", "york2015"), ".pdf or .html"),
+        (("--nc", "a", "--parquet", "a"), "both write to a"),
+    ],
+)
+def test_files_that_cannot_be_written_are_told_first(call, options, words, tmp_path):
+    code, out, err = call(*PULL, *options)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,151 @@
+"""The pages of the documentation: what they show is what comes out, and they hang together."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import notchflex as nf
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
+BY_THEMSELVES = ["calibrate.md", "examples.md"]  # run by tests of their own
+RUN = [name for name in PAGES if "/" not in name and name not in BY_THEMSELVES]
+
+
+@pytest.fixture
+def make(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Import one of the scripts that make the pages."""
+    before = set(sys.modules)
+    for folder in ("make", "papers"):
+        monkeypatch.syspath_prepend(str(DOCS / folder))
+    yield importlib.import_module
+    for name in set(sys.modules) - before:
+        file = getattr(sys.modules[name], "__file__", None)
+        if file is not None and Path(file).is_relative_to(DOCS):
+            del sys.modules[name]
+
+
+@pytest.mark.parametrize("page", RUN)
+def test_blocks_print_what_the_page_shows(page: str, make: Any):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    assert make("run_pages").with_output(text) == text, f"run docs/make/run_pages.py {page}"
+
+
+def test_every_page_with_code_is_run():
+    for name in set(PAGES) - set(RUN) - set(BY_THEMSELVES):
+        assert "```python" not in (DOCS / name).read_text(encoding="utf-8"), name
+
+
+@pytest.mark.parametrize(
+    ("script", "page"), [("robot_file", "robot_file.md"), ("quantities", "units_and_frames.md")]
+)
+def test_tables_are_those_of_the_code(script: str, page: str, make: Any):
+    on_page = make("page").marked(f"../{page}")
+    assert on_page == {name: [text] for name, text in make(script).tables().items()}
+
+
+def test_robot_of_the_page_is_read():
+    text = (DOCS / "robot_file.md").read_text(encoding="utf-8")
+    (toml,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert nf.robot.robot_from_text(toml).number_of_notches == 5
+
+
+def test_validation_page(make: Any):
+    """Its quick parts; the comparisons themselves are tests/validation."""
+    on_page = make("page").marked("../validation.md")
+    for part in ("sections", "finite_elements"):
+        for name, text in make(f"against_{part}").tables().items():
+            assert on_page[name] == [text], f"run docs/make/validation.py {part}"
+    paper = make("page").marked("pacheco2021.md")
+    for name in ("table4", "tips"):
+        assert on_page[name] == paper[name], "run docs/make/validation.py measured"
+    assert all(text.strip() for texts in on_page.values() for text in texts)
+
+
+def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any, monkeypatch: pytest.MonkeyPatch):
+    figures = make("figures")
+    monkeypatch.setattr(figures, "IMAGES", tmp_path)
+    figures.main()
+    make("against_finite_elements").pictures(tmp_path)
+    drawn = {file.name for file in tmp_path.iterdir()}
+    assert drawn == {"chain.svg", "memory.svg", "closing.svg", "cuts.svg", "finite_elements.svg"}
+    # A picture that changes in more than what a drawing program does has other text.
+    for name in drawn - {"finite_elements.svg"}:
+        texts = [
+            re.findall(r"<text[^>]*>([^<]*)</text>", (folder / name).read_text(encoding="utf-8"))
+            for folder in (tmp_path, DOCS / "images")
+        ]
+        assert texts[0] == texts[1], f"run docs/make/figures.py: {name}"
+        assert texts[0]
+
+
+def test_differences_are_those_of_arrays(make: Any):
+    differences = make("differences")
+    row = differences.difference("it", [1.0, 2.5], [1.0, 2.0], "mm")
+    assert row == ("it", 2, 0.5, "mm")
+    assert differences.difference("it", [1.0, 2.5], [1.0, 2.0], "").worst == 0.25
+    both = differences.joined([row, differences.difference("it", [1.0], [0.0], "mm")])
+    assert both == [("it", 3, 1.0, "mm")]
+
+
+def nav_files(entries: list[Any]) -> list[str]:
+    files: list[str] = []
+    for entry in entries:
+        for value in entry.values():
+            files += [value] if isinstance(value, str) else nav_files(value)
+    return files
+
+
+def test_every_page_is_in_the_navigation_once():
+    settings = tomllib.loads((ROOT / "zensical.toml").read_text(encoding="utf-8"))["project"]
+    assert sorted(nav_files(settings["nav"])) == PAGES
+    assert settings["theme"]["font"] is False
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: str):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)]+)\)", text):
+        assert "://" not in target, "a page that needs the network"
+        file, _, anchor = target.partition("#")
+        found = (DOCS / page).parent / file if file else DOCS / page
+        assert found.is_file(), target
+        if anchor:
+            heads = re.findall(r"(?m)^#+ (.*)$", found.read_text(encoding="utf-8"))
+            slugs = [re.sub(r"[^a-z0-9]+", "-", head.lower()).strip("-") for head in heads]
+            assert anchor in slugs, target
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_marks_break_no_paragraph(page: str):
+    """A line that begins with a mark and goes on is taken as HTML, and ends its paragraph."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    assert not re.findall(r"(?m)^\s*<!-- [\w.]+ -->[^<\n].*", text)
+
+
+def test_reference_has_every_public_name():
+    text = (DOCS / "reference.md").read_text(encoding="utf-8")
+    told = re.findall(r"(?m)^::: notchflex\.(\w+)$", text)
+    assert sorted(told) == sorted(set(nf.__all__) - {"__version__"})
+
+
+def test_checked_site_fetches_nothing(tmp_path: Path, make: Any):
+    check = make("check_site")
+    good = '<link href="style.css"><a href="https://doi.org/x">paper</a><img src="a.svg">'
+    for number in range(15):
+        (tmp_path / f"{number}.html").write_text(good)
+    for name in ("style.css", "a.svg"):
+        (tmp_path / name).touch()
+    assert check.problems(tmp_path) == []
+    (tmp_path / "3.html").write_text('<script src="//cdn.net/x.js"></script><a href="gone.html">')
+    assert len(check.problems(tmp_path)) == 2

@@ -1,0 +1,208 @@
+"""Every example runs, and its number is that of an independent calculation.
+
+The oracles (tests/oracles) are scalar equations of Pacheco 2021 and matrix exponentials; they
+share no code with the package. All examples run in one process, for they share programs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import runpy
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from balance import left_over
+from oracles import frames
+from oracles.wrist import A, Wrist
+from reference_data import choose, reference
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = sorted((ROOT / "examples").glob("*.py"))
+ANGLE = 1e-8  # rad; what the tables and oracles are met to elsewhere
+
+
+@cache
+def ran(number: int) -> tuple[dict[str, Any], str]:
+    """Names that an example leaves, and what it prints."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        names = runpy.run_path(str(FILES[number - 1]))
+    return names, printed.getvalue()
+
+
+def test_there_are_ten_and_each_asks_a_question():
+    assert [file.name[:3] for file in FILES] == [f"{number:02d}_" for number in range(1, 11)]
+    for file in FILES:
+        text = file.read_text(encoding="utf-8")
+        assert re.match(r'"""[^"]*\?"""\n', text), f"{file.name} begins with no question"
+        assert 13 <= len(text.splitlines()) <= 50, file.name
+
+
+@pytest.mark.parametrize("number", range(1, 11))
+def test_page_shows_the_example_and_what_it_prints(number):
+    page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
+    _, printed = ran(number)
+    text = FILES[number - 1].read_text(encoding="utf-8")
+    question, code = re.match(r'"""(.*?)"""\n\n(.*)', text, re.DOTALL).groups()
+    part = f"## {question}\n\n`examples/{FILES[number - 1].name}`\n\n"
+    part += f"```python\n{code}```\n\n```text\n{printed}```\n"
+    assert part in page, "run docs/make/examples.py"
+
+
+def test_first_bend(margin):
+    path = ran(1)[0]["path"]
+    rows = choose(reference("pacheco_force_curves.csv"), cut=(0, 0), wrist=(1, 0))[::2]
+    margin.within("total angle", path.total_angle - np.radians(rows[:, 8]), ANGLE, "rad")
+    margin.within("tip", path.tip_position[:, [0, 2]] - rows[:, 9:11], 1e-7, "mm")
+
+
+def test_my_own_tube(margin):
+    names = ran(2)[0]
+    oracle = Wrist(
+        height=(0.9,) * 5,
+        uncut=(1.1,) * 5,
+        depth=(1.53,) * 5,
+        wrap="geometric",
+        cut="off-axis",
+        outer_diameter=1.80,
+        inner_diameter=1.50,
+    )
+    expected = [state.angle for state in oracle.march(names["path"].tension[:, 0])]
+    margin.within("notch angles", names["path"].notch_angle - expected, ANGLE, "rad")
+    angle = names["closing"].angle
+    margin.within("closing angle", angle - oracle.closing_angle, ANGLE, "rad")
+    # The fibres farthest from the neutral line: the cut's edge, and the spine's outer surface.
+    section = oracle.sections[0]
+    edge = oracle.depth[0] - oracle.outer_diameter / 2  # of a straight cut, beyond the axis
+    far = max(oracle.outer_diameter / 2 - section.centroid, section.centroid - edge)
+    strain = np.max(expected, axis=1) * far / 0.9
+    safe = names["last_safe"]
+    assert strain[safe] <= 0.08 < strain[safe + 1]
+
+
+def test_pull_and_release(margin):
+    names = ran(3)[0]
+    expected = np.sum([state.angle for state in A.march(names["path"].tension[:, 0])], axis=1)
+    margin.within("loop", names["path"].total_angle - expected, ANGLE, "rad")
+    width = np.degrees(expected[::-1] - expected)[:31]
+    assert names["widest"] == width.argmax()
+    margin.within("its width", names["width"].max() - width.max(), 1e-6, "deg")
+
+
+def test_closing_order(margin):
+    names = ran(4)[0]
+    oracle = A.with_(depth=names["depths"])
+    found = names["found"]
+    margin.within("angle", found.angle - oracle.closing_angle, ANGLE, "rad")
+
+    def left(tension: float, notch: int) -> float:
+        """Moment that the tendon has beyond what the notch carries when it is just closed."""
+        closed = oracle.closing_angle[notch]
+        gap_tension = tension * np.exp(-oracle.mu * ahead(tension, notch))
+        gap_tension *= np.exp(-oracle.mu * closed)
+        return gap_tension * oracle.arm[notch] - oracle.elastic_moment(notch, closed)
+
+    def ahead(tension: float, notch: int) -> float:
+        return float(oracle.pull(tension)[0][:notch].sum())
+
+    expected = [brentq(left, 0.5, 4.0, args=(notch,), xtol=1e-12) for notch in range(5)]
+    margin.within("tension", found.tension - expected, 1e-7, "N")
+    assert np.argsort(found.tension).tolist() == [4, 3, 2, 1, 0]
+
+
+def test_weight_at_the_tip(margin):
+    names = ran(5)[0]
+    path, grams = names["path"], np.array(names["weights"])
+    force, moment = left_over(path)
+    margin.within("force left over, of all that acts", force, 1e-10)
+    margin.within("moment left over, of all that acts", moment, 1e-10)
+    # Where the first notch begins: the tendon's lever and the weight's, about its neutral line.
+    # The weight's lever changes along the notch; the modes meet that to moment_error.
+    weight = 9.81e-3 * grams
+    by_hand = path.span_tension[:, 0, 1] * A.arm[0]
+    by_hand += weight * (path.tip_position[:, 0] + A.centroid[0])
+    error = path.notch_moment[:, 0] / by_hand - 1.0
+    margin.within("moment of the first notch", error, 2e-3)
+    margin.within("without weight", path.notch_angle[0] - A.pull(0.8)[0], ANGLE, "rad")
+    assert (np.diff(path.total_angle) > 0.0).all()
+
+
+def test_stroke_and_tension(margin):
+    path = ran(6)[0]["path"]
+    margin.within("stroke", A.stroke(path.notch_angle) - path.stroke[:, 0], 1e-9, "mm")
+    margin.within("stroke as given", path.stroke - path.load.stroke, 1e-9, "mm")
+    # The tensions found, given to the oracle in the same order, lead to the same angles.
+    expected = [state.angle for state in A.march(path.tension[:, 0])]
+    margin.within("angles", path.notch_angle - expected, 1e-7, "rad")
+
+
+def test_antagonist(margin):
+    names = ran(7)[0]
+    sides = np.radians([0.0, 180.0])
+    wrist = A.with_(height=(0.8,) * 6, uncut=(0.8,) * 6, depth=(1.36,) * 6, wrap="geometric")
+    oracle = frames.Robot(wrist, np.tile(sides, 3), frames.Tendons(np.full(2, 0.7), sides))
+    for other, state in zip(names["pretensions"], names["path"], strict=True):
+        angle, _ = oracle.equilibrium(np.array([1.0, other]))
+        margin.within(f"against {other} N", state.notch_angle - angle, 1e-9, "rad")
+        total = angle[0::2].sum() - angle[1::2].sum()
+        margin.within("total", state.total_angle - total, 1e-9, "rad")
+
+
+def test_two_axis_workspace(margin):
+    names = ran(8)[0]
+    quarters = np.radians([0.0, 90.0, 180.0, 270.0])
+    wrist = A.with_(height=(1.0,) * 8, uncut=(0.6,) * 8, depth=(1.30,) * 8, wrap="geometric")
+    oracle = frames.Robot(wrist, np.tile(quarters, 2), frames.Tendons(np.full(4, 0.7), quarters))
+    assert names["found"]["converged"].all()
+    base = np.array([0.0, 0.0, 0.6])  # uncut before the first notch
+    for row in (0, 13, 26, 33):
+        angle, gap_tension = oracle.equilibrium(np.array(names["loads"][row].tension))
+        expected = oracle.bodies(angle)[-1, :3, 3] + base
+        reach = np.hypot(*expected[:2])
+        # The oracle's notches bend toward their own side alone; those of the wrist give a little
+        # sideways too, which is 4 % of the way and here added to first order.
+        error = names["tip"][row] - expected - given_sideways(oracle, angle, gap_tension)
+        margin.within("tip, of its way aside", np.linalg.norm(error) / reach, 0.004)
+
+
+def given_sideways(robot: frames.Robot, angle: np.ndarray, gap_tension: np.ndarray) -> np.ndarray:
+    """What tendons beside the plane of bending add to the tip [mm], linear and to first order."""
+    wrist, bodies = robot.wrist, robot.bodies(angle)
+    ro, ri = wrist.outer_diameter / 2, wrist.inner_diameter / 2
+    added = np.zeros(3)
+    for j, way in enumerate(robot.direction):
+        half = np.arccos(wrist.depth[j] / ro - 1.0)  # half the angle of the annular sector left
+        second_moment = (ro**4 - ri**4) / 4 * (half - np.sin(half) * np.cos(half))
+        lever = robot.tendons.radius * np.sin(robot.tendons.direction - way)
+        moment = (gap_tension[j] * lever).sum()
+        turned = moment * wrist.height[j] / (wrist.material.elastic_modulus * second_moment)
+        axis = (bodies[j] @ frames.about_z(way))[:3, 0]
+        middle = (bodies[j] + bodies[j + 1])[:3, 3] / 2
+        added -= turned * np.cross(axis, bodies[-1, :3, 3] - middle)
+    return added
+
+
+def test_compare_with_my_data(margin):
+    names = ran(9)[0]
+    table = np.genfromtxt(io.StringIO(names["MEASURED"]), delimiter=",", skip_header=1)
+    oracle = A.with_(mu=names["mu"])
+    expected = [oracle.pull(force)[0].sum() for force in table[:, 0]]
+    error = np.degrees(expected) - table[:, 1:].sum(axis=1)
+    found = np.degrees(names["found"].rmse_total)
+    margin.within("error of the total", found - np.sqrt(np.mean(error**2)), 1e-6, "deg")
+
+
+def test_what_friction_does(margin):
+    names = ran(10)[0]
+    for mu, bend, loop in zip(names["coefficients"], names["bends"], names["loops"], strict=True):
+        states = A.with_(mu=mu).march(names["way"].tension[:, 0])
+        angle = np.degrees([state.angle.sum() for state in states])
+        margin.within(f"bend at mu {mu}", bend - angle[30], 1e-6, "deg")
+        margin.within("loop", loop - (angle[::-1] - angle)[:31].max(), 1e-6, "deg")

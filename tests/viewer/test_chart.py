@@ -1,0 +1,97 @@
+"""The charts and tables of the page as text, read as a browser reads them."""
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from notchflex.viewer import Session
+from notchflex.viewer.chart import Line, chart, ticks
+from robots import ready
+
+pytest.importorskip("matplotlib")
+
+
+def elements(text, name):
+    return [one for one in ElementTree.fromstring(text).iter() if one.tag == name]
+
+
+@pytest.mark.parametrize("values", [[0.0], [0.3, 2.7], [-1.2, 0.4], [1e-4], [153.2], [1e4, 2e4]])
+def test_ticks_take_in_zero_and_all_values_in_round_steps(values):
+    found = ticks(values)
+    assert 3 <= len(found) <= 8
+    assert found[0] <= min(0.0, *values)
+    assert found[-1] >= max(0.0, *values)
+    assert 0.0 in found
+    assert np.diff(found) == pytest.approx(np.full(len(found) - 1, found[1] - found[0]))
+
+
+def test_a_chart_puts_points_where_its_ticks_say():
+    line = Line(np.array([0.0, 1.0, 2.0]), np.array([0.0, 50.0, 100.0]), "#123456", dots=["#abc"])
+    text = chart([line], "T < 3 [N]", "angle [deg]", "loop")
+    labels = {one.text: one.attrib for one in elements(text, "text")}
+    assert "T < 3 [N]" in labels
+    assert "angle [deg]" in labels
+    dots = elements(text, "circle")
+    assert float(dots[2].attrib["cx"]) == pytest.approx(float(labels["2"]["x"]), abs=0.2)
+    assert float(dots[2].attrib["cy"]) == pytest.approx(float(labels["100"]["y"]) - 4.0, abs=0.2)
+
+
+def test_many_points_are_thinned_but_not_their_ends():
+    x = np.linspace(0.0, 1.0, 20_000)
+    text = chart([Line(x, x, "#123456")], "x", "y", "many")
+    way = next(one for one in elements(text, "path") if one.attrib.get("fill") == "none")
+    points = way.attrib["d"].lstrip("M").split("L")
+    assert len(points) == 1500
+    assert points[0] != points[-1]
+    assert len(text) < 50_000
+
+
+def test_the_loop_tells_pulling_from_letting_go_and_keeps_the_loop_before():
+    from notchflex.viewer.charts import loop_chart, tendon_chart
+
+    session = Session(ready("A"))
+    for tension in (1.0, 2.0, 1.0):
+        session.go(session.controls.with_tendon(0, "tension", tension))
+    ways = [one.text for one in elements(loop_chart(session, 0), "title")]
+    assert ways == ["pulling", "letting go"]
+    session.change(ready("A").with_value("friction.coefficient", 0.05))
+    ways = [one.text for one in elements(loop_chart(session, 0), "title")]
+    assert ways == ["before the change", "pulling", "letting go"]
+    along = tendon_chart(session, 0)
+    assert "span tension [N]" in [one.text for one in elements(along, "text")]
+    assert len(elements(along, "circle")) == 9  # two edges a notch, but the last one is fixed
+
+
+def test_colours_of_contacts_and_strains():
+    from notchflex.plot.style import BLUE, GREEN, GREY, VERMILLION
+    from notchflex.viewer.colours import METAL, of_contacts, of_strain
+
+    robot = ready("A").with_value("friction.wrap", "geometric")
+    session = Session(robot)
+    assert set(of_contacts(session.state, 0)) == {GREY}  # slack
+    seen = []
+    for tension in (1.0, 0.99, 0.6):
+        session.go(session.controls.with_tendon(0, "tension", tension))
+        seen.append(set(of_contacts(session.state, 0)))
+    assert seen[0] == {BLUE}
+    assert GREEN in seen[1]
+    assert seen[2] == {VERMILLION}
+    assert of_strain(None) == METAL
+    assert of_strain(1.5) == of_strain(1.0) == of_strain(-1.0) != of_strain(0.9)
+
+
+def test_the_table_tells_units_strain_and_closed_notches():
+    from notchflex.viewer.readout import readout
+
+    session = Session(ready("A"))
+    session.go(session.controls.with_tendon(0, "tension", 1.8))
+    cells = {
+        one.attrib["data-name"]: one.text
+        for one in elements(readout(session), "td")
+        if "data-name" in one.attrib
+    }
+    assert cells["tension_1"] == "1.800"
+    assert float(cells["total_angle"]) == pytest.approx(np.degrees(session.state.total_angle), 1e-4)
+    assert cells["peak_strain"].endswith("of 8 % allowed")
+    assert cells["closed"] == "1, 2"

@@ -1,0 +1,128 @@
+"""The model of the page: sliders make loads, loads make states, states remember."""
+
+import csv
+import io
+from math import degrees
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.viewer import Controls, Session
+from notchflex.viewer.parts import kinds, numbers, with_kind
+from notchflex.viewer.reach import reach_of
+from notchflex.viewer.saving import table_bytes
+from robots import ready
+
+
+def pulled(session, *tensions):
+    """Angles after tensions of the first tendon, in rad."""
+    goals = [session.controls.with_tendon(0, "tension", tension) for tension in tensions]
+    return [float(session.go(goal).state.total_angle) for goal in goals]
+
+
+def test_controls_are_the_load_that_a_person_would_write():
+    controls = Controls(("tension", "stroke"), (1.0, 0.5), (0.0, 0.1, 0.0), 20.0, "sideways")
+    assert controls.load() == nf.Load(
+        tension=(1.0, None),
+        stroke=(None, 0.5),
+        tip_force=(0.0, 0.1, 0.0),
+        tip_mass=20.0,
+        base_rotation=(0.0, -np.pi / 2, 0.0),
+    )
+    assert controls.with_numbers(controls.numbers) == controls
+
+
+def test_the_session_goes_where_simulate_goes():
+    session = Session(ready("A"))
+    up = [0.5, 1.0, 1.5]
+    found = pulled(session, *up, *up[::-1])
+    path = nf.simulate(ready("A"), nf.pull(0.5, 1.5, steps=3).release())
+    assert found == pytest.approx(path.total_angle.tolist(), abs=1e-12)
+
+
+def test_a_slider_that_goes_back_leaves_hysteresis_and_reset_takes_it_away():
+    session = Session(ready("A"))
+    first, _, back = pulled(session, 1.0, 2.0, 1.0)
+    assert degrees(back - first) > 10.0  # 51.5 and about 79 deg
+    tension, angle = session.history.loop(0)
+    assert tension.tolist() == [0.0, 1.0, 2.0, 1.0]
+    assert angle[[1, 3]] == pytest.approx([first, back])
+    session.reset()
+    assert len(session.history) == 1
+    assert pulled(session, 1.0) == pytest.approx([first], abs=1e-12)
+
+
+def test_a_load_that_does_not_converge_changes_nothing():
+    session = Session(ready("A"))
+    pulled(session, 1.0)
+    controls, solved, count = session.controls, session.solved, len(session.history)
+    step = session.go(controls.with_tendon(0, "stroke", 20.0))  # every notch closes before
+    assert "closed" in step.reason
+    assert step.state.tension == pytest.approx([1.0])
+    assert session.controls is controls
+    assert session.solved is solved
+    assert len(session.history) == count
+    # and it goes on from there, with the friction of before
+    again = Session(ready("A"))
+    assert pulled(session, 0.8) == pytest.approx(pulled(again, 1.0, 0.8)[1:], abs=1e-12)
+
+
+def test_another_friction_does_the_same_again_beside_the_loop_before():
+    session = Session(ready("A"))
+    before = pulled(session, 1.0, 1.8, 1.0)
+    session.change(ready("A").with_value("friction.kind", "frictionless"))
+    assert session.before is not None
+    assert session.before.total_angle[1:] == pytest.approx(before)
+    angle = session.history.total_angle
+    assert angle[1] == pytest.approx(angle[3], abs=1e-9)  # no friction, no hysteresis
+    assert angle[1] > before[0]
+    assert session.history.controls[1:] == [one for one in session.before.controls[1:]]
+
+
+def test_a_tube_that_points_elsewhere_feels_its_weight_otherwise():
+    session = Session(ready("A"))
+    goal = session.controls.with_tendon(0, "tension", 0.5)
+    session.go(goal)
+    up = session.state.tip_position
+    session.change(pointing="sideways")
+    assert session.state.tip_position == pytest.approx([-up[2], up[1], up[0]], abs=1e-9)
+    light = float(session.state.total_angle)
+    session.go(session.controls.with_numbers([0.5, 0.0, 0.0, 0.0, 5.0]))
+    assert float(session.state.total_angle) < light - 0.05  # 5 g pull it down again
+
+
+def test_the_table_holds_every_step():
+    session = Session(ready("A"))
+    angles = pulled(session, 0.6, 1.2, 0.6)
+    rows = list(csv.DictReader(io.StringIO(table_bytes(session).decode())))
+    assert [float(row["tendon_force_N"]) for row in rows] == pytest.approx([0.0, 0.6, 1.2, 0.6])
+    told = [float(row["total_deg"]) for row in rows[1:]]
+    assert told == pytest.approx([degrees(angle) for angle in angles], abs=1e-9)
+
+
+@pytest.mark.parametrize("section", ["friction", "material"])
+@pytest.mark.parametrize("name", ["pacheco2021-a", "gao2017", "liu2022"])
+def test_every_kind_can_be_put_in_and_taken_out(section, name):
+    robot = nf.load_robot(name)
+    for kind in kinds(section):
+        changed = with_kind(robot, section, kind, robot)
+        assert getattr(changed, section).kind == kind
+        own = getattr(robot, section).kind
+        assert with_kind(changed, section, own, robot) == robot
+
+
+def test_numbers_are_those_of_the_file():
+    found = {one.key: one for one in numbers(ready("A"), "material")}
+    assert found["superelastic_modulus"].value == 3000.0
+    assert found["superelastic_modulus"].unit == "MPa"
+    assert [one.value for one in numbers(ready("A"), "friction")] == [0.13]
+
+
+def test_sliders_reach_far_enough_to_bend_a_robot_and_stay_within_what_is_solved():
+    reach = reach_of(ready("A"))
+    for load in (nf.Load(tension=reach.tension[0]), nf.Load(tension=0.6 * reach.tension[0])):
+        state = nf.solve(ready("A"), load)
+        assert state.converged
+        assert degrees(state.total_angle) > 60.0
+    assert nf.solve(ready("A"), nf.Load(stroke=0.5 * reach.stroke[0])).converged
