@@ -93,14 +93,16 @@ def eq17(robots, data, starts: int):
 
 
 def left_out(robots, data):
-    """Each wrist left out of eq. 17."""
-    tested = leave_out(robots, data, FOUR, by="robot", objective=SumOfRobotErrors(), starts=3)
+    """Each wrist, and each pull, left out of eq. 17."""
     told = {}
-    for fold in tested.folds:
-        without = np.degrees(fold.errors["total_angle"])
-        of_all = np.degrees(fold.errors_of_all["total_angle"])
-        print(f"without {fold.label}: total {without:.2f} deg (fitted to all {of_all:.2f})")
-        told[fold.label] = {"values": fold.found.values, "total_deg": without, "of_all": of_all}
+    for by, starts in (("robot", 3), ("pull", 1)):
+        tested = leave_out(robots, data, FOUR, by=by, objective=SumOfRobotErrors(), starts=starts)
+        for fold in tested.folds:
+            without = np.degrees(fold.errors["total_angle"])
+            of_all = np.degrees(fold.errors_of_all["total_angle"])
+            print(f"without {fold.label}: total {without:.2f} deg (fitted to all {of_all:.2f})")
+            values = fold.found.values
+            told[fold.label] = {"values": values, "total_deg": without, "of_all": of_all}
     return told
 
 

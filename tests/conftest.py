@@ -1,7 +1,10 @@
 """Settings that all tests share."""
 
 import os
+import sys
+from collections.abc import Iterator
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -35,3 +38,21 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache.mkdir("jax")))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
+
+
+# Compiled programs hold pieces of memory, of which Linux gives a process 65,530; the compiler
+# crashes where there are none left. A process that runs half of all tests comes near.
+_PIECES = 20_000
+
+
+@pytest.fixture(autouse=True, scope="module")
+def room_for_compiled_code() -> Iterator[None]:
+    """Let go of compiled programs once there are very many."""
+    yield
+    maps = Path("/proc/self/maps")
+    jax = sys.modules.get("jax")
+    if jax is None or not maps.exists():
+        return
+    with maps.open() as lines:
+        if sum(1 for _ in lines) > _PIECES:
+            jax.clear_caches()

@@ -60,7 +60,7 @@ def posterior(
     found: Calibration,
     *,
     draws: int = 500,
-    warm_up: int = 200,
+    warm_up: int = 100,
     chains: int = 2,
     seed: int = 0,
     progress: Progress | None = None,
@@ -94,7 +94,11 @@ def posterior(
     from numpyro import diagnostics, infer
 
     target = _Target(found)
-    kernel = infer.NUTS(potential_fn=target.potential, dense_mass=True)
+    # The target has about unit spread in every direction: there is no mass matrix to be found, and
+    # a few steps of this size go from one side to the other.
+    kernel = infer.NUTS(
+        potential_fn=target.potential, step_size=0.7, adapt_mass_matrix=False, max_tree_depth=4
+    )
     every: list[np.ndarray] = []
     divergent = 0
     for chain in range(chains):

@@ -148,8 +148,6 @@ def _half_width(found: Calibration) -> NDArray[np.float64]:
     from scipy.stats import t
 
     slopes = found.residuals.slopes
-    if slopes is None:
-        return np.full(len(found.residuals), np.nan)
     known = np.isfinite(np.diag(found.covariance))
     covariance = found.covariance[np.ix_(known, known)]
     variance = np.einsum("ri,ij,rj->r", slopes[:, known], covariance, slopes[:, known])
