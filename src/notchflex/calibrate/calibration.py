@@ -8,12 +8,13 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2, t
+from scipy.stats import chi2
 
-from notchflex.calibrate.intervals import LEVEL, Interval
+from notchflex.calibrate.curvature import unit_free
+from notchflex.calibrate.intervals import Interval
 from notchflex.calibrate.minimise import Cost, Minimum
 from notchflex.calibrate.noise import Noise
-from notchflex.calibrate.problem import Problem, unit_free
+from notchflex.calibrate.problem import Problem
 from notchflex.calibrate.residuals import Residuals
 from notchflex.robot import Robot
 
@@ -168,21 +169,16 @@ class Calibration:
         size = np.where(np.isfinite(size), size, np.nan)
         return self.covariance / np.outer(size, size)
 
-    def half_width(self, name: str) -> float:
-        """Half of a constant's 95 % interval in a straight-line view of the model."""
-        return float(t.ppf(0.5 + LEVEL / 2.0, max(self.freedom, 1)) * self.deviations[name])
-
 
 def _inverse(curvature: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
     """The inverse; infinite for what has no curvature at all."""
-    size = np.sqrt(np.maximum(np.diag(curvature), 0.0))
-    known = size > 0.0
+    known = np.diag(curvature) > 0.0
     found = np.diag(np.where(known, 0.0, np.inf))
-    scale = np.outer(size[known], size[known])
-    own = unit_free(curvature[np.ix_(known, known)])
-    values, vectors = np.linalg.eigh(own) if len(own) else (np.zeros(0), np.zeros((0, 0)))
+    plain = unit_free(curvature[np.ix_(known, known)])
+    values, vectors = np.linalg.eigh(plain.curvature)
     # What rounding makes of no curvature at all is a very wide interval, not a narrow one.
-    found[np.ix_(known, known)] = (vectors / np.maximum(values, 1e-15)) @ vectors.T / scale
+    own = (vectors / np.maximum(values, 1e-15)) @ vectors.T
+    found[np.ix_(known, known)] = own / np.outer(plain.size, plain.size)
     return found
 
 

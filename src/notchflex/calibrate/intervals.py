@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2, f
 
+from notchflex.calibrate.curvature import unit_free
 from notchflex.calibrate.minimise import Cost, Objective, minimise
 
 LEVEL = 0.95
@@ -153,9 +154,9 @@ def _end(
 
 def _half_width(curvature: np.ndarray, number: int, rise: float) -> float:
     """Half an interval if the misfit were a parabola."""
-    scale = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-    inverse = np.linalg.pinv(curvature / np.outer(scale, scale), rcond=1e-10, hermitian=True)
-    return float(np.sqrt(rise * max(inverse[number, number], 1e-12)) / scale[number])
+    plain = unit_free(curvature)
+    inverse = np.linalg.pinv(plain.curvature, rcond=1e-10, hermitian=True)
+    return float(np.sqrt(rise * max(inverse[number, number], 1e-12)) / plain.size[number])
 
 
 def _held(

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from notchflex.calibrate.curvature import unit_free
+
 # Damping at first, by how much it falls and grows, and where no smaller step is worth a trial.
 _FIRST, _FALL, _GROW, _MOST = 1e-3, 0.2, 4.0, 1e12
 _ITERATIONS = 100
@@ -143,11 +145,9 @@ def free_of_limits(
 def _promised(cost: Cost, at: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
     """By how much a full step would lower the objective, were it as simple as its curvature."""
     free = free_of_limits(cost.gradient, at, lower, upper)
-    gradient, curvature = cost.gradient[free], cost.curvature[np.ix_(free, free)]
-    scale = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-    own = curvature / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(own) if len(own) else (np.zeros(0), np.zeros((0, 0)))
-    along = vectors.T @ (gradient / scale)
+    plain = unit_free(cost.curvature[np.ix_(free, free)])
+    values, vectors = np.linalg.eigh(plain.curvature)
+    along = vectors.T @ (cost.gradient[free] / plain.size)
     known = values > 1e-12
     return 0.5 * float(np.sum(along[known] ** 2 / values[known]))
 

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from scipy.stats import qmc
 
 from notchflex.calibrate.constants import Unknown
+from notchflex.calibrate.curvature import unit_free
 from notchflex.calibrate.minimise import Cost, Minimum, minimise
 from notchflex.calibrate.noise import Noise, first_noise
 from notchflex.calibrate.objective import FitObjective
@@ -117,12 +118,12 @@ def lowest_nearby(
     tries = 0
     while best.cost is not None and tries < hops:
         tries += 1
-        size, axes = np.linalg.eigh(unit_free(best.cost.curvature))
+        plain = unit_free(best.cost.curvature)
+        size, axes = np.linalg.eigh(plain.curvature)
         along = random.standard_normal(len(size))
         along *= np.sqrt(2.0 * _HOP * abs(best.cost.value)) / np.linalg.norm(along)
         known = size > 1e-9
-        scale = np.sqrt(np.maximum(np.diag(best.cost.curvature), 1e-300))
-        step = axes[:, known] @ (along[known] / np.sqrt(size[known])) / scale
+        step = axes[:, known] @ (along[known] / np.sqrt(size[known])) / plain.size
         other = minimise(problem, best.values + step, problem.lower, problem.upper)
         calls = best.calls + other.calls
         gain = np.inf if other.cost is None else other.cost.value - best.cost.value
@@ -133,10 +134,4 @@ def lowest_nearby(
     return best
 
 
-def unit_free(curvature: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
-    """A curvature with ones on its diagonal."""
-    size = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-    return curvature / np.outer(size, size)
-
-
-__all__ = ["Problem", "Progress", "search", "unit_free"]
+__all__ = ["Problem", "Progress", "search"]

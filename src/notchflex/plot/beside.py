@@ -115,6 +115,11 @@ def _travel(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
     return Panel(items, f"{quantity.title} x {unit}", f"{quantity.title} z {unit}", equal=True)
 
 
+def _dots(points: np.ndarray, colours: Mapping[str, Colour], label: str, size: float) -> Line:
+    """A line with a dot at every point, which tells its numbers."""
+    return Line(points, colours[label], marker="o", size=size, group=label, told=True)
+
+
 def _notches(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
     quantity = QUANTITIES["notch_angle"]
     items: list[Item] = []
@@ -126,8 +131,7 @@ def _notches(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
         angle = path.notch_angle[step] * quantity.scale
         least = min(least, float(angle.min()))
         points = np.stack([np.arange(1, len(angle) + 1), angle], axis=1)
-        options: dict[str, Any] = {"marker": "o", "size": 2.5, "group": label, "told": True}
-        items.append(Line(points, colours[label], **options))
+        items.append(_dots(points, colours, label, size=2.5))
     return Panel(
         items or [Note("no step was solved")],
         "notch, 1 at the base",
@@ -148,8 +152,7 @@ def _tensions(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel
         tendon = int(np.argmax(path.tension[step] > SLACK))
         number = np.arange(spans_of(path, tendon))
         points = np.stack([number, path.span_tension[step, tendon, : len(number)]], axis=1)
-        options: dict[str, Any] = {"marker": "o", "size": 1.8, "group": label, "told": True}
-        items.append(Line(points, colours[label], **options))
+        items.append(_dots(points, colours, label, size=1.8))
     return Panel(
         items or [Note("no tendon is pulled")],
         "span of first pulled tendon, 0 at the base",
