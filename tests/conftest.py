@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from chromium import browser  # noqa: F401
 from margins import margin, pytest_terminal_summary  # noqa: F401
 
 # JAX compiles within a test, which no deadline should time; CI draws the same examples each time.

@@ -58,6 +58,16 @@ def test_intervals_hold_the_truth_and_are_as_wide_as_the_noise_makes_them(noisy)
     assert not noisy.misses
 
 
+def test_what_an_interval_holds_is_told_without_its_ends(noisy):
+    for name, interval in noisy.intervals.items():
+        for end in (interval.lower, interval.upper):
+            out = end - noisy.values[name]
+            assert noisy.allows(name, end - 0.02 * out)
+            assert not noisy.allows(name, end + 0.02 * out)
+    with pytest.raises(nf.InputError, match="was not fitted"):
+        noisy.allows("notch[1].depth", 1.0)
+
+
 def test_ends_of_an_interval_are_where_the_misfit_has_risen_by_chi_squared(noisy):
     name = "friction.coefficient"
     interval = noisy.intervals[name]
@@ -172,11 +182,21 @@ def test_a_pull_left_out_is_judged_by_constants_that_never_saw_it():
     rough = WRIST.with_value("friction.coefficient", 0.3)
     bad = synthetic(rough, UP, deviation=NOISE, seed=2, pull=["bad"] * 8)
     good = synthetic(WRIST, UP, deviation=NOISE, seed=1, pull=["good"] * 8)
-    tested = leave_out(WRIST, [good, bad], "friction.coefficient", by="pull")
+    whole = calibrate(WRIST, [good, bad], "friction.coefficient", starts=1, intervals=False)
+    tested = leave_out(whole, by="pull")
     assert [fold.label.rsplit(" ", 1)[1] for fold in tested.folds] == ["good", "bad"]
     without_bad = tested.folds[1]
     assert without_bad.found.values["friction.coefficient"] == pytest.approx(0.13, abs=0.02)
     assert without_bad.errors["notch_angle"] > without_bad.errors_of_all["notch_angle"]
+
+
+def test_a_robot_with_a_constant_of_its_own_cannot_be_left_out():
+    robots = {"a": WRIST, "b": WRIST}
+    seen = dict.fromkeys(robots, synthetic(WRIST, UP, deviation=NOISE, seed=1))
+    own = ("a:friction.coefficient", "material.elastic_modulus")
+    whole = calibrate(robots, seen, own, starts=1, intervals=False)
+    with pytest.raises(nf.InputError, match=r"`a:friction\.coefficient` belongs to a alone"):
+        leave_out(whole, by="robot")
 
 
 def test_distances_of_points_are_made_small():

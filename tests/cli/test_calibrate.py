@@ -38,7 +38,7 @@ def data(tmp_path):
 
 def test_from_csv_to_fitted_robot(call, data, tmp_path):
     code, out, err = call(
-        *(f"A={ROBOT}={data}", *FIT, "-o", "fitted", "--json", "fit.json", "--plot", "fit.svg"),
+        *(f"A={ROBOT}={data}", *FIT, "-o", "fitted", "--json", "fit.json", "--plot", "fit.html"),
         *("--next", "0.4,1.2", "--narrow", NAMES[0]),
     )
     assert code == 0
@@ -61,7 +61,7 @@ def test_from_csv_to_fitted_robot(call, data, tmp_path):
     assert back.friction.coefficient == document["constants"][0]["value"]
     note = f"fitted by notchflex to a.csv: {interval.lower:.5g} to {interval.upper:.5g} (95 %)"
     assert note in (tmp_path / "fitted" / "A.toml").read_text(encoding="utf-8")
-    picture = (tmp_path / "fit.svg").read_text(encoding="utf-8")
+    picture = (tmp_path / "fit.html").read_text(encoding="utf-8")
     assert "95 % band of the model" in picture
 
 

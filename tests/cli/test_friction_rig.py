@@ -34,9 +34,11 @@ def test_prints_and_draws(capsys, rig):
     assert "constant mu is enough" in words
     assert max(len(line) for line in told.out.splitlines()) <= 80
     assert "ignored columns: day" in told.err
-    picture = (rig / "rig.svg").read_text(encoding="utf-8")
-    for text in ("turn over both edges [deg]", "weight 1 [g]", "95 % interval", "reading"):
-        assert text in picture
+    assert run(["friction-rig", "rig.csv", "--plot", "rig.html"]) == 0
+    for name in ("rig.svg", "rig.html"):
+        picture = (rig / name).read_text(encoding="utf-8")
+        for text in ("turn over both edges [deg]", "weight 1 [g]", "95 % interval", "reading"):
+            assert text in picture
 
 
 def test_document(capsys):

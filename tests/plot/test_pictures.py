@@ -14,14 +14,15 @@ from notchflex.plot import (
     batch_picture,
     beside_picture,
     comparison_picture,
+    friction_picture,
     path_picture,
     picture,
     save_animation,
     state_picture,
 )
 from notchflex.plot.animation import MOST_FRAMES, frames_of
-from notchflex.plot.sheet import Area, Line
-from notchflex.plot.with_plotly import html
+from notchflex.plot.plotly_marks import html
+from notchflex.plot.sheet import Area, Bars, Cell, Line, Panel, Picture
 from notchflex.results.quantities import QUANTITIES
 from notchflex.statics import Batch, ExternalLoad
 
@@ -48,6 +49,16 @@ def a_comparison():
     return compare(robot, Measured("m", tension, none, angles, angles.sum(1), ("1", "1")))
 
 
+def a_rig():
+    """Readings whose coefficient depends on the turn; of one no deviation is known."""
+    turn = np.linspace(0.5, 1.5, 12)
+    load = np.tile([100.0, 200.0, 400.0], 4)
+    deviation = np.full((12, 4), np.nan)
+    deviation[1:, 1] = 0.002 * load[1:]
+    held = nf.calibrate.weight_held(load, 0.1 + 0.05 * turn, turn, turn)
+    return nf.friction_rig(nf.FrictionReadings(load, held, turn, turn, deviation))
+
+
 KINDS = {
     "path": lambda: path_picture(fake_path(4)),
     "failed": lambda: path_picture(fake_path(3, failed=6)),
@@ -56,6 +67,7 @@ KINDS = {
     "beside": lambda: beside_picture({"one": fake_path(4), "two": fake_path(3)}),
     "batch": lambda: batch_picture(a_batch()),
     "comparison": lambda: comparison_picture(a_comparison()),
+    "rig": lambda: friction_picture(a_rig()),
 }
 
 
@@ -186,8 +198,48 @@ def test_one_function_for_every_result():
     assert len(picture(path[1]).cells) == 3
     assert picture({"a": path, "b": path}).title == wrist.name
     assert picture(a_batch(), title="mine").title == "mine"
+    assert picture(a_comparison(), title="mine").title == "mine"
     with pytest.raises(InputError, match="got int"):
         picture(3)
+
+
+def test_rig_in_a_browser_is_that_on_paper(drawn):
+    rig, own = a_rig(), drawn["rig"]
+    shown, (left, right) = own.interactive(), own.figure().axes
+    assert left.get_ylim() == right.get_ylim()
+    assert shown.layout.yaxis2.matches == "y"
+    assert shown.layout.yaxis.range == shown.layout.yaxis2.range
+    assert tuple(shown.layout.yaxis.range) == pytest.approx(left.get_ylim(), rel=1e-3)
+    stripes = [one for one in shown.layout.shapes if one.type == "rect"]
+    half = (-rig.spread, rig.spread)
+    for stripe in (stripes[0], stripes[2]):
+        assert (stripe.y0, stripe.y1) == tuple(rig.coefficient + np.array(half))
+    assert (stripes[1].y0, stripes[1].y1) == rig.interval
+    levels = [one for one in shown.layout.shapes if one.type == "line"]
+    assert [one.y0 for one in levels] == [rig.coefficient] * 2
+    named = {one.name for one in shown.data if one.showlegend and one.xaxis == "x2"}
+    assert named == {text.get_text().replace(r"$\mu$", "μ") for text in right.get_legend().texts}
+    groups = {one.legendgroup for one in shown.data if one.showlegend}
+    assert {one.legendgroup for one in shown.layout.shapes} <= groups
+    deviation = rig.readings.coefficient_deviation
+    readings = next(one for one in shown.data if one.name == "reading")
+    assert readings.error_y.array[0] is None
+    np.testing.assert_allclose(readings.error_y.array[1:], deviation[1:], rtol=1e-5)
+    assert readings.text[0] == ""
+    ends = np.array([bar[:, 1] for bar in left.collections[0].get_segments()])
+    np.testing.assert_allclose(np.ptp(ends, axis=1)[1:], 2.0 * deviation[1:])
+    assert picture(rig).title == own.title
+
+
+def test_names_at_an_axis_have_room_in_a_browser():
+    def place(name):
+        panel = Panel([Bars([1.0], [name], ["red"])], "mm", "")
+        plain = Panel([Line([[0.0, 0.0], [1.0, 1.0]], "red")], "x", "y")
+        cells = [Cell(plain, (0, 1), (0, 1)), Cell(panel, (0, 1), (1, 2))]
+        layout = Picture("", 6.0, 3.0, cells).interactive().layout
+        return (layout.xaxis2.domain[0] - layout.xaxis.domain[1]) * layout.width
+
+    assert place("long name " * 4) - place("short") == pytest.approx(7.0 * 40 - 66.0)
 
 
 def test_animation_moves_and_ends_where_the_path_ends(tmp_path):

@@ -1,12 +1,8 @@
-"""The page in a real browser without a window: Debian's `chromium`, driven by playwright.
-
-Where either is missing, these tests are skipped and say so.
-"""
+"""The page of the viewer in a real browser."""
 
 import csv
 import io
 import re
-import shutil
 import threading
 from pathlib import Path
 
@@ -14,33 +10,12 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from chromium import PATIENCE
 from notchflex.robot import robot_from_text
 
 image = pytest.importorskip("matplotlib.image")
+pytest.importorskip("viser", reason="the extra `viewer` is not installed")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-    "--no-sandbox",
-]
-PATIENCE = 120_000  # ms: without a graphics card, on a busy machine
-
-
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip(
-        "playwright.sync_api", reason="playwright is not installed: pip install playwright"
-    )
-    pytest.importorskip("viser", reason="the extra `viewer` is not installed")
-    if CHROMIUM is None:
-        pytest.skip("there is no chromium on this machine: apt-get install chromium")
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield opened
-        opened.close()
 
 
 class Visit:

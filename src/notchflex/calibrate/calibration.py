@@ -11,11 +11,12 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from notchflex.calibrate.curvature import unit_free
-from notchflex.calibrate.intervals import Interval
+from notchflex.calibrate.intervals import Interval, allowed_rise, held
 from notchflex.calibrate.minimise import Cost, Minimum
 from notchflex.calibrate.noise import Noise
 from notchflex.calibrate.problem import Problem
 from notchflex.calibrate.residuals import Residuals
+from notchflex.errors import InputError
 from notchflex.robot import Robot
 
 # A misfit this unlikely for the noise that was told means that the model misses something.
@@ -126,6 +127,37 @@ class Calibration:
     def widened(self) -> float:
         """By how much intervals are wider than noise alone makes them: the model misses more."""
         return float(np.sqrt(self.reduced_chi_squared)) if self.misses else 1.0
+
+    @property
+    def allowed_rise(self) -> float:
+        """By how much twice the misfit may rise within a 95 % interval."""
+        freedom = None if self.noise.is_known else self.freedom
+        return allowed_rise(freedom) * self.widened**2
+
+    def allows(self, name: str, value: float) -> bool:
+        """Whether the data leave room for a value of a constant: the 95 % interval holds it.
+
+        The others make the best of it, as in the interval, whose ends need not be known.
+
+        Args:
+            name: The constant.
+            value: In the unit of the robot file.
+
+        Raises:
+            InputError: There is no such constant, or the objective is no likelihood.
+        """
+        if name not in self.names:
+            raise InputError(f"{name!r} was not fitted; there are {', '.join(self.names)}")
+        if not self.problem.objective.is_likelihood:
+            raise InputError(
+                "an interval needs LeastSquares(); other objectives are no likelihoods"
+            )
+        lower, upper = self.problem.lower, self.problem.upper
+        number = self.names.index(name)
+        if not lower[number] <= value <= upper[number]:
+            return False
+        found = held(self.problem, self.best.values, number, value, lower, upper)
+        return found is not None and 2.0 * (found[1] - self.cost) <= self.allowed_rise
 
     @cached_property
     def covariance(self) -> Float[np.ndarray, "k k"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from notchflex.calibrate.rows import SENSOR
@@ -98,6 +98,20 @@ class Unknown:
     def scale(self) -> float:
         """A size that its changes are compared with."""
         return self.last - self.first
+
+    def among(self, labels: Collection[str]) -> Unknown:
+        """The same constant of only some of the robots.
+
+        Raises:
+            InputError: None of them has it.
+        """
+        own = tuple(place for place in self.sets if place[0] in labels)
+        if not own:
+            raise InputError(
+                f"`{self.name}` belongs to {self.sets[0][0]} alone; without it there is nothing "
+                "to find it from"
+            )
+        return replace(self, sets=own)
 
     def shared_with(self, label: str) -> Unknown:
         """The same constant for a robot that was not in the fit; one of other robots sets none."""

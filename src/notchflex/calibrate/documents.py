@@ -247,7 +247,7 @@ def _noise(found: Calibration) -> list[dict[str, Any]]:
                     "quantity": name,
                     "unit": unit,
                     "standard_deviation": size * scale,
-                    "known_from": found.noise.source[sample.measured.source, name],
+                    "known_from": found.noise.source[number, name],
                 }
             )
     return rows

@@ -9,7 +9,7 @@ import numpy as np
 
 from notchflex.calibrate.calibration import Calibration
 from notchflex.calibrate.constants import Constant, unknowns
-from notchflex.calibrate.intervals import Interval, allowed_rise, profile_interval
+from notchflex.calibrate.intervals import Interval, profile_interval
 from notchflex.calibrate.measurements import Measurements
 from notchflex.calibrate.minimise import Cost, Minimum, minimise
 from notchflex.calibrate.noise import noise_left
@@ -49,7 +49,8 @@ def calibrate(
         fit: The constants, by name (see `Constant`), in the units of the robot file.
         objective: What is made small: `LeastSquares()` where not given, `SumOfRobotErrors()`
             (Pacheco 2021, eq. 17) or `SumOfDistances()` (Gao 2017, eq. 27).
-        starts: From how many places to search; the first is the robots as they are.
+        starts: From how many places to search; the first is the robots as they are. With two or
+            more, every search looks again from beside where it ended.
         seed: Of the places.
         intervals: Whether to find 95 % intervals too (profile likelihood; of `LeastSquares` only).
         settings: How hard the solver tries.
@@ -75,13 +76,13 @@ def calibrate(
     """
     if not isinstance(starts, int) or starts < 1:  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InputError(f"starts must be a whole number from 1 on; got {starts!r}")
-    named, data = given(robots, measurements)
+    named, data = _given(robots, measurements)
     unknown = unknowns(named, fit)
     problem = Problem(Samples.of(named, data, unknown, settings), objective or LeastSquares())
-    return _fitted(named, problem, starts, seed, intervals, progress)
+    return fitted(named, problem, starts, seed, intervals, progress)
 
 
-def given(
+def _given(
     robots: Robot | Mapping[str, Robot],
     measurements: Measurements
     | Sequence[Measurements]
@@ -112,7 +113,7 @@ def given(
     return named, data
 
 
-def _fitted(
+def fitted(
     robots: Mapping[str, Robot],
     problem: Problem,
     starts: int,
@@ -120,7 +121,19 @@ def _fitted(
     intervals: bool,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Search, tell the noise where it is not known, and how far to trust what was found."""
+    """Search, tell the noise where it is not known, and how far to trust what was found.
+
+    Args:
+        robots: The robots by label.
+        problem: What is fitted to what.
+        starts: As for `calibrate`.
+        seed: As for `calibrate`.
+        intervals: As for `calibrate`.
+        progress: As for `calibrate`.
+
+    Raises:
+        InputError: The model has no solution at any start.
+    """
     every = search(problem, starts, seed, progress)
     able = [(one.cost.value, number) for number, one in enumerate(every) if one.cost is not None]
     if not able:
@@ -158,8 +171,6 @@ def _with_own_noise(problem: Problem, best: Minimum) -> tuple[Minimum, Cost]:
 
 def _intervals(found: Calibration, progress: Progress | None) -> dict[str, Interval]:
     problem, best = found.problem, found.best
-    freedom = None if found.noise.is_known else found.freedom
-    rise = allowed_rise(freedom) * found.widened**2
     told: dict[str, Interval] = {}
     for number, unknown in enumerate(problem.unknowns):
         told[unknown.name] = profile_interval(
@@ -169,7 +180,7 @@ def _intervals(found: Calibration, progress: Progress | None) -> dict[str, Inter
             number,
             problem.lower,
             problem.upper,
-            rise=rise,
+            rise=found.allowed_rise,
             scale=unknown.scale,
         )
         if progress is not None:
@@ -177,4 +188,4 @@ def _intervals(found: Calibration, progress: Progress | None) -> dict[str, Inter
     return told
 
 
-__all__ = ["calibrate", "given"]
+__all__ = ["calibrate", "fitted"]

@@ -9,11 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from notchflex.calibrate.calibration import Calibration
-from notchflex.calibrate.constants import Constant
-from notchflex.calibrate.fit import calibrate, given
+from notchflex.calibrate.fit import fitted
 from notchflex.calibrate.measurements import OBSERVED, Measurements
-from notchflex.calibrate.objective import FitObjective
-from notchflex.calibrate.problem import Progress
+from notchflex.calibrate.problem import Problem, Progress
 from notchflex.calibrate.residuals import Residuals
 from notchflex.calibrate.samples import Samples
 from notchflex.errors import InputError
@@ -56,30 +54,20 @@ class LeftOut:
 
 
 def leave_out(
-    robots: Robot | Mapping[str, Robot],
-    measurements: Measurements
-    | Sequence[Measurements]
-    | Mapping[str, Measurements | Sequence[Measurements]],
-    fit: str | Sequence[str | Constant],
+    found: Calibration,
     *,
     by: Literal["pull", "robot"],
-    objective: FitObjective | None = None,
     starts: int = 1,
     seed: int = 0,
-    settings: Settings | None = None,
     progress: Progress | None = None,
 ) -> LeftOut:
-    """Fit without each pull, or each robot, and try the constants on it.
+    """Fit again without each pull, or each robot, and try the constants on it.
 
     Args:
-        robots: As for `calibrate`.
-        measurements: As for `calibrate`.
-        fit: As for `calibrate`.
+        found: A fit to everything.
         by: "pull" or "robot".
-        objective: As for `calibrate`.
         starts: From how many places to search each time.
         seed: Of the places.
-        settings: How hard the solver tries.
         progress: Called with what is done, how much of it, and how much there is.
 
     Returns:
@@ -87,27 +75,45 @@ def leave_out(
 
     Raises:
         InputError: There is only one part, or a constant belongs to the one left out alone.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> from notchflex.calibrate import calibrate, synthetic
+        >>> wrist = load_robot("pacheco2021-a")
+        >>> noise = {"notch_angle": 0.01}
+        >>> seen = [
+        ...     synthetic(wrist, pull(0.2, 1.4, steps=7), deviation=noise, seed=seed)
+        ...     for seed in (1, 2)
+        ... ]
+        >>> found = calibrate(wrist, seen, "friction.coefficient", starts=1, intervals=False)
+        >>> tested = leave_out(found, by="pull")
+        >>> [fold.errors["notch_angle"] < 0.02 for fold in tested.folds]
+        [True, True]
     """
-    named, data = given(robots, measurements)
+    every = found.problem.samples.every
+    data = {
+        label: tuple(one.measured for one in every if one.label == label) for label in found.given
+    }
     parts = _parts(data, by)
     if len(parts) < 2:
         raise InputError(f"there is only one {by}; leaving it out leaves nothing to fit to")
-    ways = {"objective": objective, "starts": starts, "seed": seed, "settings": settings}
-    whole = calibrate(named, data, fit, intervals=False, **ways)  # pyright: ignore
+    settings = every[0].rows.settings
     folds: list[Fold] = []
     for number, part in enumerate(parts):
-        rest = {label: _without(data[label], label, part) for label in named}
-        kept = {label: robot for label, robot in named.items() if rest[label]}
-        rest = {label: rest[label] for label in kept}
-        found = calibrate(kept, rest, fit, intervals=False, **ways)  # pyright: ignore
-        own = (named[part.robot], data[part.robot], part)
-        errors, of_all = _errors(*own, found), _errors(*own, whole)
+        rest = {label: _without(data[label], label, part) for label in found.given}
+        kept = {label: robot for label, robot in found.given.items() if rest[label]}
+        constants = tuple(one.among(kept) for one in found.problem.unknowns)
+        samples = Samples.of(kept, {label: rest[label] for label in kept}, constants, settings)
+        problem = Problem(samples, found.problem.objective)
+        again = fitted(kept, problem, starts, seed, intervals=False)
+        own = (found.given[part.robot], data[part.robot], part, settings)
+        errors, of_all = _errors(*own, again), _errors(*own, found)
         folds.append(
-            Fold(part.told(data[part.robot]), found, errors or {}, of_all or {}, errors is not None)
+            Fold(part.told(data[part.robot]), again, errors or {}, of_all or {}, errors is not None)
         )
         if progress is not None:
             progress("leaving out", number + 1, len(parts))
-    return LeftOut(by, whole, tuple(folds))
+    return LeftOut(by, found, tuple(folds))
 
 
 def root_mean_squares(residuals: Residuals) -> dict[str, float]:
@@ -163,14 +169,18 @@ def _without(every: Sequence[Measurements], label: str, part: _Part) -> tuple[Me
 
 
 def _errors(
-    robot: Robot, every: Sequence[Measurements], part: _Part, found: Calibration
+    robot: Robot,
+    every: Sequence[Measurements],
+    part: _Part,
+    settings: Settings,
+    found: Calibration,
 ) -> dict[str, float] | None:
     """Errors on the part left out; None where a row of it has no solution."""
     label = part.robot
     if part.pull:
         every = [every[part.measurement].of_pulls([part.pull])]
     constants = tuple(one.shared_with(label) for one in found.problem.unknowns)
-    samples = Samples.of({label: robot}, {label: every}, constants)
+    samples = Samples.of({label: robot}, {label: every}, constants, settings)
     residuals = samples.residuals(found.best.values)
     return None if residuals is None else root_mean_squares(residuals)
 

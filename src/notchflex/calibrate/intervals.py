@@ -105,7 +105,6 @@ def _end(
     points: dict[float, float],
 ) -> tuple[float | None, str]:
     """One end of an interval: where the root of the rise, nearly straight, meets its target."""
-    others = np.delete(np.arange(len(best)), number)
     guess = min(_half_width(cost.curvature, number, rise), _FAR * scale)
     limit = lower[number] if side < 0.0 else upper[number]
     target = np.sqrt(rise)
@@ -120,7 +119,7 @@ def _end(
             reach = abs(value - best[number])
             if reach == 0.0:
                 return None, ""
-        found = _held(objective, warm, number, value, others, lower, upper)
+        found = held(objective, warm, number, value, lower, upper)
         if found is None:
             # No robot, or no solution, that far: the end must be nearer.
             outer = (reach, np.inf)
@@ -159,16 +158,25 @@ def _half_width(curvature: np.ndarray, number: int, rise: float) -> float:
     return float(np.sqrt(rise * max(inverse[number, number], 1e-12)) / plain.size[number])
 
 
-def _held(
+def held(
     objective: Objective,
-    start: np.ndarray,
+    start: Float[np.ndarray, " k"],
     number: int,
     value: float,
-    others: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-) -> tuple[np.ndarray, float] | None:
-    """The least misfit with one constant held, from a start for the others."""
+    lower: Float[np.ndarray, " k"],
+    upper: Float[np.ndarray, " k"],
+) -> tuple[Float[np.ndarray, " k"], float] | None:
+    """The least misfit with one constant held, and where; None where there is no solution.
+
+    Args:
+        objective: The misfit.
+        start: Values of all constants to begin with.
+        number: Which constant.
+        value: Where it is held.
+        lower: Least values allowed.
+        upper: Greatest values allowed.
+    """
+    others = np.delete(np.arange(len(start)), number)
 
     def whole(part: np.ndarray) -> np.ndarray:
         at = start.copy()
@@ -190,4 +198,4 @@ def _held(
     return None if found.cost is None else (whole(found.values), found.cost.value)
 
 
-__all__ = ["LEVEL", "Interval", "allowed_rise", "profile_interval"]
+__all__ = ["LEVEL", "Interval", "allowed_rise", "held", "profile_interval"]

@@ -28,13 +28,14 @@ class Noise:
     Attributes:
         deviation: Of every number (rad, mm, N), (R,).
         estimated: Which of them the fit itself has told.
-        source: By measurement and quantity: "given", "repeats", "fit", or "sum of the notches" of a
-            total angle that tells nothing that the notches do not; its deviation is infinite.
+        source: By number of the measurement and quantity: "given", "repeats", "fit", or "sum of
+            the notches" of a total angle that tells nothing that the notches do not; its deviation
+            is infinite.
     """
 
     deviation: Float[np.ndarray, " r"]
     estimated: Bool[np.ndarray, " r"]
-    source: dict[tuple[str, str], str]
+    source: dict[tuple[int, str], str]
 
     @property
     def counted(self) -> int:
@@ -51,13 +52,13 @@ def first_noise(samples: Samples, residuals: Residuals) -> Noise:
     """Standard deviations as given, or else of repeats; a first guess where there are neither."""
     deviation = residuals.given.copy()
     estimated = np.zeros(len(deviation), bool)
-    source: dict[tuple[str, str], str] = {}
+    source: dict[tuple[int, str], str] = {}
     for number, sample in enumerate(samples.every):
         told = repeats(sample.measured)
         for name in sample.measured.observed:
             own = (residuals.sample == number) & (residuals.quantity == OBSERVED.index(name))
             missing = own & ~(deviation > 0.0)
-            key = (sample.measured.source, name)
+            key = (number, name)
             if name == "total_angle" and _is_sum(sample.measured):
                 deviation[own] = np.inf
                 source[key] = "sum of the notches"

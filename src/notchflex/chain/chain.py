@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple, cast
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._jax import constant, jax, jnp
+from notchflex._pytree import Pytree, static
 from notchflex.chain.mass import body_lengths, body_masses
 from notchflex.chain.plane import bending_normal, tendons_in_plane
 from notchflex.contact import LipGroup, lay_lips
@@ -41,7 +41,7 @@ MEMORY_STIFFNESS = 4e5
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-class Chain(eqx.Module):
+class Chain(Pytree):
     """Bodies 0 (the base) to n joined by n flexures, with t tendons. Units mm, N, rad.
 
     Attributes:
@@ -96,10 +96,10 @@ class Chain(eqx.Module):
     notch_frame: Float[Array, "n 3 3"]
     tendon_place: Float[Array, "t 3"]
     contacts: Int[Array, "t edges"]
-    level: str = eqx.field(static=True)
-    loaded: bool = eqx.field(static=True)
-    refinement: int = eqx.field(static=True)
-    window: int = eqx.field(static=True)
+    level: str = static()
+    loaded: bool = static()
+    refinement: int = static()
+    window: int = static()
 
     @property
     def flexures(self) -> int:

@@ -13,7 +13,6 @@ from notchflex.cli.options import OUTPUT, JsonFile, PlotFile, Settings, robot_fi
 from notchflex.cli.spec import load_columns
 from notchflex.errors import InputError
 from notchflex.results.files import (
-    PAPER,
     STANDARD_OUTPUT,
     check_distinct,
     check_folder,
@@ -158,7 +157,7 @@ def calibrate(
         ways: dict[str, Any] = {"objective": aim, "seed": seed, "progress": progress}
         found = fitting.calibrate(robots, measured, constants, starts=starts, **ways)
         if leave_out is not None:
-            left = fitting.leave_out(robots, measured, constants, by=leave_out, **ways)
+            left = fitting.leave_out(found, by=leave_out, seed=seed, progress=progress)
         if candidates is not None:
             loads = LoadPath(*candidates)
             told = fitting.next_measurement(found, loads, robot=next_robot, narrow=narrow)
@@ -214,7 +213,7 @@ def _check_targets(
     if json is not None:
         check_output(json, "--json", inputs=inputs)
     if plot is not None:
-        check_picture(plot, "--plot", inputs=inputs, kinds=PAPER)
+        check_picture(plot, "--plot", inputs=inputs)
 
 
 def _check_sensor(names: list[str]) -> None:
@@ -266,9 +265,9 @@ def _write(
         write_json(json, document)
     if plot is not None:
         with terminal.working(f"drawing {plot}"):
-            from notchflex.plot import calibration_figure, save
+            from notchflex.plot import calibration_picture
 
-            save(calibration_figure(found), plot)
+            calibration_picture(found).save(plot)
 
 
 def _print(

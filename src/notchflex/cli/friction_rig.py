@@ -9,7 +9,6 @@ from cyclopts import Parameter
 from notchflex.cli import terminal
 from notchflex.cli.options import JsonFile, PlotFile
 from notchflex.results.files import (
-    PAPER,
     STANDARD_OUTPUT,
     check_distinct,
     check_output,
@@ -40,7 +39,7 @@ def friction_rig(
     if json is not None:
         check_output(json, "--json", inputs=[data])
     if plot is not None:
-        check_picture(plot, "--plot", inputs=[data], kinds=PAPER)
+        check_picture(plot, "--plot", inputs=[data])
 
     from notchflex.calibrate.friction_documents import friction_document
     from notchflex.calibrate.friction_readings import read_friction_rig
@@ -53,9 +52,9 @@ def friction_rig(
         write_json(json, friction_document(rig))
     if plot is not None:
         with terminal.working(f"drawing {plot}"):
-            from notchflex.plot import friction_figure, save
+            from notchflex.plot import friction_picture
 
-            save(friction_figure(rig), plot)
+            friction_picture(rig).save(plot)
     if json != STANDARD_OUTPUT:
         console = terminal.output()
         console.print(data, soft_wrap=True)

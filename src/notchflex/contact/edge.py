@@ -7,7 +7,7 @@ the plane of that face, and the force stands on the plane (no friction).
 
 from __future__ import annotations
 
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from notchflex._jax import jax
 from notchflex.contact.lip import LipGroup, Touch
@@ -25,8 +25,6 @@ class Edges(LipGroup):
     """
 
     acts_on_bodies = True
-    closes: Float[Array, "*n l"]
-    back: Int[Array, "*n l"]
     leaves: Float[Array, "*n l d"]
     enters: Float[Array, "*n l d"]
     normal: Float[Array, "*n l d"]

@@ -7,12 +7,12 @@ seen from the other, or on the flexure's strains alone.
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
-import equinox as eqx
 from jaxtyping import Array, Float, Int
 
+from notchflex._pytree import Pytree
 from notchflex.flexure import FlexureState, Rod
 from notchflex.motion import Motion
 
@@ -32,7 +32,7 @@ class Touch(NamedTuple):
     slope: Float[Array, "l modes"] | None
 
 
-class LipGroup(eqx.Module):
+class LipGroup(Pytree, ABC):
     """Lips of one kind. Arrays carry the flexures as leading axis, then the lips.
 
     Attributes:
@@ -42,8 +42,8 @@ class LipGroup(eqx.Module):
     """
 
     acts_on_bodies: ClassVar[bool]
-    closes: eqx.AbstractVar[Float[Array, "*n l"]]
-    back: eqx.AbstractVar[Int[Array, "*n l"]]
+    closes: Float[Array, "*n l"]
+    back: Int[Array, "*n l"]
 
     @abstractmethod
     def touch(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Touch:

@@ -6,7 +6,7 @@ On the concentric arc of Pacheco 2021 the gap is h - (r_o + ybar) theta.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float
 
 from notchflex._jax import constant
 from notchflex.contact.lip import LipGroup, Touch
@@ -18,8 +18,6 @@ class SpineLips(LipGroup):
     """One pair of lips at every notch that has a spine."""
 
     acts_on_bodies = False
-    closes: Float[Array, "*n l"]
-    back: Int[Array, "*n l"]
 
     def touch(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Touch:
         """Length of the fibre between the lips."""

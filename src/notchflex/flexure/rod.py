@@ -12,13 +12,13 @@ nodes and the steps at them are all that is kept (`shape.py`).
 
 from __future__ import annotations
 
-import equinox as eqx
 from jaxtyping import Array, Float, Int
 
+from notchflex._pytree import Pytree, static
 from notchflex.material.section_law import FibreSection
 
 
-class Rod(eqx.Module):
+class Rod(Pytree):
     """One flexure, or with a leading axis all flexures of a chain. Units mm, rad.
 
     Attributes:
@@ -77,7 +77,7 @@ class Rod(eqx.Module):
     small: Float[Array, "*n"] | None
     chord: Float[Array, "*n"] | None
     idle: Float[Array, "*n modes"]
-    levels: tuple[int, int, int] = eqx.field(static=True)
+    levels: tuple[int, int, int] = static()
 
     @property
     def modes(self) -> int:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
+from notchflex._pytree import Pytree
 from notchflex.flexure.rod import Rod
 from notchflex.flexure.shape import Bent, bent, relative_pose, rod_end, twist_slope
 from notchflex.material import SectionLaw
 from notchflex.motion import PLANE, Motion, angular, rotation_about
 
 
-class FlexureState(eqx.Module):
+class FlexureState(Pytree):
     """One flexure under given modes (mm, N, rad), in the frame of its proximal body.
 
     Attributes:

@@ -6,17 +6,17 @@ package imports every file of the folder, so no list is kept.
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from functools import singledispatch
 from typing import Any, ClassVar
 
-import equinox as eqx
 from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import jnp
+from notchflex._pytree import Pytree
 
 
-class FrictionLaw(eqx.Module):
+class FrictionLaw(Pytree, ABC):
     """Friction of a tendon at the two edges of a gap.
 
     Attributes:

@@ -7,17 +7,17 @@ two laws of today have none and hand it back untouched.
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar, NamedTuple
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import array_module, jax
+from notchflex._pytree import Pytree
 
 
-class FibreSection(eqx.Module):
+class FibreSection(Pytree):
     """What a law needs of a cross-section, about its neutral axis. Units mm.
 
     The section's x points to the cut side, z along the rod. Leading axes are allowed.
@@ -53,7 +53,7 @@ class Response(NamedTuple):
     memory: Any
 
 
-class SectionLaw(eqx.Module):
+class SectionLaw(Pytree, ABC):
     """A material as the chain sees it. Tangents come from the resultants by differentiation.
 
     Attributes:

@@ -3,10 +3,10 @@
 from notchflex.plot.animation import save_animation
 from notchflex.plot.batch import batch_picture
 from notchflex.plot.beside import beside_picture
-from notchflex.plot.calibration import calibration_figure
+from notchflex.plot.calibration import calibration_figure, calibration_picture
 from notchflex.plot.comparison import comparison_figure, comparison_picture
 from notchflex.plot.equilibrium import state_picture
-from notchflex.plot.friction import friction_figure
+from notchflex.plot.friction import friction_figure, friction_picture
 from notchflex.plot.path import path_figure, path_picture
 from notchflex.plot.picture import picture
 from notchflex.plot.sheet import Picture
@@ -17,9 +17,11 @@ __all__ = [
     "batch_picture",
     "beside_picture",
     "calibration_figure",
+    "calibration_picture",
     "comparison_figure",
     "comparison_picture",
     "friction_figure",
+    "friction_picture",
     "path_figure",
     "path_picture",
     "picture",

@@ -1,29 +1,46 @@
-"""A fit as a picture: data with the model's band, residuals, profiles, correlations."""
+"""The picture of a fit: data with the model's band, residuals, profiles, correlations."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-
-from notchflex.plot.calibration_constants import draw_correlation, draw_profile
-from notchflex.plot.calibration_rows import Part, draw_data, draw_residuals, parts_shown
-from notchflex.plot.style import BLUE, GREY, VERMILLION, house_style, new_figure
+from notchflex.plot.calibration_constants import END, correlation_panel, profile_panel
+from notchflex.plot.calibration_rows import (
+    MEASURED,
+    MODEL,
+    band,
+    data_panel,
+    parts_shown,
+    residual_entries,
+    residual_panel,
+)
+from notchflex.plot.sheet import DASHED, Area, Cell, Line, Panel, Picture
+from notchflex.plot.style import BLUE, GREY, VERMILLION
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from notchflex.calibrate import Calibration
 
 COLUMNS = 4
 
 
 def calibration_figure(found: Calibration) -> Figure:
-    """Draw a fit.
+    """Draw a fit with matplotlib; for what it shows see `calibration_picture`.
+
+    Args:
+        found: The fit.
+
+    Returns:
+        The figure; `notchflex.plot.save` writes it.
+    """
+    return calibration_picture(found).figure()
+
+
+def calibration_picture(found: Calibration) -> Picture:
+    """Describe a fit.
 
     Robot by robot every notch and what else was measured over the load: measured points are open
     markers, the line is the model with the constants that were found, and its band is where the
@@ -37,40 +54,36 @@ def calibration_figure(found: Calibration) -> Figure:
         found: The fit.
 
     Returns:
-        The figure; `notchflex.plot.save` writes it.
+        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
     """
-    rooms: list[Callable[[Axes], None]] = []
+    panels: list[Panel] = []
     for label in found.given:
-        shown: list[Part] = parts_shown(found, label)
-        rooms += [partial(draw_data, found=found, part=part) for part in shown]
-        rooms.append(partial(draw_residuals, found=found, label=label))
-    rooms += [partial(draw_profile, found=found, name=name) for name in found.intervals]
+        panels += [data_panel(found, part) for part in parts_shown(found, label)]
+        panels.append(residual_panel(found, label))
+    panels += [profile_panel(found, name) for name in found.intervals]
     if len(found.names) > 1:
-        rooms.append(partial(draw_correlation, found=found))
-    columns = min(COLUMNS, len(rooms))
-    rows = math.ceil(len(rooms) / columns)
-    with house_style():
-        title = f"{', '.join(found.given)}: {len(found.residuals)} numbers measured"
-        figure = new_figure(3.0 * columns, 2.6 * rows + 0.4, title)
-        for number, draw in enumerate(rooms):
-            draw(figure.add_subplot(rows, columns, number + 1))
-        figure.legend(handles=_legend(), loc="outside lower center", ncols=4)
-    return figure
-
-
-def _legend() -> list[Line2D | Patch]:
-    return [
-        Line2D(
-            [],
-            [],
-            linestyle="",
-            marker="o",
-            markersize=4.0,
-            markerfacecolor="none",
-            markeredgecolor=GREY,
-            label="measured, a kind of marker for each pull",
-        ),
-        Line2D([], [], color=BLUE, label="model"),
-        Patch(facecolor=BLUE, alpha=0.25, label="95 % band of the model"),
-        Line2D([], [], color=VERMILLION, linestyle="--", label="end of the 95 % interval"),
+        panels.append(correlation_panel(found))
+    columns = min(COLUMNS, len(panels))
+    cells = [
+        Cell(
+            panel, (index // columns, index // columns + 1), (index % columns, index % columns + 1)
+        )
+        for index, panel in enumerate(panels)
     ]
+    rows = math.ceil(len(panels) / columns)
+    title = f"{', '.join(found.given)}: {len(found.residuals)} numbers measured"
+    return Picture(title, 3.0 * columns, 2.6 * rows + 0.4, cells, _legend(found, panels))
+
+
+def _legend(found: Calibration, panels: Sequence[Panel]) -> list[Line | Area]:
+    """Entries for what the panels show."""
+    measured = "measured, a kind of marker for each pull"
+    entries: list[Line | Area] = [
+        Line([], GREY, None, marker="o", size=4.0, hollow=True, name=measured, group=MEASURED),
+        Line([], BLUE, name=MODEL, group=MODEL),
+        band([], "95 % band of the model"),
+        Line([], VERMILLION, DASHED, 1.0, name="end of the 95 % interval", group=END),
+        *residual_entries(found),
+    ]
+    shown = {getattr(item, "group", "") for panel in panels for item in panel.items}
+    return [entry for entry in entries if entry.group in shown]

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from notchflex.plot.sheet import MARKERS, Area, Item, Level, Line, Panel, Stripe
 from notchflex.plot.style import BLUE, GREY, sequence_colours
 from notchflex.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from notchflex.calibrate import Calibration
 
-MARKERS = "osD^vP*X"
-# Of a robot with more notches some are drawn.
+MEASURED, MODEL, BAND = "measured", "model", "band"
+"""What shows and hides lines of all panels together."""
+
 MOST_NOTCHES = 6
+"""Of a robot with more notches some are drawn."""
+
+MOST_TOLD = 8
+"""Of so many notches a legend tells the first and the last colour."""
 
 
 class Part(NamedTuple):
@@ -36,6 +43,8 @@ class _Line(NamedTuple):
     model: NDArray[np.float64]
     half: NDArray[np.float64]
     pulls: NDArray[np.intp]
+    names: list[str]
+    """What the measurements call the pull of every row."""
 
 
 def parts_shown(found: Calibration, label: str) -> list[Part]:
@@ -56,65 +65,89 @@ def parts_shown(found: Calibration, label: str) -> list[Part]:
     return parts
 
 
-def draw_data(axes: Axes, *, found: Calibration, part: Part) -> None:
-    """Draw one number over the load: measured, model, and the band of the model."""
+def data_panel(found: Calibration, part: Part) -> Panel:
+    """Return one number over the load: measured, model, and the band of the model."""
     from notchflex.calibrate.errors_of_parts import edge
 
     _, unit, scale = edge(part.quantity)
+    items: list[Item] = []
     for line in _lines(found, part):
         measured, model, half = (one * scale for one in (line.measured, line.model, line.half))
         if np.isfinite(half).all():
-            axes.fill_between(
-                line.x, model - half, model + half, color=BLUE, alpha=0.25, linewidth=0.0
-            )
-        axes.plot(line.x, model, color=BLUE, zorder=3)
-        for pull in np.unique(line.pulls):
+            ends = [np.stack([line.x, model + way * half], axis=1) for way in (-1.0, 1.0)]
+            items.append(band([np.concatenate([ends[0], ends[1][::-1]])]))
+        curve = np.stack([line.x, model], axis=1)
+        items.append(Line(curve, BLUE, group=MODEL, layer=3, told=True))
+        for pull, name in dict.fromkeys(zip(line.pulls.tolist(), line.names, strict=True)):
             mine = line.pulls == pull
-            axes.plot(line.x[mine], measured[mine], **_marker(int(pull)))
-    axes.set_title(
-        f"{part.label}: {part.title}" if len(found.given) > 1 else part.title, loc="left"
+            points = np.stack([line.x[mine], measured[mine]], axis=1)
+            mark: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "size": 3.2}
+            mark |= {"name": f"{MEASURED}, pull {name}", "group": MEASURED, "layer": 4}
+            items.append(Line(points, GREY, None, hollow=True, told=True, **mark))
+    return Panel(
+        items,
+        _abscissa(found, part.label)[1],
+        f"{_kind(part.quantity)} [{unit}]",
+        title=f"{part.label}: {part.title}" if len(found.given) > 1 else part.title,
     )
-    axes.set_xlabel(_abscissa(found, part.label)[1])
-    axes.set_ylabel(f"{_kind(part.quantity)} [{unit}]")
 
 
-def draw_residuals(axes: Axes, *, found: Calibration, label: str) -> None:
-    """Draw what is left of every number of a robot over its noise; notches by colour."""
+def band(polygons: Sequence[NDArray[np.float64]], name: str = "") -> Area:
+    """Return where the model lies with 95 %."""
+    return Area(polygons, BLUE, BLUE, 0.25, 0.0, name=name, group=BAND)
+
+
+def residual_panel(found: Calibration, label: str) -> Panel:
+    """Return what is left of every number of a robot over its noise; notches by colour."""
+    own, angles = _own(found, label)
+    notch = found.residuals.part
+    points = np.stack(
+        [_abscissa(found, label)[0], found.residuals.values / found.noise.deviation], axis=1
+    )
+    items: list[Item] = [Stripe(-1.96, 1.96, GREY, 0.15), Level(0.0, GREY)]
+    if (own & ~angles).any():
+        items.append(replace(_OTHERS, points=points[own & ~angles], told=True, layer=1))
+    for one, entry in _notch_entries(found).items():
+        mine = points[angles & (notch == one)]
+        if len(mine):
+            items.append(replace(entry, points=mine, told=True, layer=3))
+    title = "model less measured"
+    return Panel(
+        items,
+        _abscissa(found, label)[1],
+        "residual / its noise",
+        title=f"{label}: {title}" if len(found.given) > 1 else title,
+    )
+
+
+def residual_entries(found: Calibration) -> list[Line]:
+    """Return what a legend tells of the residuals: colours of notches, marks of all others."""
+    every = list(_notch_entries(found).values())
+    told = every if len(every) < MOST_TOLD else [every[0], every[-1]]
+    return [*told, _OTHERS]
+
+
+_OTHERS = Line([], GREY, None, marker="X", size=3.5, name="residuals of others", group="others")
+
+
+def _notch_entries(found: Calibration) -> dict[int, Line]:
+    """Every notch (from 0) with its mark, the same for all robots."""
+    angles = np.any([_own(found, label)[1] for label in found.given], axis=0)
+    notches = np.unique(found.residuals.part[angles]).tolist()
+    colours = sequence_colours(len(notches))
+    names = [f"residuals of notch {notch + 1}" for notch in notches]
+    return {
+        notch: Line([], colour, None, marker="o", size=3.0, name=name, group=name)
+        for notch, colour, name in zip(notches, colours, names, strict=True)
+    }
+
+
+def _own(found: Calibration, label: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which residuals are those of a robot, and which of these are angles of notches."""
     from notchflex.calibrate.measurements import OBSERVED
 
-    residuals = found.residuals
-    own = residuals.robot == list(found.given).index(label)
-    scaled = residuals.values / found.noise.deviation
-    x = _abscissa(found, label)[0]
-    axes.axhspan(-1.96, 1.96, color=GREY, alpha=0.15, linewidth=0.0)
-    axes.axhline(0.0, color=GREY, linewidth=0.8)
-    angles = own & (residuals.quantity == OBSERVED.index("notch_angle"))
-    notches = np.unique(residuals.part[angles])
-    for notch, colour in zip(notches, sequence_colours(len(notches)), strict=True):
-        mine = angles & (residuals.part == notch)
-        name = f"{notch + 1}" if notch in (notches[0], notches[-1]) or len(notches) < 8 else None
-        axes.plot(x[mine], scaled[mine], "o", color=colour, markersize=3.0, label=name)
-    other = own & ~angles
-    if other.any():
-        axes.plot(
-            x[other], scaled[other], "x", color=GREY, markersize=3.5, label="others", zorder=1
-        )
-    title = "model less measured"
-    axes.set_title(f"{label}: {title}" if len(found.given) > 1 else title, loc="left")
-    axes.set_xlabel(_abscissa(found, label)[1])
-    axes.set_ylabel("residual / its noise")
-    if len(notches):
-        most = max(2.2, 1.1 * float(np.max(np.abs(scaled[own]))))
-        axes.set_ylim(-most, 2.0 * most)  # room for the names of the colours
-        axes.legend(
-            title="notch",
-            fontsize=6.5,
-            title_fontsize=6.5,
-            ncols=4,
-            handletextpad=0.0,
-            columnspacing=0.6,
-            loc="upper center",
-        )
+    own = found.residuals.robot == list(found.given).index(label)
+    return own, own & (found.residuals.quantity == OBSERVED.index("notch_angle"))
 
 
 def _lines(found: Calibration, part: Part) -> list[_Line]:
@@ -139,7 +172,8 @@ def _lines(found: Calibration, part: Part) -> list[_Line]:
         for rows in groups:
             model = _model(found, rows, part, measured)
             values = model - residuals.values[rows]
-            lines.append(_Line(x[rows], values, model, half[rows], residuals.pull[rows]))
+            names = [str(measured.pull[row]) for row in residuals.row[rows]]
+            lines.append(_Line(x[rows], values, model, half[rows], residuals.pull[rows], names))
     return lines
 
 
@@ -194,17 +228,6 @@ def _abscissa(found: Calibration, label: str) -> tuple[NDArray[np.float64], str]
         there = residuals.sample == number
         x[there] = residuals.row[there] + 1
     return x, "row"
-
-
-def _marker(pull: int) -> dict[str, Any]:
-    return {
-        "linestyle": "",
-        "marker": MARKERS[pull % len(MARKERS)],
-        "markersize": 3.2,
-        "markerfacecolor": "none",
-        "markeredgecolor": GREY,
-        "markeredgewidth": 0.8,
-    }
 
 
 def _kind(quantity: str) -> str:

@@ -15,6 +15,7 @@ from notchflex.plot.sheet import (
     DASH_DOT,
     DASHED,
     DOTTED,
+    MARKERS,
     MIXED,
     SOLID,
     Bars,
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 
 MODEL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 MODEL_LINES = (SOLID, DASHED, DASH_DOT, DOTTED, MIXED)
-TRIAL_MARKERS = "osD^vP*X"
 SHAPES = 6
 
 
@@ -166,7 +166,7 @@ def _points(
             np.stack([x[there], y[there]], axis=1),
             GREY,
             None,
-            marker=TRIAL_MARKERS[index % len(TRIAL_MARKERS)],
+            marker=MARKERS[index % len(MARKERS)],
             size=3.2,
             hollow=True,
             group=_trial_name(label, trial),
@@ -229,7 +229,7 @@ def _errors(models: Mapping[str, Comparison]) -> Panel:
 
 def _legend(models: Mapping[str, Comparison], trial: tuple[str, ...]) -> list[Line]:
     entries: list[Line] = []
-    for label, marker in zip(dict.fromkeys(trial), TRIAL_MARKERS, strict=False):
+    for label, marker in zip(dict.fromkeys(trial), MARKERS, strict=False):
         name = _trial_name(label, trial)
         options: dict[str, Any] = {"marker": marker, "size": 4.0, "hollow": True, "group": name}
         entries.append(Line([], GREY, None, name=name, **options))

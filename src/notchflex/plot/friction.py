@@ -1,23 +1,38 @@
-"""A picture of the friction rig: the readings over turn and load, with the estimate."""
+"""The picture of the friction rig: the readings over turn and load, with the estimate."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from notchflex.plot.style import BLUE, GREY, ORANGE, VERMILLION, house_style, new_figure
+from notchflex.plot.sheet import BESIDE, Cell, Item, Level, Line, Panel, Picture, Stripe
+from notchflex.plot.style import BLUE, GREY, ORANGE, VERMILLION
 from notchflex.results.quantities import DEGREES
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from notchflex.calibrate import FrictionRig
+
+_READING = "#333333"
 
 
 def friction_figure(rig: FrictionRig) -> Figure:
-    """Draw the coefficients of all readings of the friction rig.
+    """Draw the friction rig with matplotlib; for what it shows see `friction_picture`.
+
+    Args:
+        rig: The estimate.
+
+    Returns:
+        The figure; `notchflex.plot.save` writes it.
+    """
+    return friction_picture(rig).figure()
+
+
+def friction_picture(rig: FrictionRig) -> Picture:
+    """Describe the coefficients of all readings of the friction rig.
 
     Left over the turn, right over the load: readings with their standard deviations where known,
     outliers marked, the estimate with its 95 % interval and the spread of the readings as bands,
@@ -27,70 +42,60 @@ def friction_figure(rig: FrictionRig) -> Figure:
         rig: The estimate.
 
     Returns:
-        The figure; `save` writes it.
+        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
+
+    Example:
+        >>> import notchflex as nf
+        >>> readings = nf.FrictionReadings([200.0, 300.0], [150.0, 221.0], [1.6, 1.6], [1.6, 1.6])
+        >>> left, right = friction_picture(nf.friction_rig(readings)).cells
+        >>> right.panel.x_label
+        'weight 1 [g]'
     """
     readings, test = rig.readings, rig.constancy
-    with house_style():
-        figure = new_figure(8.0, 3.6, f"Coefficient of friction, {readings.source}")
-        left, right = figure.subplots(1, 2, sharey=True)
-        turn, load = readings.turn * DEGREES, readings.weight_1
-        _draw(left, rig, turn)
-        _draw(right, rig, load)
-        if test.enough is False:
-            _line(left, rig, turn, test.by_turn / DEGREES)
-            _line(right, rig, load, test.by_load, logarithmic=True)
-        left.set_xlabel("turn over both edges [deg]")
-        right.set_xlabel("weight 1 [g]")
-        left.set_ylabel(r"coefficient of friction $\mu$")
-        right.legend(loc="best")
-    return figure
+    turn, load = readings.turn * DEGREES, readings.weight_1
+    over_turn, over_load = _items(rig, turn), _items(rig, load)
+    if test.enough is False:
+        over_turn += _other_model(rig, turn, test.by_turn / DEGREES)
+        over_load += _other_model(rig, load, test.by_load, logarithmic=True)
+    label = r"coefficient of friction $\mu$"
+    left = Panel(over_turn, "turn over both edges [deg]", label, shared_y=True)
+    right = Panel(over_load, "weight 1 [g]", label, legend=BESIDE, shared_y=True)
+    cells = [Cell(left, (0, 1), (0, 1)), Cell(right, (0, 1), (1, 2))]
+    return Picture(f"Coefficient of friction, {readings.source}", 9.6, 3.6, cells)
 
 
-def _draw(axes: Axes, rig: FrictionRig, x: NDArray[np.float64]) -> None:
+def _items(rig: FrictionRig, x: NDArray[np.float64]) -> list[Item]:
+    """The estimate and the readings, over what changed from reading to reading."""
     readings = rig.readings
     low, high = rig.interval
+    items: list[Item] = []
     if np.isfinite(rig.spread):
         ends = rig.coefficient - rig.spread, rig.coefficient + rig.spread
-        axes.axhspan(*ends, color=GREY, alpha=0.15, linewidth=0.0, label="spread of readings")
+        items.append(Stripe(*ends, GREY, 0.15, name="spread of readings"))
     if np.isfinite(low):
-        axes.axhspan(low, high, color=BLUE, alpha=0.3, linewidth=0.0, label="95 % interval")
-    axes.axhline(rig.coefficient, color=BLUE, label=rf"$\mu$ = {rig.coefficient:.4g}")
-    known = np.isfinite(readings.coefficient_deviation)
-    style: dict[str, Any] = {"color": "0.2", "linestyle": "none", "marker": "o", "markersize": 3.0}
-    axes.errorbar(
-        x,
-        readings.coefficient,
-        yerr=np.where(known, readings.coefficient_deviation, 0.0) if known.any() else None,
-        elinewidth=0.7,
-        label="reading",
-        **style,
-    )
+        items.append(Stripe(low, high, BLUE, 0.3, name="95 % interval"))
+    name = rf"$\mu$ = {rig.coefficient:.4g}"
+    items.append(Level(rig.coefficient, BLUE, width=1.4, name=name, group="estimate"))
+    points = np.stack([x, readings.coefficient], axis=1)
+    deviation = readings.coefficient_deviation
+    half = deviation if np.isfinite(deviation).any() else None
+    dots: dict[str, Any] = {"dash": None, "marker": "o", "told": True, "half": half}
+    items.append(Line(points, _READING, name="reading", group="reading", **dots))
     if rig.outliers:
-        off = list(rig.outliers)
-        axes.plot(
-            x[off],
-            readings.coefficient[off],
-            linestyle="none",
-            marker="o",
-            markersize=8.0,
-            markerfacecolor="none",
-            markeredgecolor=VERMILLION,
-            label="outlier",
-        )
+        off = points[list(rig.outliers)]
+        mark: dict[str, Any] = {"dash": None, "marker": "o", "size": 8.0, "hollow": True}
+        items.append(Line(off, VERMILLION, name="outlier", group="outlier", layer=3, **mark))
+    return items
 
 
-def _line(
-    axes: Axes,
-    rig: FrictionRig,
-    x: NDArray[np.float64],
-    slope: float,
-    *,
-    logarithmic: bool = False,
-) -> None:
-    """Draw how the other model depends on one of the two, the other one at its mean."""
+def _other_model(
+    rig: FrictionRig, x: NDArray[np.float64], slope: float, *, logarithmic: bool = False
+) -> list[Item]:
+    """How the other model depends on one of the two, the other one at its mean."""
     if not np.isfinite(slope):
-        return
+        return []
     places = np.linspace(x.min(), x.max(), 100)
     along = np.log(places) - np.mean(np.log(x)) if logarithmic else places - x.mean()
     mean = float(np.mean(rig.readings.coefficient))
-    axes.plot(places, mean + slope * along, color=ORANGE, label="not constant")
+    line = np.stack([places, mean + slope * along], axis=1)
+    return [Line(line, ORANGE, name="not constant", group="not constant", layer=3)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from notchflex.errors import InputError
@@ -16,8 +17,8 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
     """Describe the picture of a result, whatever its kind.
 
     Args:
-        result: A `Path`, an `Equilibrium`, a `Batch`, a `Comparison`, or a dict of label to path
-            for several beside each other.
+        result: A `Path`, an `Equilibrium`, a `Batch`, a `Comparison`, a `Calibration`, a
+            `FrictionRig`, or a dict of label to path for several beside each other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -35,26 +36,40 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     picture(state).save(f"{folder}/wrist.svg")
     """
+    made = _picture(result)
+    return made if title is None else replace(made, title=title)
+
+
+def _picture(result: Any) -> Picture:
     from notchflex.compare import Comparison
     from notchflex.plot.batch import batch_picture
     from notchflex.plot.beside import beside_picture
+    from notchflex.plot.calibration import calibration_picture
     from notchflex.plot.comparison import comparison_picture
     from notchflex.plot.equilibrium import state_picture
+    from notchflex.plot.friction import friction_picture
     from notchflex.plot.path import path_picture
     from notchflex.statics import Batch, Equilibrium, Path
 
-    named = {} if title is None else {"title": title}
     if isinstance(result, Path):
-        return path_picture(result, **named)
+        return path_picture(result)
     if isinstance(result, Equilibrium):
-        return state_picture(result.path, result.step, **named)
+        return state_picture(result.path, result.step)
     if isinstance(result, Batch):
-        return batch_picture(result, **named)
+        return batch_picture(result)
     if isinstance(result, Comparison):
         return comparison_picture(result)
     if isinstance(result, Mapping) and all(isinstance(one, Path) for one in result.values()):
-        return beside_picture(cast("Mapping[str, Path]", result), **named)
+        return beside_picture(cast("Mapping[str, Path]", result))
+
+    # Late: it takes a second to import, and those above do without.
+    from notchflex.calibrate import Calibration, FrictionRig
+
+    if isinstance(result, Calibration):
+        return calibration_picture(result)
+    if isinstance(result, FrictionRig):
+        return friction_picture(result)
     raise InputError(
-        "a picture is made of a Path, an Equilibrium, a Batch, a Comparison or a dict of paths; "
-        f"got {type(result).__name__}."
+        "a picture is made of a Path, an Equilibrium, a Batch, a Comparison, a Calibration, a "
+        f"FrictionRig or a dict of paths; got {type(result).__name__}."
     )

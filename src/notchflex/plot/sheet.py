@@ -27,6 +27,9 @@ SOLID: tuple[float, ...] = ()
 DASHED, DOTTED, DASH_DOT = (4.0, 2.0), (1.0, 1.6), (6.4, 1.6, 1.0, 1.6)
 FINE, MIXED = (3.0, 2.0), (5.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 
+MARKERS = "osD^vP*X"
+"""Marks that a line can have at its points."""
+
 INSIDE, BESIDE, BELOW = "inside", "beside", "below"
 """Where the legend of a panel stands."""
 
@@ -40,7 +43,7 @@ class Line:
         colour: Its colour.
         dash: Lengths of strokes and gaps; `SOLID`, or None for marks alone.
         width: In points.
-        marker: The mark at every point, one of `o s ^ D v P * X`, or "".
+        marker: The mark at every point, one of `MARKERS`, or "".
         size: Of the marks, in points.
         hollow: Whether marks have no filling.
         name: What a legend calls it; "" for nothing.
@@ -48,6 +51,7 @@ class Line:
         layer: Above what it lies.
         told: Whether a browser tells the numbers under the pointer.
         blunt: Whether its ends are cut off straight.
+        half: Half the height of the error bar at every point, (k,), NaN for none; in the plane.
     """
 
     points: Any
@@ -62,6 +66,7 @@ class Line:
     layer: int = 2
     told: bool = False
     blunt: bool = False
+    half: Any = None
 
     @property
     def rows(self) -> Points:
@@ -116,7 +121,34 @@ class Upright:
 
     at: float
     colour: Colour = "#666666"
+    dash: tuple[float, ...] = DOTTED
+    width: float = 0.8
     name: str = ""
+    group: str = ""
+
+
+@dataclass(frozen=True)
+class Level:
+    """A horizontal line over the whole width of a panel."""
+
+    at: float
+    colour: Colour
+    dash: tuple[float, ...] = SOLID
+    width: float = 0.8
+    name: str = ""
+    group: str = ""
+
+
+@dataclass(frozen=True)
+class Stripe:
+    """All between two heights, over the whole width of a panel."""
+
+    low: float
+    high: float
+    colour: Colour
+    opacity: float
+    name: str = ""
+    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -130,13 +162,47 @@ class Bars:
 
 
 @dataclass(frozen=True)
+class Correlations:
+    """Correlations of n numbers as a square of colours, each with its value.
+
+    Attributes:
+        values: From -1 to 1, (n, n); NaN where there is none.
+        names: Of the n numbers, which a browser tells under the pointer.
+        rows: What stands beside the rows; under the columns stand their numbers from 1.
+    """
+
+    values: Points
+    names: Sequence[str]
+    rows: Sequence[str]
+
+    @property
+    def texts(self) -> list[list[str]]:
+        """What stands in the square."""
+        return [[f"{one:.2f}" if np.isfinite(one) else "-" for one in row] for row in self.values]
+
+    @property
+    def letters(self) -> float:
+        """Size of the letters in it, in points, with which a value fits its place."""
+        count = len(self.names)
+        return 8.0 if count < 6 else 36.0 / count
+
+    @property
+    def outer_letters(self) -> float:
+        """Size of the letters beside and below it, in points."""
+        return min(7.0, 3.1 * self.letters)
+
+
+@dataclass(frozen=True)
 class Note:
-    """A sentence in the middle of a panel that has nothing else to show."""
+    """A sentence in the middle of a panel that has nothing else to show, or in its corner."""
 
     text: str
+    colour: Colour = "black"
+    corner: bool = False
+    """Whether it stands at the upper left, beside what else is drawn."""
 
 
-Item = Line | Area | Faces | Arrow | Upright | Bars | Note
+Item = Line | Area | Faces | Arrow | Upright | Level | Stripe | Bars | Correlations | Note
 
 
 @dataclass(frozen=True)
@@ -156,7 +222,9 @@ class Panel:
         y_range: The same upward.
         whole_x: Whether the axis has whole numbers only.
         whole_y: The same upward.
+        most_x: How many numbers stand at the axis at most; None for what has room.
         shared_x: Whether its horizontal axis is that of the other such panels.
+        shared_y: The same upward.
     """
 
     items: Sequence[Item]
@@ -171,7 +239,9 @@ class Panel:
     y_range: tuple[float | None, float | None] | None = None
     whole_x: bool = False
     whole_y: bool = False
+    most_x: int | None = None
     shared_x: bool = False
+    shared_y: bool = False
 
     @property
     def in_space(self) -> bool:
@@ -204,7 +274,7 @@ class Picture:
     width: float
     height: float
     cells: Sequence[Cell]
-    legend: Sequence[Line] = field(default_factory=tuple[Line, ...])
+    legend: Sequence[Line | Area] = field(default_factory=tuple[Line, ...])
 
     @property
     def shape(self) -> tuple[int, int]:

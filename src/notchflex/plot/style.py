@@ -28,6 +28,9 @@ VERMILLION = "#D55E00"
 PURPLE = "#CC79A7"
 GREY = "#7F7F7F"
 
+DIVERGING = "PuOr"
+"""matplotlib's name of the colours from -1 to 1: orange, white, purple."""
+
 DOTS_PER_INCH = 200
 
 SETTINGS: dict[Any, Any] = {
@@ -78,6 +81,11 @@ def sequence_colours(count: int) -> list[tuple[float, float, float, float]]:
     """Return `count` colours in an order that the eye sees, dark to light, also in grey print."""
     # The lightest fifth of the map is too pale for lines on white paper.
     return [tuple(c) for c in matplotlib.colormaps["viridis"](np.linspace(0.0, 0.82, count))]
+
+
+def diverging_colours(count: int) -> list[tuple[float, float, float, float]]:
+    """Return `count` colours for values from -1 to 1, white in the middle."""
+    return [tuple(c) for c in matplotlib.colormaps[DIVERGING](np.linspace(0.0, 1.0, count))]
 
 
 def save(figure: Figure, target: str | FilePath) -> None:

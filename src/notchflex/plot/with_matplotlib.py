@@ -17,14 +17,17 @@ from notchflex.plot.sheet import (
     Area,
     Arrow,
     Bars,
+    Correlations,
     Faces,
+    Level,
     Line,
     Note,
     Panel,
     Picture,
+    Stripe,
     Upright,
 )
-from notchflex.plot.style import house_style, new_figure, rgb
+from notchflex.plot.style import DIVERGING, house_style, new_figure, rgb
 
 ELEVATION, AZIMUTH = 18.0, -60.0
 
@@ -35,15 +38,16 @@ def figure_of(picture: Picture) -> Figure:
         figure = new_figure(picture.width, picture.height, picture.title)
         grid = figure.add_gridspec(*picture.shape)
         scales: dict[str, list[Axes]] = {}
-        shared: Axes | None = None
+        shared: dict[str, Axes] = {}
         for cell in picture.cells:
             panel = cell.panel
             place = grid[slice(*cell.rows), slice(*cell.columns)]
             options: dict[str, Any] = {"projection": "3d"} if panel.in_space else {}
-            if panel.shared_x:
-                options["sharex"] = shared
+            sharing = [name for name in "xy" if getattr(panel, f"shared_{name}")]
+            options |= {f"share{name}": shared.get(name) for name in sharing}
             axes: Any = figure.add_subplot(place, **options)
-            shared = shared or (axes if panel.shared_x else None)
+            for name in sharing:
+                shared.setdefault(name, axes)
             draw_panel(axes, panel)
             if panel.scale:
                 scales.setdefault(panel.scale, []).append(axes)
@@ -54,9 +58,25 @@ def figure_of(picture: Picture) -> Figure:
                     axes.update_datalim(other.dataLim.get_points())
                 axes.autoscale_view()
         if picture.legend:
-            entries = [_line_2d(one) for one in picture.legend]
-            figure.legend(handles=entries, loc="outside lower center", ncols=min(8, len(entries)))
+            entries = [
+                _line_2d(one)
+                if isinstance(one, Line)
+                else _polygon(one, np.zeros((1, 2)), one.name)
+                for one in picture.legend
+            ]
+            columns = _columns([one.name for one in picture.legend], picture.width)
+            figure.legend(handles=entries, loc="outside lower center", ncols=columns)
     return figure
+
+
+def _columns(names: list[str], width: float) -> int:
+    """How many columns a legend has, 8 at most, to be no wider than its picture [in]."""
+    # Room for the mark and the gap, and the mean width of a letter of 8 points.
+    wide = [0.55 + 0.068 * len(name) for name in names]
+    for columns in range(min(8, len(names)), 1, -1):
+        if sum(part.max() for part in np.array_split(wide, columns)) <= width:
+            return columns
+    return 1
 
 
 def draw_panel(axes: Any, panel: Panel) -> None:
@@ -84,6 +104,8 @@ def draw_panel(axes: Any, panel: Panel) -> None:
     ):
         if whole:
             getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(integer=True))
+        if name == "x" and panel.most_x is not None:
+            axes.locator_params(axis="x", nbins=panel.most_x)
         if wanted is not None:
             getattr(axes, f"set_{name}lim")(*wanted)
     if panel.legend == BELOW:  # axes of three dimensions have no empty corner
@@ -98,29 +120,31 @@ def _draw(axes: Any, item: Any) -> None:
     match item:
         case Line():
             axes.add_line(_line(axes, item))
+            if item.half is not None:
+                x, y = item.rows.T
+                bars: dict[str, Any] = {"ecolor": item.colour, "elinewidth": 0.7}
+                half = np.nan_to_num(item.half)  # no bar has no height
+                axes.errorbar(x, y, yerr=half, fmt="none", zorder=item.layer, **bars)
         case Area():
             for index, polygon in enumerate(item.polygons):
-                axes.add_patch(
-                    Polygon(
-                        polygon,
-                        facecolor=(*rgb(item.face), item.opacity),
-                        edgecolor=item.edge,
-                        linewidth=item.width,
-                        joinstyle="round",
-                        zorder=item.layer,
-                        label=item.name if item.name and not index else None,
-                    )
-                )
+                axes.add_patch(_polygon(item, polygon, "" if index else item.name))
         case Arrow():
             _draw_arrow(axes, item)
         case Upright():
-            axes.axvline(
-                item.at, color=item.colour, linewidth=0.8, linestyle=":", label=item.name or None
-            )
+            axes.axvline(item.at, **_straight(item))
+        case Level():
+            axes.axhline(item.at, **_straight(item))
+        case Stripe():
+            look: dict[str, Any] = {"color": item.colour, "alpha": item.opacity, "linewidth": 0.0}
+            axes.axhspan(item.low, item.high, label=item.name or None, **look)
         case Bars():
             _draw_bars(axes, item)
+        case Correlations():
+            _draw_correlations(axes, item)
         case Note():
-            axes.text(0.5, 0.5, item.text, transform=axes.transAxes, ha="center")
+            place = (0.03, 0.95, item.text) if item.corner else (0.5, 0.5, item.text)
+            aligned = {"va": "top"} if item.corner else {"ha": "center"}
+            axes.text(*place, transform=axes.transAxes, color=item.colour, **aligned)
         case _:
             pass  # faces are drawn together, before
 
@@ -146,11 +170,34 @@ def _line(axes: Any, item: Line) -> Any:
     return made
 
 
+def _polygon(item: Area, points: Any, name: str) -> Polygon:
+    return Polygon(
+        points,
+        facecolor=(*rgb(item.face), item.opacity),
+        edgecolor=item.edge,
+        linewidth=item.width,
+        joinstyle="round",
+        zorder=item.layer,
+        label=name or None,
+    )
+
+
+def _straight(item: Upright | Level) -> dict[str, Any]:
+    return {
+        "color": item.colour, "linestyle": _dashes(item.dash), "linewidth": item.width,
+        "label": item.name or None,
+    }  # fmt: skip
+
+
+def _dashes(dash: tuple[float, ...]) -> Any:
+    return (0, dash) if dash else "-"
+
+
 def _line_2d(item: Line) -> Any:
     from matplotlib.lines import Line2D
 
     colour: Any = item.colour
-    style: Any = "" if item.dash is None else ((0, item.dash) if item.dash else "-")
+    style: Any = "" if item.dash is None else _dashes(item.dash)
     options: dict[str, Any] = {"label": item.name} if item.name else {}
     if item.blunt:
         options["solid_capstyle"] = "butt"
@@ -201,6 +248,19 @@ def _draw_bars(axes: Any, item: Bars) -> None:
     axes.set_yticks(places, list(item.names))
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
+
+
+def _draw_correlations(axes: Any, item: Correlations) -> None:
+    axes.imshow(item.values, cmap=DIVERGING, vmin=-1.0, vmax=1.0)
+    texts = item.texts
+    for (row, column), value in np.ndenumerate(item.values):
+        shade = "white" if abs(value) > 0.7 else "black"
+        look: dict[str, Any] = {"fontsize": item.letters, "color": shade}
+        axes.text(column, row, texts[row][column], ha="center", va="center", **look)
+    places = range(len(item.names))
+    axes.set_xticks(places, [str(number + 1) for number in places], fontsize=item.outer_letters)
+    axes.set_yticks(places, list(item.rows), fontsize=item.outer_letters)
+    axes.grid(visible=False)
 
 
 def _draw_faces(axes: Any, faces: list[Faces]) -> None:

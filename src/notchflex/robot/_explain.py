@@ -2,6 +2,7 @@
 
 import dataclasses
 import difflib
+import functools
 import types
 import typing
 from collections.abc import Iterable, Mapping, Sequence
@@ -62,20 +63,23 @@ def kinds_in(annotation: Any) -> list[type]:
     return [annotation] if is_part else []
 
 
+@functools.cache
 def kind_of(cls: type) -> str:
     """Return the word that names a kind in a file, "" for a part that comes in one kind only."""
     kind = fields_of(cls).get("kind")
     return "" if kind is None else str(kind.default)
 
 
-def fields_of(cls: type) -> dict[str, Any]:
+@functools.cache  # asked for each value that is set by its name
+def fields_of(cls: type) -> Mapping[str, Any]:
     """Return pydantic's field records, in the order in which a file lists the keys.
 
     That is `kind`, then what the class itself declares, then what all kinds share.
     """
     known: dict[str, Any] = getattr(cls, "__pydantic_fields__", {})
     shared = {f.name for f in dataclasses.fields(cls) if f.kw_only}
-    return dict(sorted(known.items(), key=lambda item: (item[0] != "kind", item[0] in shared)))
+    order = sorted(known.items(), key=lambda item: (item[0] != "kind", item[0] in shared))
+    return types.MappingProxyType(dict(order))
 
 
 def _sentences_of(record: dict[str, Any], cls: type, repeats: Sequence[int]) -> list[str]:

@@ -6,11 +6,11 @@ import dataclasses
 from functools import partial
 from typing import Any, NamedTuple, cast
 
-import equinox as eqx
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jnp
+from notchflex._pytree import Pytree
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual, stroke
 from notchflex.statics.element import Memory, Unknowns, pressed
@@ -19,7 +19,7 @@ from notchflex.statics.sweep import Step, linear_step
 from notchflex.statics.walk import Evaluation, evaluate
 
 
-class Settings(eqx.Module):
+class Settings(Pytree):
     """How hard the solver tries.
 
     Attributes:

@@ -7,13 +7,13 @@ notch, on that notch's strains alone); tension, friction and balance are the cha
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
-import equinox as eqx
 from jaxtyping import Array, Float, Int
 
 from notchflex._jax import jnp
+from notchflex._pytree import Pytree, static
 from notchflex.flexure import FlexureState, Rod
 from notchflex.motion import Motion
 
@@ -38,7 +38,7 @@ class Crossing(NamedTuple):
     slope: Float[Array, "t modes"] | None
 
 
-class TendonGroup(eqx.Module):
+class TendonGroup(Pytree, ABC):
     """Tendons of one kind of path. Arrays carry the flexures as leading axis, then the tendons.
 
     Attributes:
@@ -55,13 +55,13 @@ class TendonGroup(eqx.Module):
     """
 
     acts_on_bodies: ClassVar[bool]
-    numbers: eqx.AbstractVar[tuple[int, ...]]
-    present: eqx.AbstractVar[Float[Array, "*n t"]]
-    visits: eqx.AbstractVar[Float[Array, "*n t"]]
-    ends: eqx.AbstractVar[Float[Array, "*n t"]]
-    back: eqx.AbstractVar[Int[Array, "*n t"]]
-    body_length: eqx.AbstractVar[Float[Array, "*n t"]]
-    natural_gap: eqx.AbstractVar[Float[Array, "*n t"]]
+    numbers: tuple[int, ...] = static()
+    present: Float[Array, "*n t"]
+    visits: Float[Array, "*n t"]
+    ends: Float[Array, "*n t"]
+    back: Int[Array, "*n t"]
+    body_length: Float[Array, "*n t"]
+    natural_gap: Float[Array, "*n t"]
 
     @property
     def by_modes(self) -> bool:

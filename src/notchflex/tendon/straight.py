@@ -11,10 +11,10 @@ are. That is a reading of a paper; it is no tendon whose work is tension times l
 
 from __future__ import annotations
 
-import equinox as eqx
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
+from notchflex._pytree import static
 from notchflex.flexure import FlexureState, Rod
 from notchflex.motion import Motion, moment_of, wrench_at
 from notchflex.tendon.crossing import Crossing, TendonGroup, guarded_norm
@@ -35,18 +35,11 @@ class Straight(TendonGroup):
 
     acts_on_bodies = True
 
-    numbers: tuple[int, ...] = eqx.field(static=True)
-    present: Float[Array, "*n t"]
-    visits: Float[Array, "*n t"]
-    ends: Float[Array, "*n t"]
-    back: Int[Array, "*n t"]
-    body_length: Float[Array, "*n t"]
-    natural_gap: Float[Array, "*n t"]
     leaves: Float[Array, "*n t d"]
     enters: Float[Array, "*n t d"]
     along: Float[Array, "*n t d"]
-    pulls: str = eqx.field(static=True)
-    turns_with_chord: bool = eqx.field(static=True)
+    pulls: str = static()
+    turns_with_chord: bool = static()
 
     @property
     def by_modes(self) -> bool:

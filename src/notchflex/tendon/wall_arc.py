@@ -7,8 +7,7 @@ whichever way the notch faces.
 
 from __future__ import annotations
 
-import equinox as eqx
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from notchflex._jax import jnp
 from notchflex.flexure import FlexureState, Rod, fibre_slope, fibre_stretch, of_rod
@@ -25,13 +24,6 @@ class WallArc(TendonGroup):
 
     acts_on_bodies = False
 
-    numbers: tuple[int, ...] = eqx.field(static=True)
-    present: Float[Array, "*n t"]
-    visits: Float[Array, "*n t"]
-    ends: Float[Array, "*n t"]
-    back: Int[Array, "*n t"]
-    body_length: Float[Array, "*n t"]
-    natural_gap: Float[Array, "*n t"]
     across: Float[Array, "*n t 2"]
 
     @property
