@@ -39,10 +39,7 @@ class Visit:
         self.settle()
 
     def _heard(self, message):
-        # viser's page says so, and goes on, where a control was taken away while its new value was
-        # on the way, as when another robot's sliders take the place of these.
-        late = message.text.startswith("Tried to update non-existent component")
-        if message.type == "error" and not late:
+        if message.type == "error":
             self.errors.append(message.text)
 
     def _asked(self, url):

@@ -44,7 +44,11 @@ class Page:
         self._first_look()
 
     def rebuild(self) -> None:
-        """Lay the controls out anew, for another robot or other ends of sliders."""
+        """Lay the controls out anew, for another robot or other ends of sliders.
+
+        Once for each change: of controls that are taken away before they were sent, viser still
+        sends the updates, to a page that does not know them.
+        """
         viewer = self.viewer
         for folder in self._folders:
             folder.remove()

@@ -206,10 +206,13 @@ class Viewer:
         self._finish()
         old = self.session.robot
         self.page.busy("preparing the robot")
-        step = self.session.change(robot, told=self._replayed)
-        if (old.tube, old.notch, old.tendon) != (robot.tube, robot.notch, robot.tendon):
-            self._rebuild(robot)
-        self.scene.robot = robot
+        try:
+            step = self.session.change(robot, told=self._replayed)
+            if (old.tube, old.notch, old.tendon) != (robot.tube, robot.notch, robot.tendon):
+                self._reshape(robot)
+            self.scene.robot = robot
+        finally:  # refused, controls show again what the robot has
+            self.page.rebuild()
         self._again(step)
 
     def change_part(self, section: str, kind: str) -> None:
@@ -223,9 +226,11 @@ class Viewer:
     def _try(self, made: Callable[[], Robot]) -> None:
         """Change the robot if that gives one; show in any case what it has."""
         try:
-            self.change(made())
-        finally:
+            robot = made()
+        except InputError:
             self.page.rebuild()
+            raise
+        self.change(robot)
 
     def show(self, name: str, value: bool) -> None:
         """Show something in the scene or not; see `Shown`."""
@@ -236,11 +241,10 @@ class Viewer:
         self.message = f"Not reached: {step.reason}" if step.reason else ""
         self._begin()
 
-    def _rebuild(self, robot: Robot) -> None:
+    def _reshape(self, robot: Robot) -> None:
         self.reach = reach_of(robot)
         self.scene.remove()
         self.scene = Scene(self.server, robot, self.reach, self.shown)
-        self.page.rebuild()
 
     def load(self, robot: Robot, file: Watched | None = None) -> None:
         """Begin anew with another robot; a file that was watched is no more."""
@@ -249,7 +253,8 @@ class Viewer:
         self.session, self.original = session, robot
         self._file = file
         self.message = ""
-        self._rebuild(robot)
+        self._reshape(robot)
+        self.page.rebuild()
         self._begin()
         self.page.look()
 
@@ -263,7 +268,6 @@ class Viewer:
             return
         self.original = robot
         self.change(robot)
-        self.page.rebuild()
 
     def stretch(self, reach: Reach) -> None:
         """Let sliders go to other ends."""
