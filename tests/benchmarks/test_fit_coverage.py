@@ -22,7 +22,7 @@ def coverage():
 
 
 def test_intervals_of_a_few_repetitions_hold_the_truth(coverage):
-    names, truth, estimates, holds = coverage.covered(coverage.cases()["wrist"], COUNT)
+    names, truth, estimates, holds = coverage.covered(coverage.cases()["short"], COUNT)
     # 24 intervals of 95 %: 5 misses or more happen once in 140 draws, and the draw is fixed.
     assert holds.sum() >= len(names) * COUNT - 4
     off = (estimates.mean(axis=0) - truth) / (estimates.std(axis=0, ddof=1) / np.sqrt(COUNT))
