@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax, jit, jnp
+from notchflex._jax import jax, jnp
+from notchflex._kept import kept
 from notchflex.chain import Chain
 from notchflex.errors import InputError
 from notchflex.robot import Robot
@@ -226,7 +227,7 @@ def _piece(paths: int) -> int:
     return next((size for size in _PIECES if size >= each), _PIECES[-1])
 
 
-@partial(jit, static_argnums=(9, 10, 11))
+@kept(9, 10, 11)
 def _follow_all(
     chain: Float[Array, " chain"],
     chain_moves: Float[Array, "k chain"],

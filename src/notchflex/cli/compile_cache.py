@@ -1,4 +1,4 @@
-"""Keeping compiled code between runs of the command line, so that only the first one is slow."""
+"""Keeping compiled programs between runs of the command line, so that only the first is slow."""
 
 from __future__ import annotations
 
@@ -12,22 +12,24 @@ VARIABLE = "JAX_COMPILATION_CACHE_DIR"
 
 
 def use_compile_cache() -> None:
-    """Let JAX keep what it compiles in the user's cache folder.
+    """Keep compiled programs in the user's cache folder.
 
-    Called before the first computation. Nothing happens where the user has chosen a folder
-    (`JAX_COMPILATION_CACHE_DIR`, empty for none) or where no folder can be written. Compiled code
-    belongs to one kind of processor, so each has a folder of its own: a home folder may be shared.
+    Called before the first computation. The user may choose another folder
+    (`JAX_COMPILATION_CACHE_DIR`, empty for none); nothing happens where no folder can be written.
+    Compiled code belongs to one kind of processor, so each has a folder of its own: a home folder
+    may be shared.
     """
-    if VARIABLE in os.environ:
-        return
     folder = cache_folder()
     if folder is None:
         return
     from notchflex._jax import jax
+    from notchflex._kept import keep_in
 
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    if VARIABLE not in os.environ:
+        jax.config.update("jax_compilation_cache_dir", str(folder))
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+        jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    keep_in(folder)
 
 
 def cache_folder() -> Path | None:

@@ -15,8 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import elementwise, least_squares
-from scipy.special import ellipeinc, ellipj, elliprf, expit
 
 from notchflex.errors import InputError
 
@@ -90,6 +88,8 @@ def elastica(
     ):
         if not np.all(good):
             raise InputError(f"{word} must be {allowed} and finite")
+    from scipy import special  # takes half a second, and bending a robot does without
+
     scaled = length * np.sqrt(load / stiffness)  # λ
     shape = (_held if follower is None else _following)(scaled, angle)
     slope, clamp, modulus, complement, sn, cn, dn, amplitude = shape
@@ -98,7 +98,7 @@ def elastica(
     # and sin ω, by ε(K) - ε(K - λ) = ε(λ) - k² sn cd.
     with np.errstate(divide="ignore", invalid="ignore"):
         opposite = (
-            2.0 * (ellipeinc(amplitude, squared) - squared * sn * cn / dn) - scaled
+            2.0 * (special.ellipeinc(amplitude, squared) - squared * sn * cn / dn) - scaled
         ) / scaled
         across = 2.0 * modulus * complement * sn / (dn * scaled)
     opposite = np.where(scaled > 0.0, opposite, np.cos(angle))
@@ -123,6 +123,8 @@ class _Shape(NamedTuple):
 
 def _following(scaled: np.ndarray, free: np.ndarray) -> _Shape:
     """With ω(0) given; also beyond a quarter period, where the beam curls."""
+    from scipy.special import ellipj
+
     modulus, complement = np.sin(0.5 * free), np.cos(0.5 * free)
     sn, cn, dn, amplitude = ellipj(scaled, modulus**2)
     # Sums of angles: sin((ω₀ - ω_L)/2) = k k' (1 - cn)/dn, its cosine (k² cn + k'²)/dn.
@@ -154,6 +156,9 @@ def _slope_for(scaled: np.ndarray, clamp: np.ndarray) -> tuple[np.ndarray, np.nd
     λ = F(am(λ), k) rises with the slope from 0 to infinity. The root is sought in the logit of
     the slope's share of what there is, so that both ends keep their relative precision.
     """
+    from scipy.optimize import elementwise
+    from scipy.special import elliprf, expit
+
     span = np.pi - clamp
     loaded = scaled > 0.0
     wanted = np.log(np.where(loaded, scaled, 1.0))
@@ -216,6 +221,8 @@ def modulus_from_single_notch(
         ... )
         1000.000
     """
+    from scipy.optimize import least_squares
+
     pull, measured = np.asarray(force, dtype=float), np.asarray(chord_angle, dtype=float)
     if pull.ndim != 1 or pull.shape != measured.shape or not len(pull):
         raise InputError(

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from notchflex._jax import jax, jit
+from notchflex._jax import jax
+from notchflex._kept import kept
 from notchflex.chain import Chain
 from notchflex.errors import InputError
 from notchflex.robot import Robot
@@ -308,7 +309,7 @@ def _tables(
     return made
 
 
-@partial(jit, static_argnums=(3, 4, 5, 6, 7))
+@kept(3, 4, 5, 6, 7)
 def _follow_all(
     chains: Float[Array, "*b chain"],
     commands: Float[Array, "b s command"],

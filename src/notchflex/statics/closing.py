@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import elementwise
 
 from notchflex.chain import Chain, assemble
 from notchflex.contact import closing_travel, free_angle
@@ -123,6 +122,8 @@ def _tensions(
         force, gap, converged = lips(ready, tensions_alone(value), ready.rest, Settings())
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
         return np.where(converged, overlap, np.nan)[: len(notch)]
+
+    from scipy.optimize import elementwise  # takes half a second, and few ask for closing
 
     linear = np.asarray(chain.stiffness)[notches, 0] * travel[notches] / arm[notches]
     high = linear.copy()

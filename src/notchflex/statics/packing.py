@@ -31,6 +31,10 @@ class Form:
         self.ends = np.cumsum(sizes)[:-1].tolist()
         self.size = sum(sizes)
 
+    def __repr__(self) -> str:
+        """Tell all of it: kept programs are found by this."""
+        return f"Form({self.structure}, {self.shapes}, {self.kinds})"
+
     @classmethod
     def of(cls, tree: Any) -> Form:
         """The form of a tree."""

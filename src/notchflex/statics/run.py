@@ -8,13 +8,14 @@ the states beyond their shape is another program, run when it is asked for.
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import jax, jit, jnp
+from notchflex._jax import jax, jnp
+from notchflex._kept import kept
 from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form
@@ -171,7 +172,7 @@ def lips(
     return np.asarray(force), np.asarray(gap), np.asarray(converged)
 
 
-@partial(jit, static_argnums=4)
+@kept(4)
 def _lips(
     vector: Float[Array, " chain"],
     commands: Command,
@@ -210,7 +211,7 @@ def _pad(tree: Any) -> Any:
     return jax.tree.map(lambda leaf: np.asarray(leaf)[index], tree)
 
 
-@partial(jit, static_argnums=(4, 5, 6))
+@kept(4, 5, 6)
 def _follow(
     vector: Float[Array, " chain"],
     commands: Float[Array, "s command"],
@@ -255,7 +256,7 @@ def _follow(
     return jax.lax.map(with_shape, table)
 
 
-@partial(jit, static_argnums=(2, 3))
+@kept(2, 3)
 def _quantities(
     vector: Float[Array, " chain"],
     states: Float[Array, "s state"],
@@ -266,7 +267,7 @@ def _quantities(
     return jax.lax.map(lambda packed: quantities(chain, state_form.unpack(packed)), states)
 
 
-@partial(jit, static_argnums=4)
+@kept(4)
 def _stability(
     vector: Float[Array, " chain"],
     commands: Command,

@@ -1,0 +1,156 @@
+"""Compiled programs kept on disk, so that another process need not even trace them.
+
+JAX's own cache keeps what XLA makes of a program, but to find it there the program is traced and
+lowered first, which takes longer than all else that a short command does. Here the whole program
+is found by what it was made from: the source code, the versions, and the forms of its arguments.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import threading
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from functools import cache, update_wrapper
+from pathlib import Path
+from typing import Any, ClassVar
+
+from jax.experimental.compilation_cache import compilation_cache
+
+from notchflex._jax import jax, jit
+
+_DIGEST = 32  # bytes
+_making = threading.Lock()
+
+
+class Kept:
+    """A compiled function whose programs are kept in a folder, once one is told.
+
+    Without a folder it is the function that `jit` makes. As all with options for the compiler it
+    is called from plain code only, and no part of another compiled function.
+
+    Args:
+        function: What to compile. Arguments are arrays, or trees of them, given by position.
+        static: Positions of arguments that are no arrays; their `repr` must tell them apart.
+    """
+
+    folder: ClassVar[Path | None] = None
+    loaded: ClassVar[dict[Any, Callable[..., Any]]] = {}
+
+    def __init__(self, function: Callable[..., Any], static: tuple[int, ...]) -> None:
+        """Compile nothing yet."""
+        self._plain: Any = jit(function, static_argnums=static)
+        self._static = frozenset(static)
+        self._name = f"{function.__module__}.{function.__qualname__}"
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the program for these arguments, made or loaded where it is not there yet."""
+        if Kept.folder is None:
+            return self._plain(*arguments)
+        arrays = [one for place, one in enumerate(arguments) if place not in self._static]
+        leaves, structure = jax.tree.flatten(arrays)
+        static = tuple(arguments[place] for place in sorted(self._static))
+        kinds = tuple((leaf.shape, leaf.dtype.str) for leaf in leaves)
+        known = (self, structure, kinds, static)
+        program = Kept.loaded.get(known)
+        if program is not None:
+            return program(*arrays)
+        with _making:  # threads that ask for the same program wait for the one that makes it
+            if known in Kept.loaded:
+                return Kept.loaded[known](*arrays)
+            told = (self._name, str(structure), kinds, static)
+            Kept.loaded[known], came = self._found(repr(told), arguments, arrays)
+            return came
+
+    def __getattr__(self, name: str) -> Any:
+        """What else the compiled function of JAX can do."""
+        return getattr(self._plain, name)
+
+    def _found(self, told: str, arguments: tuple[Any, ...], arrays: list[Any]) -> tuple[Any, Any]:
+        """The program of that description, from the folder or made and put there; its result."""
+        assert Kept.folder is not None
+        name = hashlib.sha256(f"{_made_from()} {told}".encode()).hexdigest()[:32]
+        file = Kept.folder / f"program-{name}"
+        program = _read(file)
+        if program is not None:
+            try:
+                return program, program(*arrays)
+            except jax.errors.JaxRuntimeError:  # what the file holds lacks a piece
+                pass
+        lowered = self._plain.lower(*arguments)
+        with _without_cache():
+            program = lowered.compile()
+        _write(file, program)
+        return program, program(*arrays)
+
+
+def kept(*static: int) -> Callable[[Callable[..., Any]], Kept]:
+    """Make a function one whose compiled programs are kept; see `Kept`."""
+    return lambda function: Kept(function, static)
+
+
+def keep_in(folder: Path) -> None:
+    """Keep programs in a folder from now on; not where they are made for a GPU."""
+    Kept.folder = folder if jax.default_backend() == "cpu" else None
+
+
+@contextmanager
+def _without_cache() -> Generator[None]:
+    """Let XLA compile anew: of what comes out of JAX's own cache, only a part would be kept.
+
+    Seen with jax 0.10.1 as "Function ... not found" when it is run.
+    """
+    enabled: bool = getattr(jax.config, "jax_enable_compilation_cache")  # noqa: B009
+    try:
+        jax.config.update("jax_enable_compilation_cache", False)
+        compilation_cache.reset_cache()
+        yield
+    finally:
+        jax.config.update("jax_enable_compilation_cache", enabled)
+        compilation_cache.reset_cache()
+
+
+@cache
+def _made_from() -> str:
+    """What programs are made from beside their arguments: code, versions, options."""
+    from importlib.metadata import version
+
+    root = Path(__file__).parent
+    code = hashlib.sha256()
+    for file in sorted(root.rglob("*.py")):
+        code.update(str(file.relative_to(root)).encode() + b"\0" + file.read_bytes() + b"\0")
+    versions = [version(name) for name in ("jax", "jaxlib", "numpy")]
+    settings = [os.environ.get("XLA_FLAGS", ""), os.cpu_count()]
+    return repr((code.hexdigest(), versions, settings))
+
+
+def _read(file: Path) -> Any:
+    """The program in a file; None where there is none that is whole."""
+    from jax.experimental import serialize_executable
+
+    try:
+        content = file.read_bytes()
+        if hashlib.sha256(content[_DIGEST:]).digest() != content[:_DIGEST]:
+            return None
+        return serialize_executable.deserialize_and_load(*pickle.loads(content[_DIGEST:]))
+    except Exception:  # a file of another version, or no file: the program is made again
+        return None
+
+
+def _write(file: Path, program: Any) -> None:
+    """Put a program in a file, as a whole or not at all."""
+    from jax.experimental import serialize_executable
+
+    try:
+        content = pickle.dumps(serialize_executable.serialize(program))
+        own = file.with_suffix(f".{os.getpid()}")
+        own.write_bytes(hashlib.sha256(content).digest() + content)
+        own.replace(file)
+    except Exception:  # no room, or nothing that can be kept: the next process makes it again
+        return
+
+
+__all__ = ["keep_in", "kept"]

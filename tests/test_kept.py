@@ -1,0 +1,71 @@
+"""Compiled programs kept on disk: found again without tracing, and never a wrong one."""
+
+import numpy as np
+import pytest
+
+from notchflex._jax import jnp
+from notchflex._kept import Kept
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(Kept, "folder", tmp_path)
+    monkeypatch.setattr(Kept, "loaded", {})
+    return tmp_path
+
+
+@pytest.fixture
+def traced():
+    """How often the function below was traced, by its static argument."""
+    return []
+
+
+@pytest.fixture
+def process(traced):
+    """The function as a new process has it: nothing of it is loaded."""
+
+    def begun():
+        def grown(values, factor):
+            traced.append(factor)
+            return {"grown": factor * jnp.cumsum(values)}
+
+        return Kept(grown, (1,))
+
+    return begun
+
+
+def test_another_process_loads_the_program_and_does_not_trace_it(folder, process, traced):
+    first = process()(np.arange(3.0), 2)
+    assert traced == [2]
+    again = process()
+    np.testing.assert_array_equal(again(np.arange(3.0), 2)["grown"], first["grown"])
+    np.testing.assert_array_equal(again(np.ones(3), 2)["grown"], [2.0, 4.0, 6.0])
+    assert traced == [2]
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_other_shapes_kinds_and_static_arguments_are_other_programs(folder, process, traced):
+    function = process()
+    function(np.arange(3.0), 2)
+    np.testing.assert_array_equal(function(np.arange(4.0), 2)["grown"], [0.0, 2.0, 6.0, 12.0])
+    np.testing.assert_array_equal(function(np.arange(3), 2)["grown"], [0, 2, 6])
+    np.testing.assert_array_equal(function(np.arange(3.0), 3)["grown"], [0.0, 3.0, 9.0])
+    assert traced == [2, 2, 2, 3]
+    assert len(list(folder.iterdir())) == 4
+
+
+@pytest.mark.parametrize("spoil", [lambda content: content[:-9], lambda content: b"no program"])
+def test_a_spoilt_file_is_made_again(folder, process, traced, spoil):
+    process()(np.arange(3.0), 2)
+    (file,) = folder.iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(spoil(whole))
+    np.testing.assert_array_equal(process()(np.arange(3.0), 2)["grown"], [0.0, 2.0, 6.0])
+    assert traced == [2, 2]
+    process()(np.arange(3.0), 2)
+    assert traced == [2, 2]
+
+
+def test_a_folder_that_cannot_be_written_costs_only_time(folder, process, monkeypatch):
+    monkeypatch.setattr(Kept, "folder", folder / "not" / "there")
+    np.testing.assert_array_equal(process()(np.arange(3.0), 2)["grown"], [0.0, 2.0, 6.0])
