@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import re
 import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -17,11 +18,13 @@ from functools import cache, update_wrapper
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
 from jax.experimental.compilation_cache import compilation_cache
 
 from notchflex._jax import jax, jit
 
 _DIGEST = 32  # bytes
+_CALLED = re.compile(r'custom_call_target="([^"]+)"')
 _making = threading.Lock()
 
 
@@ -135,7 +138,10 @@ def _read(file: Path) -> Any:
         content = file.read_bytes()
         if hashlib.sha256(content[_DIGEST:]).digest() != content[:_DIGEST]:
             return None
-        return serialize_executable.deserialize_and_load(*pickle.loads(content[_DIGEST:]))
+        by_lapack, parts = pickle.loads(content[_DIGEST:])
+        if by_lapack:
+            _find_lapack()
+        return serialize_executable.deserialize_and_load(*parts)
     except Exception:  # a file of another version, or no file: the program is made again
         return None
 
@@ -145,12 +151,25 @@ def _write(file: Path, program: Any) -> None:
     from jax.experimental import serialize_executable
 
     try:
-        content = pickle.dumps(serialize_executable.serialize(program))
+        called = set(_CALLED.findall(program.as_text()))
+        if not all(target.startswith("lapack_") for target in called):
+            return  # nobody knows here what must be ready before it may run
+        content = pickle.dumps((bool(called), serialize_executable.serialize(program)))
         own = file.with_suffix(f".{os.getpid()}")
         own.write_bytes(hashlib.sha256(content).digest() + content)
         own.replace(file)
     except Exception:  # no room, or nothing that can be kept: the next process makes it again
         return
+
+
+def _find_lapack() -> None:
+    """Let jaxlib look up LAPACK's routines, as it does when JAX lowers a call of one.
+
+    A program that is only loaded would jump to nowhere.
+    """
+    from jaxlib import lapack
+
+    lapack.prepare_lapack_call("getrf", np.dtype(float))
 
 
 __all__ = ["keep_in", "kept"]

@@ -33,7 +33,7 @@ ROOT_VERBS = (
 )
 
 
-def notchflex(*arguments, cwd=None, stdin=""):
+def notchflex(*arguments, cwd=None, stdin="", **environment):
     return subprocess.run(
         [sys.executable, "-m", "notchflex", *arguments],
         capture_output=True,
@@ -41,6 +41,7 @@ def notchflex(*arguments, cwd=None, stdin=""):
         encoding="utf-8",
         cwd=cwd,
         input=stdin,
+        env=os.environ | environment,
         timeout=300,
         check=False,
     )
@@ -63,6 +64,19 @@ def test_quick_verbs_do_not_import_jax(arguments):
 def test_importing_the_package_does_not_import_jax():
     code = "import sys, notchflex; sys.exit('jax' in sys.modules or 'pydantic' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_second_process_runs_what_the_first_has_compiled(tmp_path):
+    # A real process each: a program that is only loaded must find all that it calls.
+    asked = ("simulate", "pacheco2021-a", "--tension", "0:2:5", "--json", "-")
+    first, second = (notchflex(*asked, JAX_COMPILATION_CACHE_DIR=str(tmp_path)) for _ in range(2))
+    assert first.returncode == second.returncode == 0, second.stderr
+    assert first.stdout == second.stdout
+    kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("program-*")}
+    assert len(kept) == 3  # the states, what is told of them, and whether they are stable
+    third = notchflex(*asked, JAX_COMPILATION_CACHE_DIR=str(tmp_path))
+    assert third.stdout == first.stdout
+    assert kept == {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("program-*")}
 
 
 @pytest.mark.parametrize("arguments", QUICK[:3], ids=" ".join)
