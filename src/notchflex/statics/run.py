@@ -168,7 +168,8 @@ def lips(
         Contact forces and gaps, loads by notches, and which loads converged.
     """
     form = prepared.chain_form
-    force, gap, converged = _lips(prepared.vector, commands, start, settings, form)
+    numbers = np.array(_numbers(settings))
+    force, gap, converged = _lips(prepared.vector, commands, start, numbers, form)
     return np.asarray(force), np.asarray(gap), np.asarray(converged)
 
 
@@ -177,10 +178,10 @@ def _lips(
     vector: Float[Array, " chain"],
     commands: Command,
     start: Solved,
-    settings: Settings,
+    numbers: Float[Array, " settings"],
     chain_form: Form,
 ) -> tuple[Array, Array, Array]:
-    chain = chain_form.unpack(vector)
+    chain, settings = chain_form.unpack(vector), Settings.of(numbers)
 
     def at_lips(command: Command) -> tuple[Array, Array, Array]:
         came = advance(chain, command, start, settings)
