@@ -29,7 +29,13 @@ def use_compile_cache() -> None:
         jax.config.update("jax_compilation_cache_dir", str(folder))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
         jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
-    keep_in(folder)
+    # A folder that the user has chosen may be shared by machines that are not alike.
+    programs = folder / f"programs-{_machine()}"
+    try:
+        programs.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return
+    keep_in(programs)
 
 
 def cache_folder() -> Path | None:
