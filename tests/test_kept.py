@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from notchflex._jax import jnp
+from notchflex._jax import jax, jnp
 from notchflex._kept import Kept
+from notchflex.cli import compile_cache
 
 
 @pytest.fixture
@@ -69,3 +70,34 @@ def test_a_spoilt_file_is_made_again(folder, process, traced, spoil):
 def test_a_folder_that_cannot_be_written_costs_only_time(folder, process, monkeypatch):
     monkeypatch.setattr(Kept, "folder", folder / "not" / "there")
     np.testing.assert_array_equal(process()(np.arange(3.0), 2)["grown"], [0.0, 2.0, 6.0])
+
+
+def test_without_compiling_it_is_the_plain_function(folder, process):
+    with jax.disable_jit():
+        np.testing.assert_array_equal(process()(np.arange(3.0), 2)["grown"], [0.0, 2.0, 6.0])
+    assert not list(folder.iterdir())
+
+
+def test_a_file_that_cannot_be_replaced_leaves_nothing_beside_it(folder, process):
+    process()(np.arange(3.0), 2)
+    (file,) = folder.iterdir()
+    file.unlink()
+    file.mkdir()
+    process()(np.arange(3.0), 2)
+    assert list(folder.iterdir()) == [file]
+
+
+def test_a_folder_of_the_user_is_made_and_has_one_of_its_own_for_each_processor(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(Kept, "folder", None)
+    monkeypatch.setenv(compile_cache.VARIABLE, str(tmp_path / "own"))
+    compile_cache.use_compile_cache()
+    assert Kept.folder.is_dir()
+    assert Kept.folder.parent == tmp_path / "own"
+    monkeypatch.setattr(compile_cache, "_machine", lambda: "other")
+    before = Kept.folder
+    compile_cache.use_compile_cache()
+    assert Kept.folder != before
+    monkeypatch.setenv(compile_cache.VARIABLE, "gs://somewhere")
+    assert compile_cache.cache_folder() is None

@@ -13,7 +13,7 @@ import pickle
 import re
 import threading
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache, update_wrapper
 from pathlib import Path
 from typing import Any, ClassVar
@@ -51,7 +51,7 @@ class Kept:
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the program for these arguments, made or loaded where it is not there yet."""
-        if Kept.folder is None:
+        if Kept.folder is None or getattr(jax.config, "jax_disable_jit"):  # noqa: B009
             return self._plain(*arguments)
         arrays = [one for place, one in enumerate(arguments) if place not in self._static]
         leaves, structure = jax.tree.flatten(arrays)
@@ -96,7 +96,9 @@ def kept(*static: int) -> Callable[[Callable[..., Any]], Kept]:
 
 
 def keep_in(folder: Path) -> None:
-    """Keep programs in a folder from now on; not where they are made for a GPU."""
+    """Keep programs in a folder from now on, made if need be; not where they are for a GPU."""
+    with suppress(OSError):  # without a folder every process makes its programs
+        folder.mkdir(parents=True, exist_ok=True)
     Kept.folder = folder if jax.default_backend() == "cpu" else None
 
 
@@ -156,8 +158,11 @@ def _write(file: Path, program: Any) -> None:
             return  # nobody knows here what must be ready before it may run
         content = pickle.dumps((bool(called), serialize_executable.serialize(program)))
         own = file.with_suffix(f".{os.getpid()}")
-        own.write_bytes(hashlib.sha256(content).digest() + content)
-        own.replace(file)
+        try:
+            own.write_bytes(hashlib.sha256(content).digest() + content)
+            own.replace(file)
+        finally:
+            own.unlink(missing_ok=True)
     except Exception:  # no room, or nothing that can be kept: the next process makes it again
         return
 

@@ -156,6 +156,28 @@ def test_one_reading():
     np.testing.assert_allclose(rig.interval, rig.coefficient + half * np.array([-1.0, 1.0]))
 
 
+def test_a_reading_of_unknown_error_is_as_good_as_the_others_and_not_exact():
+    turn = [0.5 * np.pi] * 3
+    deviation = np.full((3, 4), np.nan)
+    deviation[1:, 1] = 1.0
+    readings = nf.FrictionReadings([200.0] * 3, [150.0, 151.0, 152.0], turn, turn, deviation)
+    rig = nf.friction_rig(readings)
+    low, high = rig.interval
+    assert rig.coefficient == pytest.approx(readings.coefficient.mean(), rel=1e-3)
+    assert high - low > 0.5 * rig.spread
+
+
+def test_readings_that_agree_to_rounding_or_rub_too_much_are_doubted():
+    said = " ".join(
+        nf.friction_rig(nf.FrictionReadings([200.0] * 2, [150.0] * 2, *[[1.6] * 2] * 2)).words
+    )
+    assert "how far mu can be trusted is not known" in said
+    assert "in degrees" not in said
+    small = np.radians([[1.57] * 2] * 2)  # radians that were read as degrees
+    rubs = nf.friction_rig(nf.FrictionReadings([200.0] * 2, [150.0, 151.0], *small))
+    assert "are the turns in degrees?" in " ".join(rubs.words)
+
+
 def test_what_cannot_be_tested_is_said():
     same = nf.FrictionReadings([200.0] * 5, np.linspace(149.0, 151.0, 5), [1.5] * 5, [1.5] * 5)
     test = constancy(same)

@@ -75,6 +75,27 @@ def test_a_search_that_does_not_settle_is_told(call, data, monkeypatch):
     assert "Error: not converged: not settled after 100 steps" in err
 
 
+def test_what_cannot_be_done_beyond_the_fit_does_not_lose_it(call, data, tmp_path):
+    narrow = ("--next", "0.4,1.2", "--narrow", "x")
+    code, out, err = call(f"A={ROBOT}={data}", *FIT, "-o", "fitted", *narrow)
+    assert code == 2
+    assert "--next: x was not fitted" in err
+    assert NAMES[0] in out
+    assert (tmp_path / "fitted" / "A.toml").exists()
+
+
+def test_an_interrupted_fit_is_told_and_writes_nothing(call, data, tmp_path, monkeypatch):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fitting, "calibrate", interrupted)
+    code, out, err = call(f"A={ROBOT}={data}", *FIT, "-o", "fitted", "--json", "fit.json")
+    assert code == 130
+    assert out == ""
+    assert "interrupted; nothing more is written" in err
+    assert [file.name for file in tmp_path.iterdir()] == [data]
+
+
 def test_other_tables_fit_80_columns(capsys):
     found = fitted()
     long = "notch[12].very_long_name_of_a_constant_of_a_robot"
@@ -145,7 +166,13 @@ PAIR = f"{ROBOT}=a.csv"
         ([PAIR, *FIT, "--next", "1", "--next-robot", "B"], "no robot of this fit is called so"),
         ([PAIR, *FIT, "--next", "1:2"], "is no start:stop:count"),
         ([PAIR, *FIT, "--set", "B:friction.coefficient=1"], "no robot of this fit is called B"),
+        ([PAIR, *FIT, "--next", "x"], "--next x: 'x' is no number"),
         ([PAIR, *FIT, "--leave-out", "notch"], "--leave-out"),
+        ([PAIR, *FIT, "--leave-out", "robot"], "there is only one robot"),
+        ([PAIR, *FIT, "--seed", "-1"], "--seed -1: give 0 or more"),
+        ([PAIR, *FIT, "--posterior", "--draws", "3"], "--draws 3: give 4 or more"),
+        ([PAIR, *FIT, "--posterior", "--objective", "robot-errors"], "is no likelihood"),
+        ([f"each={ROBOT}=a.csv", *FIT], "no robot can be called each"),
         ([PAIR, *FIT, "--json", "a.csv"], "would replace the file that is read"),
         (["mine.toml=a.csv", *FIT, "-o", "."], "would replace the file that is read"),
         ([PAIR, *FIT, "-o", "a.csv"], "is a file, not a folder"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
 from notchflex.calibrate.curvature import unit_free
@@ -105,23 +105,33 @@ class Calibration:
         return self.noise.counted - len(self.names)
 
     @property
+    def tells_no_noise(self) -> bool:
+        """Whether the fit goes through numbers of unknown noise, with none left over to tell it."""
+        return not self.noise.is_known and self.freedom <= 0
+
+    @property
     def reduced_chi_squared(self) -> float:
         """Mean square of residuals over their noise; about 1 where the model is right.
 
         Of numbers whose noise is known otherwise than by the fit; NaN where there are none.
         """
-        known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
-        left = int(known.sum()) - len(self.names)
+        known, left = self._known
         if left <= 0:
             return float("nan")
         scaled = self.residuals.values[known] / self.noise.deviation[known]
         return float(np.sum(scaled**2)) / left
 
     @property
+    def _known(self) -> tuple[Bool[np.ndarray, " r"], int]:
+        """Numbers whose noise is known otherwise than by the fit; how many more than constants."""
+        known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
+        return known, int(known.sum()) - len(self.names)
+
+    @property
     def misses(self) -> bool:
         """Whether the model misses what was measured by more than noise can explain."""
-        value = self.reduced_chi_squared
-        return bool(value > 1.0 and chi2.sf(value * self.freedom, self.freedom) < _UNLIKELY)
+        value, (_, left) = self.reduced_chi_squared, self._known
+        return bool(value > 1.0 and chi2.sf(value * left, left) < _UNLIKELY)
 
     @property
     def widened(self) -> float:
@@ -130,7 +140,9 @@ class Calibration:
 
     @property
     def allowed_rise(self) -> float:
-        """By how much twice the misfit may rise within a 95 % interval."""
+        """By how much twice the misfit may rise in a 95 % interval; infinite for unknown noise."""
+        if self.tells_no_noise:
+            return float("inf")
         freedom = None if self.noise.is_known else self.freedom
         return allowed_rise(freedom) * self.widened**2
 
@@ -163,9 +175,12 @@ class Calibration:
     def covariance(self) -> Float[np.ndarray, "k k"]:
         """Covariance of the constants, in a straight-line view of the model.
 
-        Infinite where nothing measured depends on a constant. For objectives that are no
-        likelihood, and nowhere else, from how unlike the pulls are (Huber's sandwich by pulls).
+        Infinite where nothing measured depends on a constant, or nothing tells the noise. For
+        objectives that are no likelihood, and nowhere else, from how unlike the pulls are (Huber's
+        sandwich by pulls).
         """
+        if self.problem.objective.is_likelihood and self.tells_no_noise:
+            return np.diag(np.full(len(self.names), np.inf))
         inverse = _inverse(self.reached.curvature)
         if self.problem.objective.is_likelihood:
             return inverse * self.widened**2

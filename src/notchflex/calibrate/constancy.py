@@ -111,8 +111,14 @@ def design(readings: FrictionReadings) -> NDArray[np.float64]:
 
 
 def known_variance(readings: FrictionReadings) -> NDArray[np.float64]:
-    """Variance of every coefficient that the standard deviations of its reading give, else 0."""
-    return np.nan_to_num(readings.coefficient_deviation) ** 2
+    """Variance of every coefficient that the standard deviations of its reading give.
+
+    A reading without any is taken to be as accurate as the others are in the mean, not exact;
+    0 where there is none at all.
+    """
+    variance = readings.coefficient_deviation**2
+    told = np.isfinite(variance)
+    return np.where(told, variance, np.mean(variance[told]) if told.any() else 0.0)
 
 
 def _probability(statistic: float, freedom: int, count: int, columns: int, other: Line) -> float:

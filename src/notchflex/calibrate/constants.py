@@ -6,6 +6,8 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from notchflex.calibrate.rows import SENSOR
 from notchflex.errors import InputError
 from notchflex.robot import Robot
@@ -52,7 +54,7 @@ class Constant:
         if not isinstance(self.name, str) or not self.name.strip():  # pyright: ignore
             raise InputError(f"a constant needs the name of a value; got {self.name!r}")
         for limit in (self.lower, self.upper):
-            if limit is not None and not math.isfinite(limit):
+            if limit is not None and not _is_finite(limit):
                 raise InputError(f"`{self.name}`: limits must be finite; got {limit}")
         if None not in (self.lower, self.upper) and not self.lower < self.upper:  # pyright: ignore
             raise InputError(
@@ -60,11 +62,11 @@ class Constant:
                 f"and {self.upper:g}"
             )
         if self.prior is not None:
-            mean, deviation = self.prior
-            if not (math.isfinite(mean) and 0.0 < deviation < math.inf):
+            pair = np.atleast_1d(np.asarray(self.prior, object))
+            if len(pair) != 2 or not all(map(_is_finite, pair)) or not pair[1] > 0.0:
                 raise InputError(
                     f"`{self.name}`: a prior is a mean and a standard deviation above 0; "
-                    f"got {mean:g} and {deviation:g}"
+                    f"got {' and '.join(map(str, pair))}"
                 )
 
 
@@ -133,6 +135,8 @@ def unknowns(
     Raises:
         InputError: A name is none, is given twice, or belongs to no robot.
     """
+    if "each" in robots:
+        raise InputError("no robot can be called each: `each:` stands for every robot of the fit")
     given = (fit,) if isinstance(fit, str | Constant) else tuple(fit)
     if not given:
         raise InputError("fit names no constant; name one, such as friction.coefficient")
@@ -197,6 +201,10 @@ def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant) -> Unkn
     sets = tuple((label, path) for label in robots)
     name = constant.name.strip()
     return Unknown(name, unit, sets, lower, upper, start, first, last, constant.prior)
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and math.isfinite(value)
 
 
 def _range(path: str, unit: str, value: float) -> tuple[float, float]:

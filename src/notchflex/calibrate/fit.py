@@ -76,6 +76,8 @@ def calibrate(
     """
     if not isinstance(starts, int) or starts < 1:  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InputError(f"starts must be a whole number from 1 on; got {starts!r}")
+    if not isinstance(seed, int) or seed < 0:  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError(f"seed must be a whole number from 0 on; got {seed!r}")
     named, data = _given(robots, measurements)
     unknown = unknowns(named, fit)
     problem = Problem(Samples.of(named, data, unknown, settings), objective or LeastSquares())
@@ -93,7 +95,10 @@ def _given(
     Raises:
         InputError: They do not belong together.
     """
-    named = {robots.name: robots} if isinstance(robots, Robot) else dict(robots)
+    single = not isinstance(robots, Mapping)
+    named = {getattr(robots, "name", ""): robots} if single else dict(robots)
+    if not all(isinstance(one, Robot) for one in named.values()):  # pyright: ignore
+        raise InputError("calibrate needs a Robot, or robots by label; load_robot makes one")
     if not isinstance(measurements, Mapping):
         if len(named) != 1:
             raise InputError("several robots need their measurements by the same labels")
@@ -109,6 +114,13 @@ def _given(
         every = (own,) if isinstance(own, Measurements) else tuple(own)
         if not every or not all(isinstance(one, Measurements) for one in every):  # pyright: ignore
             raise InputError(f"{label} needs one Measurements or more")
+        for number, one in enumerate(every):
+            if one in every[:number]:
+                same = every[every.index(one)].source
+                raise InputError(
+                    f"{one.source} of {label} holds the same rows as {same}; give them once, or "
+                    "they count twice"
+                )
         data[label] = every
     return named, data
 
@@ -139,6 +151,12 @@ def fitted(
     if not able:
         where = [f"{source}, row {row + 1}" for source, row in problem.samples.failed]
         told = f": no solution at {where[0]} ({len(where)} rows)" if where else ""
+        refused = problem.samples.refused.rstrip(".")
+        if refused:
+            raise InputError(
+                f"no robot can be as the search would start: {refused}. Give other limits to "
+                "search between"
+            )
         raise InputError(
             f"the model has no solution at any start{told}. Check units and loads of the file, "
             "or give other limits to search between"
@@ -171,6 +189,11 @@ def _with_own_noise(problem: Problem, best: Minimum) -> tuple[Minimum, Cost]:
 
 def _intervals(found: Calibration, progress: Progress | None) -> dict[str, Interval]:
     problem, best = found.problem, found.best
+    if found.tells_no_noise:
+        return {
+            name: Interval(None, None, np.array([[value, 0.0]]), "nothing tells the noise")
+            for name, value in found.values.items()
+        }
     told: dict[str, Interval] = {}
     for number, unknown in enumerate(problem.unknowns):
         told[unknown.name] = profile_interval(

@@ -98,6 +98,8 @@ def _trust(found: Calibration, unknown: Unknown) -> str:
         size = found.deviations[unknown.name]
         return f"standard deviation {size:.2g} {unit}".strip() if isfinite(size) else "no interval"
     low, high = interval.lower, interval.upper
+    if found.tells_no_noise:
+        return f"no interval: {interval.reason}"
     if low is None and high is None:
         return "any value fits"
     if low is not None and high is not None:

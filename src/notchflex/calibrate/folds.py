@@ -94,6 +94,8 @@ def leave_out(
     data = {
         label: tuple(one.measured for one in every if one.label == label) for label in found.given
     }
+    if starts < 1 or seed < 0:
+        raise InputError(f"starts must be 1 or more, seed 0 or more; got {starts} and {seed}")
     parts = _parts(data, by)
     if len(parts) < 2:
         raise InputError(f"there is only one {by}; leaving it out leaves nothing to fit to")

@@ -36,7 +36,7 @@ class FrictionReadings:
         turn_1: Angle by which the string turns over the first edge, rad, (N,).
         turn_2: The same over the second edge, rad, (N,).
         deviation: Standard deviations of these four, in their order and units, (N, 4); NaN where
-            not known.
+            not known. A reading without any is taken to be as accurate as the others.
         source: Where they came from.
         lines: Lines of the file that they stand in; empty if there is none.
         ignored: Columns of the file that were not used.

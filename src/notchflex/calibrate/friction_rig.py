@@ -11,6 +11,9 @@ from notchflex.calibrate.constancy import Constancy, constancy, design, known_va
 from notchflex.calibrate.friction_readings import FrictionReadings
 from notchflex.calibrate.scattered import fit_line, mean_interval, outliers
 
+# A tendon that rubs more than that is more likely a wrong unit.
+_RARE = 1.0
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FrictionRig:
@@ -62,6 +65,13 @@ class FrictionRig:
         said = [f"mu = {self.coefficient:.4g}, 95 % interval {low:.4g} to {high:.4g}, from {of}."]
         if count > 1:
             said.append(f"The readings spread by {self.spread:.2g} (standard deviation).")
+        if low == high:
+            said.append(
+                "They agree to rounding, which no readings of a rig do: how far mu can be trusted "
+                "is not known; give standard deviations."
+            )
+        if self.coefficient > _RARE:
+            said.append("So large a coefficient is rare: are the turns in degrees?")
         given = np.isfinite(self.readings.coefficient_deviation)
         if given.all() and count > 1:
             typical = float(np.sqrt(np.mean(self.readings.coefficient_deviation**2)))

@@ -20,6 +20,8 @@ LEVEL = 0.95
 _CLOSE, _TRIES = 0.005, 12
 # So many times the guessed half-width is far enough to say that the data set no end.
 _FAR = 50.0
+NO_SOLUTION = "the model has no solution that far"
+"""Why an end is open that the data may well set."""
 
 
 @dataclass(frozen=True)
@@ -87,9 +89,10 @@ def profile_interval(
         ends.append(end)
         if end is None:
             word = "below" if side < 0.0 else "above"
-            why.append(reason or f"nothing in the data holds it from {word} (limit {limit:.6g})")
+            at = f" (limit {limit:.6g})" if np.isfinite(limit) else ""
+            why.append(reason or f"nothing in the data holds it from {word}{at}")
     profile = np.array(sorted(points.items()))
-    return Interval(ends[0], ends[1], profile, "; ".join(why))
+    return Interval(ends[0], ends[1], profile, "; ".join(dict.fromkeys(why)))
 
 
 def _end(
@@ -147,7 +150,7 @@ def _end(
             share = (target - inner[1]) / (outer[1] - inner[1])
             reach = inner[0] + min(max(share, 0.05), 0.95) * (outer[0] - inner[0])
     if outer is None or np.isinf(outer[1]):
-        return None, "the model has no solution that far"
+        return None, NO_SOLUTION
     return float(best[number] + side * reach), ""
 
 
@@ -198,4 +201,4 @@ def held(
     return None if found.cost is None else (whole(found.values), found.cost.value)
 
 
-__all__ = ["LEVEL", "Interval", "allowed_rise", "held", "profile_interval"]
+__all__ = ["LEVEL", "NO_SOLUTION", "Interval", "allowed_rise", "held", "profile_interval"]

@@ -91,8 +91,10 @@ def _measured(measurements: Measurements) -> dict[str, Any]:
         for held, name in ((observed, column.name), (deviation, column.deviation)):
             if column.quantity not in held:
                 continue
-            values = held[column.quantity][(slice(None), *column.index)]
-            if not np.isnan(values).all():
+            place = (slice(None), *column.index)
+            values, seen = held[column.quantity][place], observed[column.quantity][place]
+            # The deviation of what was never measured tells nothing, and would not be read back.
+            if not (np.isnan(values).all() or np.isnan(seen).all()):
                 table[name] = exactly_in_degrees(values) if column.in_degrees else values
     return table
 

@@ -102,6 +102,13 @@ def next_measurement(
     missing = [name for name in narrow if name not in found.names]
     if missing:
         raise InputError(f"{missing[0]} was not fitted; narrow some of {', '.join(found.names)}")
+    if found.tells_no_noise:
+        raise InputError(
+            "nothing tells the noise, so that nobody knows what another measurement would add; "
+            "measure more, or give standard deviations"
+        )
+    if any(not 0.0 < value < np.inf for value in (deviation or {}).values()):
+        raise InputError("a deviation of the next measurement must be above 0")
     fitted = found.robots[label]
     path = load_path(candidates, fitted.number_of_tendons)
     seen = tuple(observed or _observed(found, label))

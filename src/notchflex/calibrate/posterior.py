@@ -18,6 +18,9 @@ from notchflex.calibrate.intervals import LEVEL
 from notchflex.calibrate.problem import Progress
 from notchflex.errors import InputError
 
+LEAST_DRAWS = 4
+"""Fewer draws of a chain tell nothing of how unlike its halves are."""
+
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
@@ -88,8 +91,11 @@ def posterior(
     """
     if not found.problem.objective.is_likelihood:
         raise InputError("a posterior needs LeastSquares(); other objectives are no likelihoods")
-    if min(draws, chains) < 1 or warm_up < 0:
-        raise InputError("draws and chains must be 1 or more, warm_up 0 or more")
+    if draws < LEAST_DRAWS or chains < 1 or warm_up < 0:
+        raise InputError(
+            f"draws must be {LEAST_DRAWS} or more (the chain's halves are compared), chains 1 or "
+            f"more, warm_up 0 or more; got {draws}, {chains} and {warm_up}"
+        )
     need("numpyro", "bayes", "a posterior")
     from numpyro import diagnostics, infer
 
@@ -128,6 +134,11 @@ class _Target:
     """Minus the logarithm of the posterior, in the units of the fit's own spread."""
 
     def __init__(self, found: Calibration) -> None:
+        if found.tells_no_noise:
+            raise InputError(
+                "nothing tells the noise: as many constants were fitted as numbers measured; "
+                "measure more, or give standard deviations"
+            )
         covariance = found.covariance
         if not np.isfinite(covariance).all():
             raise InputError("the data cannot tell some of the constants; fit only the others")
@@ -163,4 +174,4 @@ class _Target:
         return np.concatenate([[cost.value], self._spread.T @ cost.gradient]) / self._temper
 
 
-__all__ = ["Posterior", "posterior"]
+__all__ = ["LEAST_DRAWS", "Posterior", "posterior"]

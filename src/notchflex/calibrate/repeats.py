@@ -88,6 +88,24 @@ def repeats_of_each(measurements: Measurements, *, step: float | None = None) ->
     return found
 
 
+def gone_back(measurements: Measurements) -> tuple[str, ...]:
+    """Pulls in which a command rises and then falls: the way back of what loads a robot.
+
+    Returns:
+        Their labels; not those of pulls whose rows come in no order.
+    """
+    commands = _commands(measurements)
+    reach = np.ptp(commands, axis=0)
+    found: dict[str, None] = {}
+    for label in measurements.pulls:
+        rows = [row for row, pull in enumerate(measurements.pull) if pull == label]
+        for column in np.flatnonzero(reach > 0.0):
+            points = _turning_points(commands[rows, column], _TURN * reach[column])
+            if len(points) == 1 and points[0] < len(rows) - 2:
+                found[label] = None
+    return tuple(found)
+
+
 def _root_mean_square(values: Numbers) -> float:
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")

@@ -80,11 +80,12 @@ def misfit(name: str, measured: Measurements, predicted: Predicted) -> Misfit:
         rows = _turned(seen, base, [table[name] for table in tables])
     else:
         model = [_model(name, table, seen.shape) for table in tables]
-        if name in LENGTHS:
-            seen = seen @ base  # into the frame of the base, in which the model tells
+        if name in LENGTHS:  # in the world, where coordinates may be missing one by one
+            model = [one @ base.T for one in model]
         model[0] = model[0] - seen
         rows = [np.reshape(one, (len(seen), -1)) for one in model]
-    return Misfit(rows[0], np.stack(rows[1:]))
+    slopes = np.array(rows[1:]).reshape(count, *rows[0].shape)  # of no constant, perhaps
+    return Misfit(rows[0], slopes)
 
 
 def _model(name: str, table: dict[str, np.ndarray], shape: tuple[int, ...]) -> np.ndarray:

@@ -49,12 +49,14 @@ class Samples:
         unknowns: The constants.
         solves: How many rows were solved so far.
         failed: Rows that were not solved in the last try: measurement and row.
+        refused: Why no robot could have the values of the last try, "" where one could.
     """
 
     every: tuple[Sample, ...]
     unknowns: tuple[Unknown, ...]
     solves: int = 0
     failed: list[tuple[str, int]] = field(default_factory=list[tuple[str, int]])
+    refused: str = ""
 
     @classmethod
     def of(
@@ -102,13 +104,14 @@ class Samples:
 
     def residuals(self, values: Float[np.ndarray, " k"]) -> Residuals | None:
         """Model less measurement; None where a robot cannot be, or rows have no solution."""
-        self.failed = []
+        self.failed, self.refused = [], ""
         parts: list[dict[str, np.ndarray]] = []
         for number, sample in enumerate(self.every):
             own = np.asarray(values, float)[list(sample.columns)]
             try:
                 predicted = sample.rows.at(own)
-            except InputError:
+            except InputError as problem:
+                self.refused = str(problem)
                 return None
             self.solves += len(predicted.converged)
             rows = np.flatnonzero(~predicted.converged)

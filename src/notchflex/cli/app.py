@@ -117,6 +117,7 @@ def build() -> App:
         error_console=terminal.messages(),
         result_action="return_value",
         exit_on_error=False,
+        suppress_keyboard_interrupt=False,  # told by `run`
         print_error=False,
     )
     for order, (verb, (text, examples)) in enumerate(VERBS.items()):

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.calibrate_words import PAIR, Given, parse_fit, parse_pairs, robots_of
+from notchflex.cli.calibrate_words import (
+    PAIR,
+    Given,
+    check_beyond,
+    check_options,
+    check_sensor,
+    parse_fit,
+    parse_pairs,
+    robots_of,
+)
 from notchflex.cli.options import OUTPUT, JsonFile, PlotFile, Settings, robot_files
 from notchflex.cli.spec import load_columns
 from notchflex.errors import InputError
@@ -124,14 +135,15 @@ def calibrate(
     """
     given = parse_pairs(pairs)
     wanted = parse_fit(fit, bounds, prior)
-    _check_options(objective, huber, starts, draws, next_, next_robot, narrow, given)
+    check_options(objective, huber, starts, seed, next_, next_robot, narrow, given)
+    check_beyond(objective, posterior, draws, leave_out, given)
     inputs = _inputs(given)
     _check_targets(given, inputs, output, json, plot)
     robots = robots_of(given, settings)
     candidates = None
     if next_:
         one = robots[next_robot or next(iter(robots))]
-        candidates = load_columns(next_, (), one.number_of_tendons)
+        candidates = load_columns(next_, (), one.number_of_tendons, option="--next")
 
     with terminal.working("loading the solver"):
         from notchflex.cli.compile_cache import use_compile_cache
@@ -140,7 +152,7 @@ def calibrate(
         import notchflex.calibrate as fitting
         from notchflex.statics import LoadPath
 
-    _check_sensor([one.name for one in wanted])
+    check_sensor([one.name for one in wanted])
     measured = {
         label: [
             fitting.read_measurements(file, robots[label], from_rest=False if path else None)
@@ -156,42 +168,38 @@ def calibrate(
     with terminal.bars() as progress:
         ways: dict[str, Any] = {"objective": aim, "seed": seed, "progress": progress}
         found = fitting.calibrate(robots, measured, constants, starts=starts, **ways)
+        # What the fit turns out not to allow beyond it must not lose the fit.
+        undone: list[str] = []
         if leave_out is not None:
-            left = fitting.leave_out(found, by=leave_out, seed=seed, progress=progress)
+            with _noting(undone, "--leave-out"):
+                left = fitting.leave_out(found, by=leave_out, seed=seed, progress=progress)
         if candidates is not None:
             loads = LoadPath(*candidates)
-            told = fitting.next_measurement(found, loads, robot=next_robot, narrow=narrow)
+            with _noting(undone, "--next"):
+                told = fitting.next_measurement(found, loads, robot=next_robot, narrow=narrow)
         if posterior:
-            drawn = fitting.posterior(found, draws=draws, seed=seed, progress=progress)
+            with _noting(undone, "--posterior"):
+                drawn = fitting.posterior(found, draws=draws, seed=seed, progress=progress)
     _write(found, left, told, drawn, inputs, output=output, json=json, plot=plot)
     if json != STANDARD_OUTPUT:
         _print(found, left, told, drawn)
-    return _say_what_matters(found, robots)
+    code = _say_what_matters(found, robots)
+    if not undone:
+        return code
+    from notchflex.cli.app import BAD_INPUT
+
+    for problem in undone:
+        terminal.error(problem)
+    return BAD_INPUT
 
 
-def _check_options(
-    objective: str,
-    huber: float | None,
-    starts: int,
-    draws: int,
-    next_: tuple[str, ...],
-    next_robot: str | None,
-    narrow: tuple[str, ...],
-    given: Given,
-) -> None:
-    """Refuse what does not go together before anything is loaded."""
-    if huber is not None and objective != "least-squares":
-        raise InputError(f"--huber {huber:g} belongs to least-squares; leave out one of the two.")
-    for option, number in (("--starts", starts), ("--draws", draws)):
-        if number < 1:
-            raise InputError(f"{option} {number}: give 1 or more.")
-    if (next_robot is not None or narrow) and not next_:
-        raise InputError("--next-robot and --narrow belong to --next; give candidates with it.")
-    if next_robot is not None and next_robot not in given.robot:
-        raise InputError(
-            f"--next-robot {next_robot}: no robot of this fit is called so; there are "
-            f"{', '.join(given.robot)}."
-        )
+@contextlib.contextmanager
+def _noting(undone: list[str], option: str) -> Generator[None]:
+    """Keep what an option cannot do, to be told after the fit."""
+    try:
+        yield
+    except InputError as problem:
+        undone.append(f"{option}: {problem}")
 
 
 def _inputs(given: Given) -> list[Path]:
@@ -214,16 +222,6 @@ def _check_targets(
         check_output(json, "--json", inputs=inputs)
     if plot is not None:
         check_picture(plot, "--plot", inputs=inputs)
-
-
-def _check_sensor(names: list[str]) -> None:
-    """Tell a wrong name of a constant of the measurement, which is in no robot file."""
-    from notchflex.calibrate.rows import SENSOR
-
-    for name in names:
-        path = name.rpartition(":")[2]
-        if path.startswith("sensor.") and path not in SENSOR:
-            raise InputError(f"--fit {name}: there are {' and '.join(SENSOR)}.")
 
 
 def _objective(name: str, huber: float | None) -> FitObjective:

@@ -29,9 +29,10 @@ def print_calibration(found: Calibration) -> None:
         console.print(f"{label}: {', '.join(data_of(found, label))}", soft_wrap=True)
     kind = type(found.problem.objective).__name__
     count = len(found.searches)
+    numbers = len(found.residuals)
     console.print(
-        f"{len(found.residuals)} numbers measured; {count} search{'es' if count > 1 else ''}, "
-        f"{found.solves} rows solved"
+        f"{numbers} number{'s' if numbers > 1 else ''} measured; "
+        f"{count} search{'es' if count > 1 else ''}, {found.solves} rows solved"
     )
     chi = found.reduced_chi_squared
     told = f"; reduced chi squared {chi:.3g} (about 1: as noise)" if math.isfinite(chi) else ""

@@ -1,4 +1,4 @@
-"""What `notchflex calibrate` is given: robots with their data, constants, limits and priors."""
+"""What `notchflex calibrate` is given: robots with their data, constants, what goes together."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from notchflex._extras import need
 from notchflex.cli.options import chosen_robot
 from notchflex.errors import InputError
 from notchflex.robot import Robot
@@ -59,6 +60,11 @@ def parse_pairs(texts: Sequence[str]) -> Given:
             raise InputError(
                 f"{given.robot[label]} and {robot} are both called {label}; give one of them "
                 f"another label: LABEL={robot}={data}."
+            )
+        if label == "each":
+            raise InputError(
+                f"`{text}`: no robot can be called each, which stands for every robot; choose "
+                "another label."
             )
         own = given.data.setdefault(label, [])
         if data in own:
@@ -111,6 +117,58 @@ def robots_of(given: Given, settings: Sequence[str]) -> dict[str, Robot]:
         for one in [label] if named else own:
             own[one].append(rest if named else text)
     return {label: chosen_robot(name, own[label]) for label, name in given.robot.items()}
+
+
+def check_options(
+    objective: str,
+    huber: float | None,
+    starts: int,
+    seed: int,
+    next_: tuple[str, ...],
+    next_robot: str | None,
+    narrow: tuple[str, ...],
+    given: Given,
+) -> None:
+    """Refuse what does not go together before anything is loaded."""
+    if huber is not None and objective != "least-squares":
+        raise InputError(f"--huber {huber:g} belongs to least-squares; leave out one of the two.")
+    for option, number, least in (("--starts", starts, 1), ("--seed", seed, 0)):
+        if number < least:
+            raise InputError(f"{option} {number}: give {least} or more.")
+    if (next_robot is not None or narrow) and not next_:
+        raise InputError("--next-robot and --narrow belong to --next; give candidates with it.")
+    if next_robot is not None and next_robot not in given.robot:
+        raise InputError(
+            f"--next-robot {next_robot}: no robot of this fit is called so; there are "
+            f"{', '.join(given.robot)}."
+        )
+
+
+def check_beyond(
+    objective: str, posterior: bool, draws: int, leave_out: str | None, given: Given
+) -> None:
+    """Refuse what could not be done after the fit before the time for it is spent."""
+    if posterior and objective != "least-squares":
+        raise InputError(
+            f"--posterior needs least-squares: {objective} is no likelihood. Leave out one of the "
+            "two."
+        )
+    if posterior:
+        need("numpyro", "bayes", "--posterior")
+    if draws < 4:
+        raise InputError(f"--draws {draws}: give 4 or more.")
+    if leave_out == "robot" and len(given.robot) < 2:
+        raise InputError("--leave-out robot: there is only one robot; give two or more.")
+
+
+def check_sensor(names: list[str]) -> None:
+    """Tell a wrong name of a constant of the measurement, which is in no robot file."""
+    from notchflex.calibrate.rows import SENSOR
+
+    for name in names:
+        path = name.rpartition(":")[2]
+        if path.startswith("sensor.") and path not in SENSOR:
+            raise InputError(f"--fit {name}: there are {' and '.join(SENSOR)}.")
 
 
 def _label(robot: str) -> str:

@@ -30,19 +30,17 @@ def use_compile_cache() -> None:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
         jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     # A folder that the user has chosen may be shared by machines that are not alike.
-    programs = folder / f"programs-{_machine()}"
-    try:
-        programs.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return
-    keep_in(programs)
+    keep_in(folder / f"programs-{_machine()}")
 
 
 def cache_folder() -> Path | None:
-    """Return where compiled code is kept, made if need be; None where it is not kept."""
+    """Return where compiled code is kept, made if need be; None where it is not kept.
+
+    What the user chose may be an address of a store, which JAX can write to and we cannot.
+    """
     if VARIABLE in os.environ:
         chosen = os.environ[VARIABLE]
-        return Path(chosen) if chosen else None
+        return Path(chosen) if chosen and "://" not in chosen else None
     folder = _user_cache() / "notchflex" / f"compiled-{_machine()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -90,7 +90,7 @@ def _number(word: str, text: str, option: str) -> float:
 
 
 def load_columns(
-    tension: Sequence[str], stroke: Sequence[str], tendons: int
+    tension: Sequence[str], stroke: Sequence[str], tendons: int, *, option: str = "--tension"
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the commanded tensions and strokes of every step.
 
@@ -100,6 +100,7 @@ def load_columns(
         tension: What `--tension` was given, each SPEC or TENDON=SPEC.
         stroke: The same of `--stroke`.
         tendons: Number of tendons of the robot.
+        option: What gave the tensions, for messages.
 
     Returns:
         Tensions [N] and strokes [mm], each (S, tendons), NaN where not commanded.
@@ -110,17 +111,17 @@ def load_columns(
     """
     columns: dict[tuple[str, int], tuple[str, list[float]]] = {}
     commanded: dict[int, str] = {}
-    for option, texts in (("--tension", tension), ("--stroke", stroke)):
+    for kind, texts in ((option, tension), ("--stroke", stroke)):
         for text in texts:
-            index, spec = _tendon(text, option, tendons)
+            index, spec = _tendon(text, kind, tendons)
             if index in commanded:
                 raise InputError(
-                    f"{option} {text}: tendon {index + 1} already has {commanded[index]}; "
+                    f"{kind} {text}: tendon {index + 1} already has {commanded[index]}; "
                     "give each tendon one tension or one stroke."
                 )
-            values = parse_spec(spec, option, negative=option == "--stroke", shown=text)
-            commanded[index] = f"{option} {text}"
-            columns[option, index] = (commanded[index], values)
+            values = parse_spec(spec, kind, negative=kind == "--stroke", shown=text)
+            commanded[index] = f"{kind} {text}"
+            columns[kind, index] = (commanded[index], values)
     if not columns:
         raise InputError("Give a load: --tension SPEC or --stroke SPEC, for example --tension 2.")
     longest_name, longest = max(columns.values(), key=lambda column: len(column[1]))
@@ -130,12 +131,10 @@ def load_columns(
                 f"{name} has {len(values)} steps and {longest_name} has {len(longest)}; "
                 "give equal numbers of steps, or a single value for all of them."
             )
-    table = {
-        option: np.full((len(longest), tendons), np.nan) for option in ("--tension", "--stroke")
-    }
-    for (option, index), (_, values) in columns.items():
-        table[option][:, index] = values
-    return table["--tension"], table["--stroke"]
+    table = {kind: np.full((len(longest), tendons), np.nan) for kind in (option, "--stroke")}
+    for (kind, index), (_, values) in columns.items():
+        table[kind][:, index] = values
+    return table[option], table["--stroke"]
 
 
 def _tendon(text: str, option: str, tendons: int) -> tuple[int, str]:
