@@ -6,6 +6,7 @@ them, and only those that compute import JAX.
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -178,6 +179,12 @@ def main() -> None:
         traceback.print_exc()
         terminal.error("this is a bug in notchflex; please report it with the lines above.")
         code = INTERNAL_ERROR
+    if code == INTERRUPTED:
+        # What is being compiled goes on in threads of its own, and would crash where Python is
+        # taken down below it. All that was written is written.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
     sys.exit(code)
 
 
