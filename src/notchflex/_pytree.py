@@ -28,10 +28,15 @@ class Pytree:
         [1.0]
     """
 
-    def __init_subclass__(cls, **options: Any) -> None:
-        """Make a dataclass of the subclass, and tell JAX which of its fields are arrays."""
+    def __init_subclass__(cls, *, eq: bool = False, **options: Any) -> None:
+        """Make a dataclass of the subclass, and tell JAX which of its fields are arrays.
+
+        Args:
+            eq: Whether equal fields make equals, as of plain numbers; arrays have no one answer.
+            options: For other bases.
+        """
         super().__init_subclass__(**options)
-        dataclasses.dataclass(frozen=True, eq=False)(cls)
+        dataclasses.dataclass(frozen=True, eq=eq)(cls)
         jax.tree_util.register_dataclass(cls)
 
 

@@ -120,6 +120,7 @@ def test_a_new_load_or_robot_of_the_same_shape_compiles_nothing(
 ) -> None:
     monkeypatch.setattr(Kept, "folder", None)  # programs that are loaded are not counted
     nf.simulate(wrist, nf.pull(0.0, 1.0, steps=5))
+    nf.simulate(wrist, nf.draw(0.0, 1.0, steps=5))  # strokes are a program of their own
     compiled = run_module._follow._cache_size()
     nf.simulate(wrist, nf.pull(0.0, 2.0, steps=17).release())
     nf.simulate(nf.load_robot("pacheco2021-b-specimen"), nf.draw(0.0, 1.0, steps=40))

@@ -19,7 +19,7 @@ from notchflex.statics.sweep import Step, linear_step
 from notchflex.statics.walk import Evaluation, evaluate
 
 
-class Settings(Pytree):
+class Settings(Pytree, eq=True):
     """How hard the solver tries.
 
     Attributes:
