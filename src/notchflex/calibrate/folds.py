@@ -16,7 +16,6 @@ from notchflex.calibrate.residuals import Residuals
 from notchflex.calibrate.samples import Samples
 from notchflex.errors import InputError
 from notchflex.robot import Robot
-from notchflex.statics.newton import Settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +107,7 @@ def leave_out(
         samples = Samples.of(kept, {label: rest[label] for label in kept}, constants, settings)
         problem = Problem(samples, found.problem.objective)
         again = fitted(kept, problem, starts, seed, intervals=False)
-        own = (found.given[part.robot], data[part.robot], part, settings)
+        own = (found.given[part.robot], data[part.robot], part)
         errors, of_all = _errors(*own, again), _errors(*own, found)
         folds.append(
             Fold(part.told(data[part.robot]), again, errors or {}, of_all or {}, errors is not None)
@@ -171,17 +170,14 @@ def _without(every: Sequence[Measurements], label: str, part: _Part) -> tuple[Me
 
 
 def _errors(
-    robot: Robot,
-    every: Sequence[Measurements],
-    part: _Part,
-    settings: Settings,
-    found: Calibration,
+    robot: Robot, every: Sequence[Measurements], part: _Part, found: Calibration
 ) -> dict[str, float] | None:
     """Errors on the part left out; None where a row of it has no solution."""
     label = part.robot
     if part.pull:
         every = [every[part.measurement].of_pulls([part.pull])]
     constants = tuple(one.shared_with(label) for one in found.problem.unknowns)
+    settings = found.problem.samples.every[0].rows.settings
     samples = Samples.of({label: robot}, {label: every}, constants, settings)
     residuals = samples.residuals(found.best.values)
     return None if residuals is None else root_mean_squares(residuals)
