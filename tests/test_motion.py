@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,8 +12,17 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from notchflex._jax import jax
-from notchflex.motion import Motion, exponential, identity, rotation_about, skew, unskew
+from notchflex._jax import jax, jnp
+from notchflex.motion import (
+    Motion,
+    exponential,
+    identity,
+    left_slope,
+    left_slope_change,
+    rotation_about,
+    skew,
+    unskew,
+)
 
 numbers = st.floats(-2.0, 2.0)
 vectors = st.tuples(numbers, numbers, numbers).map(np.array)
@@ -73,3 +85,32 @@ def test_derivative_is_smooth_at_zero() -> None:
     twist = np.zeros(6)
     derivative = jax.jacfwd(lambda value: exponential(value).rotation)(twist)
     np.testing.assert_allclose(derivative[:, :, :3], -np.cross(np.eye(3)[:, None], np.eye(3)[None]))
+
+
+@given(vectors, vectors)
+def test_left_slope_is_what_a_rotation_turns_by(vector: np.ndarray, change: np.ndarray) -> None:
+    step = 1e-6 * change
+    turn = rotation_about(vector + step) @ rotation_about(vector - step).T
+    assert unskew(turn) == pytest.approx(2.0 * left_slope(vector) @ step, abs=2e-13)
+
+
+@given(vectors, vectors)
+def test_change_of_the_left_slope_against_automatic_slopes(
+    vector: np.ndarray, held: np.ndarray
+) -> None:
+    own = left_slope_change(jnp.array(vector), jnp.array(held))
+    found = jax.jacfwd(lambda varied: left_slope(varied).T @ held)(jnp.array(vector))
+    assert np.asarray(own) == pytest.approx(np.asarray(found), abs=1e-12)
+
+
+@pytest.mark.parametrize("carry", [Motion.wrench, Motion.wrench_inside, Motion.twist_inside])
+@pytest.mark.parametrize("size", [6, 3])
+def test_columns_are_carried_as_one_by_one(carry: Callable[..., Any], size: int) -> None:
+    rng = np.random.default_rng(0)
+    twist = rng.normal(size=size)
+    motion = exponential(jnp.array(twist))
+    columns = jnp.array(rng.normal(size=(size, 4)))
+    one_by_one = np.stack([carry(motion, column) for column in columns.T], axis=1)
+    plain = carry(Motion(*map(np.asarray, motion)), np.asarray(columns))
+    assert np.asarray(carry(motion, columns)) == pytest.approx(one_by_one, abs=1e-15)
+    assert plain == pytest.approx(one_by_one, abs=1e-14)

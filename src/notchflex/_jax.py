@@ -18,10 +18,14 @@ import jax.numpy as jnp  # noqa: E402
 
 # The chain is many small steps one after the other, each far too small for several threads. XLA's
 # newer fusion on the CPU compiles them in 7 s rather than 4 s (jax 0.10.1); later versions have no
-# other.
-_OPTIONS = {"xla_cpu_multi_thread_eigen": False}
+# other. Its library for products of matrices takes some 5 us to begin one, and a loop over a few
+# hundred numbers that is shared out among cores waits for them: together a fifth of the time of a
+# robot with 27 notches.
+_OPTIONS: dict[str, Any] = {"xla_cpu_multi_thread_eigen": False}
 if jax.__version_info__ < (0, 11):
     _OPTIONS["xla_cpu_use_fusion_emitters"] = False
+    _OPTIONS["xla_cpu_experimental_ynn_fusion_type"] = ""
+    _OPTIONS["xla_disable_hlo_passes"] = "cpu-parallel-task-assigner"
 jit = partial(jax.jit, compiler_options=_OPTIONS)
 
 

@@ -18,7 +18,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, constant, jnp
+from notchflex._jax import array_module, constant, jax, jnp
 
 PLANE, IN_PLANE = np.array([1, 3, 5]), np.array([0, 2])
 
@@ -40,42 +40,58 @@ class Motion(NamedTuple):
     def then(self, inner: Motion) -> Motion:
         """Product: this motion, and inside its frame another."""
         return Motion(
-            self.rotation @ inner.rotation,
-            self.rotation @ inner.translation + self.translation,
+            _times(self.rotation, inner.rotation),
+            _times(self.rotation, inner.translation) + self.translation,
         )
 
     def point(self, inside: Float[Array, " d"]) -> Float[Array, " d"]:
         """Outer coordinates of a point of the inner frame (mm)."""
-        return self.rotation @ inside + self.translation
+        return _times(self.rotation, inside) + self.translation
 
-    def point_inside(self, outside: Float[Array, " d"]) -> Float[Array, " d"]:
-        """Inner coordinates of a point of the outer frame (mm)."""
-        return (outside - self.translation) @ self.rotation
+    def point_inside(self, outside: Float[Array, "*n d"]) -> Float[Array, "*n d"]:
+        """Inner coordinates of a point of the outer frame (mm), or of many."""
+        return _times(self.rotation.T, (outside - self.translation).T).T
 
-    def wrench(self, inside: Float[Array, " w"]) -> Float[Array, " w"]:
-        """A wrench (moment, force) about the inner origin, about and along the outer frame."""
+    def wrench(self, inside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
+        """A wrench (moment, force) about the inner origin, about and along the outer frame.
+
+        Or many as columns, as for the two functions that follow.
+        """
         axes = angular(inside)
-        force = self.rotation @ inside[axes:]
+        force = _times(self.rotation, inside[axes:])
         moment = turned(self.rotation, inside[:axes]) + moment_of(self.translation, force)
         return array_module(inside, force).concatenate([moment, force])
 
-    def wrench_inside(self, outside: Float[Array, " w"]) -> Float[Array, " w"]:
+    def wrench_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
         """A wrench about the outer origin, about the inner origin and along the inner frame."""
         axes = angular(outside)
         force = outside[axes:]
         moment = outside[:axes] - moment_of(self.translation, force)
         inside = turned(self.rotation.T, moment)
-        return array_module(outside, inside).concatenate([inside, force @ self.rotation])
+        along = _times(self.rotation.T, force)
+        return array_module(outside, inside).concatenate([inside, along])
 
-    def twist_inside(self, outside: Float[Array, " w"]) -> Float[Array, " w"]:
+    def twist_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
         """A twist at the outer origin, at and along the inner frame."""
         axes = angular(outside)
         moved = outside[axes:] + cross(outside[:axes], self.translation)
         turn = turned(self.rotation.T, outside[:axes])
-        return array_module(outside, moved).concatenate([turn, moved @ self.rotation])
+        return array_module(outside, moved).concatenate([turn, _times(self.rotation.T, moved)])
 
 
-def angular(twist: Float[Array, " w"]) -> int:
+def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
+    """Product with a vector or with columns.
+
+    Compiled it is written out, and becomes part of what stands around it: of so small matrices a
+    product for itself takes longer to begin than to do.
+    """
+    if array_module(matrix, other) is np:
+        return matrix @ other
+    columns = matrix.T.reshape(*matrix.shape, *(1,) * (other.ndim - 1))
+    return cast("Array", sum(columns[k] * other[k : k + 1] for k in range(len(matrix))))
+
+
+def angular(twist: Float[Array, "w ..."]) -> int:
     """Number of angular components of a twist or wrench: 3 in space, 1 in the plane."""
     return 3 if twist.shape[0] == 6 else 1
 
@@ -85,10 +101,10 @@ def identity(dimensions: int = 3) -> Motion:
     return Motion(constant(np.eye(dimensions)), constant(np.zeros(dimensions)))
 
 
-def turned(rotation: Float[Array, "d d"], axis: Float[Array, " a"]) -> Float[Array, " a"]:
-    """An angular vector along the outer frame; in the plane a mirror changes its sign."""
+def turned(rotation: Float[Array, "d d"], axis: Float[Array, "a ..."]) -> Float[Array, "a ..."]:
+    """Angular vectors along the outer frame; in the plane a mirror changes their sign."""
     if axis.shape[0] == 3:
-        return rotation @ axis
+        return _times(rotation, axis)
     return (rotation[0, 0] * rotation[1, 1] - rotation[0, 1] * rotation[1, 0]) * axis
 
 
@@ -106,7 +122,7 @@ def skew(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
     return xp.stack(rows, axis=-1).reshape(*vector.shape, 3)
 
 
-def cross(first: Float[Array, " a"], second: Float[Array, " d"]) -> Float[Array, " d"]:
+def cross(first: Float[Array, "a ..."], second: Float[Array, "d ..."]) -> Float[Array, "d ..."]:
     """Cross product of an angular vector and a linear one (in space, of any two).
 
     Written out: it is compiled and run faster so than as a matrix.
@@ -118,7 +134,7 @@ def cross(first: Float[Array, " a"], second: Float[Array, " d"]) -> Float[Array,
     return xp.stack([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
-def moment_of(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " a"]:
+def moment_of(point: Float[Array, "d ..."], force: Float[Array, "d ..."]) -> Float[Array, "a ..."]:
     """Moment about the origin of a force at a point, or of any two linear vectors."""
     if point.shape[0] == 3:
         return cross(point, force)
@@ -245,6 +261,22 @@ def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
     _, second, third = _coefficients(_squared(vector))
     matrix = skew(vector)
     return constant(np.eye(3)) + _each(second) * matrix + _each(third) * (matrix @ matrix)
+
+
+def left_slope_change(vector: Float[Array, " 3"], held: Float[Array, " 3"]) -> Float[Array, "3 3"]:
+    """Change of `left_slope(vector).T @ held` per change of the rotation vector.
+
+    That product is held - b (v x held) + c v x (v x held), with coefficients b and c of |v|^2.
+    """
+    squared = vector @ vector
+    (_, second, third), (_, by_second, by_third) = jax.jvp(
+        _coefficients, (squared,), (jnp.ones_like(squared),)
+    )
+    once = cross(vector, held)
+    twice = cross(vector, once)
+    of_coefficients = jnp.outer(2.0 * (by_third * twice - by_second * once), vector)
+    of_products = skew(once) + skew(vector) @ skew(held)
+    return of_coefficients + second * skew(held) - third * of_products
 
 
 def _squared(vector: Float[Array, "*n 3"]) -> Float[Array, "*n"]:

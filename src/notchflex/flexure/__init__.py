@@ -12,6 +12,7 @@ from notchflex.flexure.state import (
     fibre_slope,
     fibre_stretch,
     flexure_state,
+    held_by_strains,
     in_space,
     of_rod,
 )
@@ -29,6 +30,7 @@ __all__ = [
     "flattened",
     "flexure_state",
     "free_pose",
+    "held_by_strains",
     "in_space",
     "modulus_from_single_notch",
     "of_rod",

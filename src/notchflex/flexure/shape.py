@@ -20,7 +20,15 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import array_module, constant, jax, jnp
 from notchflex.flexure.rod import Rod
-from notchflex.motion import Motion, cross, left_slope, rotation_about, sine_cosine, unskew
+from notchflex.motion import (
+    Motion,
+    cross,
+    left_slope,
+    left_slope_change,
+    rotation_about,
+    sine_cosine,
+    unskew,
+)
 
 
 class Bent(NamedTuple):
@@ -31,12 +39,15 @@ class Bent(NamedTuple):
         turn: Turn at every place per unit of mode, along the axes of the start.
         step: The turned steps at the nodes.
         stepped: The turned steps per unit of mode.
+        from_place: Rotation vectors from place to place, their slopes by the modes, and what these
+            make of the turn, along the axes of the start; None in the plane, where turns add up.
     """
 
     rotation: Float[Array, "places d d"]
     turn: Float[Array, "places a modes"]
     step: Float[Array, "gauss d"]
     stepped: Float[Array, "gauss d modes"]
+    from_place: tuple[Array, Array, Array] | None
 
     @property
     def end(self) -> Motion:
@@ -48,14 +59,16 @@ def bent(rod: Rod, modes: Float[Array, " modes"]) -> Bent:
     """Turns and steps of a rod under given modes."""
     xp = array_module(modes)
     hat = xp.concatenate([np.ones(1), modes])
+    from_place = None
     if rod.turn_pair is None:
         rotation, turn = _in_plane(rod.turn[:, 0] @ hat), rod.turn[..., 1:]
     else:
         turns, slope = _turns(rod, hat)
         rotation = _products(_about(turns))
-        turn = xp.cumsum(_before(rotation) @ _left_slopes(turns) @ slope, axis=0)
+        turning = _before(rotation) @ _left_slopes(turns) @ slope
+        from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
     stepped = _stepped(rod, rotation)
-    return Bent(rotation, turn, stepped @ hat, stepped[..., 1:])
+    return Bent(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
 
 
 def free_pose(rod: Rod) -> Motion:
@@ -158,7 +171,7 @@ def twist_slope(rod: Rod, modes: Float[Array, " modes"], own: Bent) -> Float[Arr
     twist = jnp.concatenate([turn, end.T @ _moved(own)])
     if rod.small is not None:
         twist = jnp.where(rod.small > 0.0, _small_twist(rod, modes), twist)
-    return jax.vmap(_tail(rod).twist_inside, in_axes=1, out_axes=1)(twist)
+    return _tail(rod).twist_inside(twist)
 
 
 def _moved(own: Bent) -> Float[Array, "d modes"]:
@@ -194,7 +207,7 @@ def pull_change(
     leaving = _moments(_moved(own)[None], force)[0].T @ own.turn[-1]
     change = mixed + mixed.T - twice - leaving
     if axes == 3:
-        change = change + _order_of_turns(rod, modes, own, at_end)
+        change = change + _order_of_turns(rod, own, at_end)
     if rod.small is not None:
         small = jax.jacfwd(lambda varied: _small_twist(rod, varied).T @ at_end)(modes)
         change = jnp.where(rod.small > 0.0, small, change)
@@ -208,37 +221,29 @@ def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:
     return jnp.cross(points, jnp.broadcast_to(force[:, None], points.shape), axis=1)
 
 
-def _order_of_turns(
-    rod: Rod, modes: Float[Array, " modes"], own: Bent, at_end: Float[Array, " 6"]
-) -> Float[Array, "modes modes"]:
+def _order_of_turns(rod: Rod, own: Bent, at_end: Float[Array, " 6"]) -> Float[Array, "modes modes"]:
     """What `pull_change` has in space alone, where a turn after another is not the other after it.
 
     The slopes of the turns change with the modes: from place to place by those before, within each
     step by the slope of the exponential and by the pairs of Magnus's series.
     """
+    assert rod.turn_pair is not None
+    assert own.from_place is not None
+    turns, slope, turning = own.from_place
     end = own.rotation[-1]
     moment, force = end @ at_end[:3], end @ at_end[3:]
-    hat = jnp.concatenate([jnp.ones(1), modes])
-    turns, slope = _turns(rod, hat)
     nodes = own.turn[:-1]
     # Each place's share of the wrench, then that of all places from it on.
     shares = jnp.cross(own.step, jnp.broadcast_to(force, own.step.shape))
     shares = jnp.concatenate([shares, moment[None]])
     onward = jnp.cumsum(shares[::-1], axis=0)[::-1]
-    before = _before(own.rotation)
-    increments = before @ _left_slopes(turns) @ slope
     turned_before = jnp.concatenate([jnp.zeros_like(own.turn[:1]), own.turn[:-1]])
-    lever = jnp.cross(increments, jnp.broadcast_to(onward[..., None], increments.shape), axis=1)
+    lever = jnp.cross(turning, jnp.broadcast_to(onward[..., None], turning.shape), axis=1)
     change = jnp.einsum("kci,kcj->ij", lever, turned_before)
-    inside = jnp.einsum("kdc,kd->kc", before, onward)
-
-    def answered(vector: Array, share: Array) -> Array:
-        return left_slope(vector).T @ share
-
-    bending = jax.vmap(jax.jacfwd(answered))(turns, inside)
+    inside = jnp.einsum("kdc,kd->kc", _before(own.rotation), onward)
+    bending = jax.vmap(left_slope_change)(turns, inside)
     change = change + jnp.einsum("kci,kcd,kdj->ij", slope, bending, slope)
-    answers = jax.vmap(answered)(turns, inside)
-    assert rod.turn_pair is not None
+    answers = jnp.einsum("kdc,kd->kc", _left_slopes(turns), inside)
     change = change + 2.0 * jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
     # The first node's wrench is turned by the end, and steps lean out of their turns' plane.
     last = own.turn[-1]

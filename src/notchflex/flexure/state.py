@@ -120,6 +120,24 @@ def flexure_state(
     )
 
 
+def held_by_strains(
+    rod: Rod, law: SectionLaw, memory: Any, modes: Float[Array, " modes"]
+) -> Float[Array, "modes modes"]:
+    """Change of what the strains do to each mode (`internal`), per unit of mode."""
+
+    def answered(strain: Array, section: Any, at_node: Any, columns: Array) -> Array:
+        def resultants(varied: Array) -> Array:
+            return of_rod(rod, law.respond(in_space(varied), section, at_node).resultants)
+
+        return jax.vmap(
+            lambda column: jax.jvp(resultants, (strain,), (column,))[1], in_axes=1, out_axes=1
+        )(columns)
+
+    answers = jax.vmap(answered)(rod.basis @ modes, rod.section, memory, rod.basis)
+    weighed = rod.length[:, None, None] * rod.basis
+    return jnp.einsum("icm,ick->mk", weighed, answers) + jnp.diag(rod.idle)
+
+
 def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"], Float[Array, ""]]:
     """How far the chord of a rod has turned in its plane of bending (Liu 2022, eq. 19).
 

@@ -8,7 +8,13 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import constant
 from notchflex.material.registry import section_law
-from notchflex.material.section_law import FibreSection, Response, SectionLaw, elastic_stiffness
+from notchflex.material.section_law import (
+    FibreSection,
+    Response,
+    SectionLaw,
+    elastic_resultants,
+    elastic_stiffness,
+)
 from notchflex.robot import Linear
 
 
@@ -25,14 +31,14 @@ class LinearLaw(SectionLaw):
 
     def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
         """Resultants in proportion to the strains."""
-        return Response(self.stiffness(section) @ strain, memory)
+        moduli = self.elastic_modulus, self.shear_modulus
+        return Response(elastic_resultants(*moduli, section, strain), memory)
 
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
         """Half the product of resultants and strains."""
-        del memory
-        return 0.5 * strain @ self.stiffness(section) @ strain
+        return 0.5 * strain @ self.respond(strain, section, memory).resultants
 
 
 @section_law.register

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, jax
+from notchflex._jax import array_module, constant, jax
 from notchflex._pytree import Pytree
 
 
@@ -83,10 +83,13 @@ class SectionLaw(Pytree, ABC):
         return jax.jacfwd(lambda varied: self.respond(varied, section, memory).resultants)(strain)
 
 
-def elastic_stiffness(
-    elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
-) -> Float[Array, "*shape 6 6"]:
-    """Stiffness of a linear elastic section about its neutral axis.
+def elastic_resultants(
+    elastic_modulus: float | Array,
+    shear_modulus: float | Array,
+    section: FibreSection,
+    strain: Float[Array, " 6"],
+) -> Float[Array, "*shape 6"]:
+    """Resultants of a linear elastic section about its neutral axis.
 
     The axes through the centroid are principal, so bending and stretch do not couple. Shear
     along y acts at the shear centre, `shear_centre` on the spine's side, where the section's
@@ -97,28 +100,31 @@ def elastic_stiffness(
         elastic_modulus: Young's modulus, MPa.
         shear_modulus: Shear modulus, MPa.
         section: The section, or many.
+        strain: Its strains.
 
     Returns:
-        Resultants per strain, in the order of the strains.
+        Resultants, in the order of the strains.
     """
-    xp = array_module(*jax.tree.leaves((elastic_modulus, shear_modulus, section)))
+    xp = array_module(*jax.tree.leaves((elastic_modulus, shear_modulus, section)), strain)
+    about_x, about_y, twist, along_x, along_y, stretch = (strain[place] for place in range(6))
     shear = shear_modulus * section.area
-    lever = section.shear_centre
-    entries = [
-        elastic_modulus * section.second_moment_strong,
-        elastic_modulus * section.second_moment_weak,
-        shear_modulus * section.torsion_constant + shear * lever * lever,
-        -shear * lever,
-        shear,
-        elastic_modulus * section.area,
+    across = shear * (along_y - section.shear_centre * twist)
+    resultants = [
+        elastic_modulus * section.second_moment_strong * about_x,
+        elastic_modulus * section.second_moment_weak * about_y,
+        shear_modulus * section.torsion_constant * twist - section.shear_centre * across,
+        shear * along_x,
+        across,
+        elastic_modulus * section.area * stretch,
     ]
-    return xp.tensordot(xp.stack(entries, axis=-1), _PLACES, 1)
+    return xp.stack(resultants, axis=-1)
 
 
-# Where the entries of `elastic_stiffness` stand.
-_PLACES = np.zeros((6, 6, 6))
-for _entry, _places in enumerate(
-    [[(0, 0)], [(1, 1)], [(2, 2)], [(2, 4), (4, 2)], [(3, 3), (4, 4)], [(5, 5)]]
-):
-    for _row, _column in _places:
-        _PLACES[_entry, _row, _column] = 1.0
+def elastic_stiffness(
+    elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
+) -> Float[Array, "*shape 6 6"]:
+    """Resultants per strain of a linear elastic section, or of many; see `elastic_resultants`."""
+    xp = array_module(*jax.tree.leaves((elastic_modulus, shear_modulus, section)))
+    moduli = elastic_modulus, shear_modulus
+    by_strain = [elastic_resultants(*moduli, section, unit) for unit in constant(np.eye(6))]
+    return xp.stack(by_strain, axis=-1)

@@ -15,7 +15,13 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jnp
 from notchflex.material.registry import section_law
-from notchflex.material.section_law import FibreSection, Response, SectionLaw, elastic_stiffness
+from notchflex.material.section_law import (
+    FibreSection,
+    Response,
+    SectionLaw,
+    elastic_resultants,
+    elastic_stiffness,
+)
 from notchflex.robot import Superelastic
 
 _POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
@@ -75,19 +81,23 @@ class SuperelasticLaw(SectionLaw):
         """Stiffness on the linear branch."""
         return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
 
+    def _elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Array:
+        """Resultants on the linear branch."""
+        moduli = self.elastic_modulus, self.shear_modulus
+        return jnp.asarray(elastic_resultants(*moduli, section, strain))
+
     def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
         """Resultants with the weak-axis moment taken from the outer fibre on the spine."""
         stress = self.stress(strain[1] * section.edge_spine)
         moment = section.second_moment_weak / section.edge_spine * stress
-        resultants = jnp.asarray(self.stiffness(section) @ strain)
-        return Response(resultants.at[1].set(moment), memory)
+        return Response(self._elastic(strain, section).at[1].set(moment), memory)
 
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
         """Area under the moment over the curvature, and the elastic rest."""
         del memory
-        others = jnp.asarray(self.stiffness(section) @ strain).at[1].set(0.0)
+        others = self._elastic(strain, section).at[1].set(0.0)
         density = self.energy_density(strain[1] * section.edge_spine)
         return 0.5 * others @ strain + (
             section.second_moment_weak / section.edge_spine**2 * density

@@ -18,7 +18,9 @@ from notchflex.statics.load import LoadPath
 def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
     by_stroke = ~np.isnan(load.stroke)
-    value = np.where(by_stroke, load.stroke, np.nan_to_num(load.tension))
+    value = np.where(np.isnan(load.tension), 0.0, load.tension)
+    if by_stroke.any():
+        value = np.where(by_stroke, load.stroke, value)
     others = None
     if chain.loaded:
         others = applied(

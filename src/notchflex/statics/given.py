@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,7 @@ def vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
             numbers = [number(entry, what) for entry in given]
         except InputError:
             numbers = []
-    if len(numbers) != 3 or not np.isfinite(numbers).all():
+    if len(numbers) != 3 or not all(isfinite(one) for one in numbers):
         raise InputError(f"{what} needs three finite numbers ({form}); got {shown(value)}")
     return numbers[0], numbers[1], numbers[2]
 

@@ -17,14 +17,13 @@ Only the geometry of a span, an opening or a rod is differentiated by JAX, on it
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
-from notchflex.flexure import flexure_state, pull_change
-from notchflex.flexure.rod import Rod
+from notchflex.flexure import held_by_strains, pull_change
 from notchflex.motion import Motion, skew, wrench_turn
 from notchflex.statics.applied import Applied, body_wrench
 from notchflex.statics.element import RATE, STICTION, Memory, Unknowns, driven, heights, pressed
@@ -64,7 +63,7 @@ def blocks(
     openings = [opening_of(chain, k, at, unit, moves) for k in range(len(chain.lips))]
     elastic = chain.elastic
     if elastic is None:
-        elastic = jax.vmap(jax.jacfwd(_internal, argnums=3), in_axes=(0, None, 0, 0))(
+        elastic = jax.vmap(held_by_strains, in_axes=(0, None, 0, 0))(
             chain.rods, chain.law, chain.memory, unknowns.modes
         )
     behind: list[Array] = []
@@ -114,10 +113,6 @@ def _stacked(chain: Chain, rows: list[Array], form: Layout) -> Float[Array, "n k
     return jnp.concatenate(rows, axis=1)
 
 
-def _internal(rod: Rod, law: Any, memory: Any, modes: Array) -> Float[Array, " modes"]:
-    return flexure_state(rod, law, memory, modes, with_pose=False).internal
-
-
 def _forces(
     chain: Chain,
     unknowns: Unknowns,
@@ -149,7 +144,7 @@ def _forces(
     whole = ending[:, 0]
     if unit.handed:
         whole = whole + unit.handed[0][None]
-    back = jax.vmap(jax.vmap(Motion.wrench, in_axes=(None, 1), out_axes=1))
+    back = jax.vmap(Motion.wrench)
 
     def handed_back(rows: Array, wrench: Array) -> Array:
         """Rows of a wrench that goes along with the distal body, seen from the body before."""

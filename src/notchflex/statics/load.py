@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -269,8 +270,8 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     if len(turns) > 1:
         raise InputError("base_rotation must be the same for all loads of a path")
     return LoadPath(
-        np.stack([_entries(load.tension, tendons, "tension") for load in every]),
-        np.stack([_entries(load.stroke, tendons, "stroke") for load in every]),
+        np.array([_entries(load.tension, tendons, "tension") for load in every]),
+        np.array([_entries(load.stroke, tendons, "stroke") for load in every]),
         np.array(turns.pop()),
         tuple(load.external for load in every),
     )
@@ -296,7 +297,7 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     return plain or (NOTHING,) * steps
 
 
-def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
+def _entries(value: Any, tendons: int, what: str) -> list[float]:
     """One number per tendon, NaN where nothing is commanded."""
     if hasattr(value, "__array__"):
         value = np.asarray(value).tolist()
@@ -307,12 +308,12 @@ def _entries(value: Any, tendons: int, what: str) -> np.ndarray:
             f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "
             f"give at most {tendons}"
         )
-    entries = np.full(tendons, np.nan)
+    entries = [nan] * tendons
     for i, entry in enumerate(given):
         if entry is None:
             continue
         entries[i] = number(entry, what, _FORM)
-        if not np.isfinite(entries[i]):
+        if not isfinite(entries[i]):
             raise InputError(f"{what} must be finite; got {shown(entry)}")
     return entries
 

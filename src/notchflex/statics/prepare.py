@@ -34,11 +34,8 @@ class Prepared:
 
     @cached_property
     def vector(self) -> Float[Array, " chain"]:
-        """The chain, kept where compiled programs take it from without copying.
-
-        That is the processor, also where JAX has a GPU: one robot is far too small for that.
-        """
-        return jax.device_put(self.chain_form.pack(self.chain), jax.local_devices(backend="cpu")[0])
+        """The chain, kept where compiled programs take it from without copying."""
+        return on_processor(self.chain_form.pack(self.chain))
 
     @cached_property
     def rest(self) -> Solved:
@@ -55,16 +52,39 @@ class Prepared:
         """Form of a solved state."""
         return Form.of(self.rest)
 
+    @cached_property
+    def rest_on_processor(self) -> Float[Array, " state"]:
+        """The same, kept as the chain is."""
+        return on_processor(self.rest_vector)
+
     def command_form(self, commands: Command) -> Form:
         """Form of one of some loads: by tensions alone, or some by stroke."""
-        none = np.zeros(self.chain.tendons)
-        by_stroke = None if commands.by_stroke is None else none.astype(bool)
-        return Form.of(Command(constant(none), by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
+        return self._tension_form if commands.by_stroke is None else self._stroke_form
+
+    @cached_property
+    def _tension_form(self) -> Form:
+        return self._form_of_commands(None)
+
+    @cached_property
+    def _stroke_form(self) -> Form:
+        return self._form_of_commands(np.zeros(self.chain.tendons, bool))
+
+    def _form_of_commands(self, by_stroke: np.ndarray | None) -> Form:
+        value = constant(np.zeros(self.chain.tendons))
+        return Form.of(Command(value, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
 
     @cached_property
     def shape(self) -> Form:
         """Form of what is told of the shape of every state."""
         return Shape.form(self.chain.flexures, self.chain.tendons)
+
+
+def on_processor(values: np.ndarray) -> Array:
+    """Values where compiled programs for one robot run.
+
+    That is the processor, also where JAX has a GPU: one robot is far too small for that.
+    """
+    return jax.device_put(values, jax.local_devices(backend="cpu")[0])
 
 
 @lru_cache(maxsize=64)

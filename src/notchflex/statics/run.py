@@ -19,7 +19,7 @@ from notchflex._kept import kept
 from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form
-from notchflex.statics.prepare import Prepared
+from notchflex.statics.prepare import Prepared, on_processor
 from notchflex.statics.quantities import Quantities, Shape, notch_lips, quantities, shape
 from notchflex.statics.stability import held_stiffness
 from notchflex.statics.stepping import Solved, advance
@@ -132,11 +132,15 @@ def run(
     count = len(commands.value)
     form = prepared.command_form(commands)
     packed = form.pack(commands, leading=1)
-    packed = packed[_padded(count)]
-    first = prepared.rest_vector if start is None else prepared.state.pack(start)
-    options = np.array([*_numbers(settings), float(each_from_start), float(count)])
+    if count != _size(count):
+        packed = packed[_padded(count)]
+    options = _options(settings, each_from_start, count)
     forms = (prepared.chain_form, form, prepared.state)
-    table = np.asarray(_follow(prepared.vector, packed, first, options, *forms))
+    if start is None:
+        first, given = prepared.rest_vector, prepared.rest_on_processor
+    else:
+        first = given = prepared.state.pack(start)
+    table = np.asarray(_follow(prepared.vector, packed, given, options, *forms))
     return Run(prepared, first, table, count)
 
 
@@ -168,7 +172,7 @@ def lips(
         Contact forces and gaps, loads by notches, and which loads converged.
     """
     form = prepared.chain_form
-    numbers = np.array(_numbers(settings))
+    numbers = np.array(settings.numbers)
     force, gap, converged = _lips(prepared.vector, commands, start, numbers, form)
     return np.asarray(force), np.asarray(gap), np.asarray(converged)
 
@@ -195,15 +199,20 @@ def _lips(
     return jax.lax.map(at_lips, commands)
 
 
-@lru_cache(maxsize=8)
-def _numbers(settings: Settings) -> tuple[float, ...]:
-    return settings.numbers
+@lru_cache(maxsize=64)
+def _options(settings: Settings, each_from_start: bool, count: int) -> Float[Array, " options"]:
+    """What is told to `_follow` beside robot, loads and start, kept for the next time."""
+    return on_processor(np.array([*settings.numbers, float(each_from_start), float(count)]))
+
+
+def _size(count: int) -> int:
+    """The number of loads that programs are compiled for."""
+    return next((size for size in _SIZES if size >= count), -(-count // _SIZES[-1]) * _SIZES[-1])
 
 
 def _padded(count: int) -> Int[np.ndarray, " size"]:
     """Entries up to one of the sizes, the last one repeated."""
-    size = next((size for size in _SIZES if size >= count), -(-count // _SIZES[-1]) * _SIZES[-1])
-    return np.minimum(np.arange(size), count - 1)
+    return np.minimum(np.arange(_size(count)), count - 1)
 
 
 def _pad(tree: Any) -> Any:

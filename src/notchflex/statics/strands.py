@@ -77,13 +77,13 @@ def moves_of(chain: Chain, at: Evaluation, unit: Units) -> Moves:
         return Moves([], None)
     own = unit.of_modes(twist)
     relative = [own]
-    inside = jax.vmap(jax.vmap(Motion.twist_inside, in_axes=(None, 1), out_axes=1), (0, None))
+    inside = jax.vmap(Motion.twist_inside, (0, None))
     for older in unit.motions:
         relative.append(own - inside(pose, older))
     if not len(unit.turn):
         return Moves(relative, None)
     axes = len(unit.turn)
-    before = jax.vmap(jax.vmap(_turn_inside, (None, 1), 1), (0, None))(pose.rotation, unit.turn)
+    before = jax.vmap(_turn_inside, (0, None))(pose.rotation, unit.turn)
     return Moves(relative, unit.spread(own[:, :axes]) + before)
 
 
