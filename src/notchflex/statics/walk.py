@@ -286,15 +286,26 @@ def _outside(pose: Motion, applied: Applied | None) -> _Outside:
 
 
 def body_poses(relative: Motion) -> Motion:
-    """Poses of bodies 0 to n in the frame of the base, from the poses between neighbours."""
+    """Poses of bodies 0 to n in the frame of the base, from the poses between neighbours.
 
-    def outward(pose: Motion, step: Motion) -> tuple[Motion, Motion]:
-        following = pose.then(step)
-        return following, following
-
-    start = identity(relative.translation.shape[-1])
-    _, poses = jax.lax.scan(outward, start, relative)
-    return jax.tree.map(lambda first, rest: jnp.concatenate([first[None], rest]), start, poses)
+    First from every second body on, then every fourth, until all are seen from the base.
+    """
+    dimensions = relative.translation.shape[-1]
+    poses = jax.tree.map(
+        lambda first, rest: jnp.concatenate([first[None], rest]), identity(dimensions), relative
+    )
+    reach = 1
+    while reach < len(poses.translation):
+        joined = jax.vmap(Motion.then)(
+            jax.tree.map(lambda leaf, reach=reach: leaf[:-reach], poses),
+            jax.tree.map(lambda leaf, reach=reach: leaf[reach:], poses),
+        )
+        poses = jax.tree.map(
+            lambda near, far, reach=reach: jnp.concatenate([near[:reach], far]), poses, joined
+        )
+        poses = jax.lax.optimization_barrier(poses)
+        reach *= 2
+    return poses
 
 
 def _wrenches(
