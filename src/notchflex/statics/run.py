@@ -8,7 +8,8 @@ the states beyond their shape is another program, run when it is asked for.
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from collections.abc import Callable
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from notchflex.statics.walk import evaluate
 
 # Numbers of loads that programs are compiled for: a solve, a usual path, and longer ones.
 _SIZES = (1, 128, 4096)
+# Of solved states so many are told of at once.
+_SIDE_BY_SIDE = 16
 # Beside states and shape: residual, iterations, converged, tried, reached, parts, part before.
 _TOLD = 7
 
@@ -78,16 +81,20 @@ class Run:
     def _more(self) -> tuple[Quantities, Quantities]:
         """What is reported of each state, and of the one before the first."""
         states = self._table[:, : self._prepared.state.size]
+        rows = np.concatenate([self._first[None], states])
+        if len(rows) > _SIDE_BY_SIDE:
+            rows = np.pad(rows, [(0, -len(rows) % _SIDE_BY_SIDE), (0, 0)])
         every = _quantities(
             self._prepared.vector,
-            np.concatenate([states, self._first[None]]),
+            rows,
+            np.array(1.0 + self._count),
             self._prepared.chain_form,
             self._prepared.state,
         )
         every = jax.tree.map(np.asarray, every)
         return (
-            jax.tree.map(lambda leaf: leaf[: self._count], every),
-            jax.tree.map(lambda leaf: leaf[-1], every),
+            jax.tree.map(lambda leaf: leaf[1 : 1 + self._count], every),
+            jax.tree.map(lambda leaf: leaf[0], every),
         )
 
     def quantity(self, name: str) -> np.ndarray:
@@ -263,18 +270,37 @@ def _follow(
         found = shape(chain, state_form.unpack(states[: state_form.size]))
         return jnp.concatenate([states, Form.of(found).pack(found), told])
 
-    return jax.lax.map(with_shape, table)
+    return _of_each(with_shape, table, count)
 
 
-@kept(2, 3)
+@kept(3, 4)
 def _quantities(
     vector: Float[Array, " chain"],
     states: Float[Array, "s state"],
+    count: Float[Array, ""],
     chain_form: Form,
     state_form: Form,
 ) -> Quantities:
     chain = chain_form.unpack(vector)
-    return jax.lax.map(lambda packed: quantities(chain, state_form.unpack(packed)), states)
+    return _of_each(lambda packed: quantities(chain, state_form.unpack(packed)), states, count)
+
+
+def _of_each(function: Callable[[Array], Any], rows: Float[Array, "s k"], count: Array) -> Any:
+    """A function of every row, some rows side by side; 0 for those that only fill up."""
+    if len(rows) == 1:
+        return jax.lax.map(function, rows)
+    beside = min(len(rows), _SIDE_BY_SIDE)
+    pieces = rows.reshape(-1, beside, rows.shape[-1])
+
+    def of_piece(item: tuple[Array, Array]) -> Any:
+        some, start = item
+        every = jax.vmap(function)
+        form = jax.eval_shape(every, some)
+        nothing = partial(jax.tree.map, lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), form)
+        return jax.lax.cond(start < count, lambda: every(some), nothing)
+
+    found = jax.lax.map(of_piece, (pieces, beside * jnp.arange(len(pieces))))
+    return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), found)
 
 
 @kept(4)
