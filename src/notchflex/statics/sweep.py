@@ -207,8 +207,8 @@ def eliminated(
     table = jnp.concatenate([matrix, right], axis=-1)
     for number in range(size):
         own = (np.arange(size) == number)[:, None]
-        inverse = 1.0 / table[..., number : number + 1, :1]
-        by_pivot = jnp.where(own, inverse - 1.0, -table[..., :1] * inverse)
-        table = table[..., 1:] + by_pivot * table[..., number : number + 1, 1:]
+        pivot = table[..., number : number + 1, 1:] / table[..., number : number + 1, :1]
+        # The pivot's row is put in, not reached by a difference, which would cost its digits.
+        table = jnp.where(own, pivot, table[..., 1:] - table[..., :1] * pivot)
         table = jax.lax.optimization_barrier(table)
     return table
