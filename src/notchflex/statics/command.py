@@ -18,9 +18,9 @@ from notchflex.statics.load import LoadPath
 def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
     by_stroke = ~np.isnan(load.stroke)
-    value = np.where(np.isnan(load.tension), 0.0, load.tension)
+    drawn, value = None, np.where(np.isnan(load.tension), 0.0, load.tension)
     if by_stroke.any():
-        value = np.where(by_stroke, load.stroke, value)
+        drawn, value = cast("Array", by_stroke), np.where(by_stroke, load.stroke, value)
     others = None
     if chain.loaded:
         others = applied(
@@ -32,7 +32,6 @@ def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
         )
         if chain.frame is not None:
             others = in_frame(others, chain.frame)
-    drawn = cast("Array", by_stroke) if by_stroke.any() else None
     return Command(constant(value), drawn, others)
 
 

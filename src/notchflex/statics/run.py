@@ -9,7 +9,7 @@ the states beyond their shape is another program, run when it is asked for.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -295,9 +295,8 @@ def _of_each(function: Callable[[Array], Any], rows: Float[Array, "s k"], count:
     def of_piece(item: tuple[Array, Array]) -> Any:
         some, start = item
         every = jax.vmap(function)
-        form = jax.eval_shape(every, some)
-        nothing = partial(jax.tree.map, lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), form)
-        return jax.lax.cond(start < count, lambda: every(some), nothing)
+        nothing = jax.tree.map(jnp.zeros_like, jax.eval_shape(every, some))
+        return jax.lax.cond(start < count, lambda: every(some), lambda: nothing)
 
     found = jax.lax.map(of_piece, (pieces, beside * jnp.arange(len(pieces))))
     return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), found)
