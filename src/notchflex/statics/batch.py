@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from notchflex._jax import jax
+from notchflex._jax import in_one_kernel, jax
 from notchflex._kept import kept
 from notchflex.chain import Chain
 from notchflex.errors import InputError
@@ -44,10 +44,8 @@ _BY_FLEXURE = (
 )
 _BY_BODY = ("body_position", "body_rotation")
 
-# Rows of a piece, by how many rows there are, so that all cores have work; and rows of it that are
-# solved side by side.
+# Rows of a piece, by how many rows there are, so that all cores have work.
 _PIECES = {0: 64, 512: 256, 8192: 1024}
-_SIDE_BY_SIDE = 64
 
 
 class Batch(Mapping[str, np.ndarray]):
@@ -320,23 +318,43 @@ def _follow_all(
     outputs: tuple[str, ...],
     one_robot: bool,
 ) -> dict[str, Array]:
-    """Follow the paths of all rows, some rows side by side."""
+    """Follow the paths of all rows: one after the other, or side by side on a GPU."""
+    work = partial(_rows, chain_form, command_form, outputs, one_robot)
+    given = (chains, commands, numbers)
+    if jax.default_backend() != "cpu":
+        return work(jax.vmap, *given)
+    plain = chain_form.unpack(chains if one_robot else chains[0]).is_plain
+    return in_one_kernel(partial(work, _in_turn), *given, short=plain)
+
+
+def _in_turn(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of every row, one after the other.
+
+    Side by side rows would wait for the one that takes longest, and want more than the cache.
+    """
+    return lambda *rows: jax.lax.map(lambda row: function(*row), rows)
+
+
+def _rows(
+    chain_form: Form,
+    command_form: Form,
+    outputs: tuple[str, ...],
+    one_robot: bool,
+    of_every: Callable[[Callable[..., Any]], Callable[..., Any]],
+    chains: Float[Array, "*b chain"],
+    commands: Float[Array, "b s command"],
+    numbers: Float[Array, " settings"],
+) -> dict[str, Array]:
+    """What is asked of all rows."""
     settings = Settings.of(numbers)
 
-    def one(chain_vector: Array, path: Array) -> dict[str, Array]:
-        chain: Chain = chain_form.unpack(chain_vector)
-        commands = command_form.unpack(path)
-        return followed(chain, commands, at_rest(chain), settings, outputs, advance)
+    def one(chain: Chain, path: Array) -> dict[str, Array]:
+        loads = command_form.unpack(path)
+        return followed(chain, loads, at_rest(chain), settings, outputs, advance)
 
-    each = partial(one, chains) if one_robot else one
-    on_cores = jax.default_backend() == "cpu"
-    beside = _SIDE_BY_SIDE if on_cores else len(commands)
-    tables = [
-        values.reshape(-1, beside, *values.shape[1:])
-        for values in ((commands,) if one_robot else (chains, commands))
-    ]
-    found = jax.lax.map(lambda some: jax.vmap(each)(*some), tables)
-    return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), found)
+    if one_robot:
+        return of_every(partial(one, chain_form.unpack(chains)))(commands)
+    return of_every(lambda vector, path: one(chain_form.unpack(vector), path))(chains, commands)
 
 
 __all__ = ["Batch", "simulate_batch", "solve_batch"]

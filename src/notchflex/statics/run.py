@@ -9,14 +9,15 @@ the states beyond their shape is another program, run when it is asked for.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import in_one_kernel, jax, jnp
 from notchflex._kept import kept
+from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form
@@ -238,6 +239,24 @@ def _follow(
     command_form: Form,
     state_form: Form,
 ) -> Float[Array, "s told"]:
+    chain: Chain = chain_form.unpack(vector)
+    solve = partial(_solved_states, chain_form, command_form, state_form)
+    tell = partial(_with_shapes, chain_form, state_form)
+    # Two kernels, which are compiled at the same time.
+    table = in_one_kernel(solve, vector, commands, start, options, short=chain.is_plain)
+    return in_one_kernel(tell, vector, table, options[-1], short=chain.is_plain)
+
+
+def _solved_states(
+    chain_form: Form,
+    command_form: Form,
+    state_form: Form,
+    vector: Float[Array, " chain"],
+    commands: Float[Array, "s command"],
+    start: Float[Array, " state"],
+    options: Float[Array, " options"],
+) -> Float[Array, "s states"]:
+    """The two states of every load, and how it went, a row per load."""
     chain = chain_form.unpack(vector)
     settings = Settings.of(options[:-2])
     each_from_start, count = options[-2] > 0.0, options[-1]
@@ -263,7 +282,18 @@ def _follow(
         return (solved, alive & (told[2] > 0.0)), jnp.concatenate([states, told])
 
     numbers = jnp.arange(len(commands), dtype=float)
-    _, table = jax.lax.scan(follow, (start, jnp.array(True)), (commands, numbers))
+    return jax.lax.scan(follow, (start, jnp.array(True)), (commands, numbers))[1]
+
+
+def _with_shapes(
+    chain_form: Form,
+    state_form: Form,
+    vector: Float[Array, " chain"],
+    table: Float[Array, "s states"],
+    count: Float[Array, ""],
+) -> Float[Array, "s told"]:
+    """The same with the shape of every state."""
+    chain = chain_form.unpack(vector)
 
     def with_shape(row: Array) -> Array:
         states, told = row[:-_TOLD], row[-_TOLD:]
