@@ -105,7 +105,8 @@ def flexure_state(
     internal = jnp.einsum("i,ic,icm->m", rod.length, resultants, rod.basis)
     has_chord = with_pose and rod.chord is not None
     chord_turn, chord_angle = chord(rod, modes) if has_chord else (None, None)
-    axes = angular(elastic[0])
+    axes = min(angular(elastic[0]), 2)
+    bending = jnp.einsum("i,icm->cm", rod.length, rod.basis[:, :axes])
     return FlexureState(
         bent=own,
         pose=pose,
@@ -114,7 +115,7 @@ def flexure_state(
         strain=elastic,
         internal=internal + rod.idle * modes,
         # About x and y of the section's frame; the third axis of space is that of torsion.
-        bend=rod.length @ (rod.reference_strain + elastic)[:, : min(axes, 2)],
+        bend=rod.length @ rod.reference_strain[:, :axes] + bending @ modes,
         chord_turn=chord_turn,
         chord_angle=chord_angle,
     )
