@@ -16,7 +16,7 @@ def wrist() -> nf.Robot:
 
 
 def test_loads_of_one_robot(wrist, margin):
-    loads = nf.pull(0.0, 2.5, steps=70)  # more than are solved side by side
+    loads = nf.pull(0.0, 2.5, steps=70)  # more than one piece
     told: list[tuple[int, int]] = []
     found = nf.solve_batch(wrist, loads, progress=lambda done, count: told.append((done, count)))
     each = nf.solve_each(wrist, loads)

@@ -11,27 +11,23 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
-from notchflex._jax import in_one_kernel, jax
-from notchflex._kept import kept
-from notchflex.chain import Chain
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.statics.actuation import filled
+from notchflex.statics.batch_rows import followed_rows
 from notchflex.statics.command import command
 from notchflex.statics.given import shown
 from notchflex.statics.load import Load, LoadPath, joined_paths, load_path
 from notchflex.statics.newton import DEFAULT, Settings
-from notchflex.statics.outputs import DEFAULT_OUTPUTS, followed, known_outputs
+from notchflex.statics.outputs import DEFAULT_OUTPUTS, known_outputs
 from notchflex.statics.packing import Form
 from notchflex.statics.prepare import Prepared, lengthened
 from notchflex.statics.solve import prepared_for
-from notchflex.statics.stepping import advance, at_rest
 
 _BY_FLEXURE = (
     "notch_angle",
@@ -258,8 +254,9 @@ class _Table:
         commands = self.commands[index if len(self.commands) > 1 else np.zeros_like(index)]
         one_robot = len(self.chains) == 1
         chains = self.chains[0] if one_robot else self.chains[index]
-        forms = (self.ready.chain_form, self.command_form, self.ready.state, self.outputs)
-        came = _follow_all(chains, commands, numbers, *forms, one_robot)
+        given = (chains, commands, numbers, np.array(count))
+        forms = (self.ready.chain_form, self.command_form, self.outputs)
+        came = followed_rows(*given, *forms, one_robot)
         own = self.flexures[index[:count] if len(self.flexures) > 1 else np.zeros(count, int)]
         return {name: _of_own(name, np.array(values)[:count], own) for name, values in came.items()}
 
@@ -305,56 +302,6 @@ def _tables(
         commands = np.concatenate(commands)
         made.append(_Table(robots_of_one[0], rows, chains, commands, form, np.array(own), outputs))
     return made
-
-
-@kept(3, 4, 5, 6, 7)
-def _follow_all(
-    chains: Float[Array, "*b chain"],
-    commands: Float[Array, "b s command"],
-    numbers: Float[Array, " settings"],
-    chain_form: Form,
-    command_form: Form,
-    state_form: Form,
-    outputs: tuple[str, ...],
-    one_robot: bool,
-) -> dict[str, Array]:
-    """Follow the paths of all rows: one after the other, or side by side on a GPU."""
-    work = partial(_rows, chain_form, command_form, outputs, one_robot)
-    given = (chains, commands, numbers)
-    if jax.default_backend() != "cpu":
-        return work(jax.vmap, *given)
-    plain = chain_form.unpack(chains if one_robot else chains[0]).is_plain
-    return in_one_kernel(partial(work, _in_turn), *given, short=plain)
-
-
-def _in_turn(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of every row, one after the other.
-
-    Side by side rows would wait for the one that takes longest, and want more than the cache.
-    """
-    return lambda *rows: jax.lax.map(lambda row: function(*row), rows)
-
-
-def _rows(
-    chain_form: Form,
-    command_form: Form,
-    outputs: tuple[str, ...],
-    one_robot: bool,
-    of_every: Callable[[Callable[..., Any]], Callable[..., Any]],
-    chains: Float[Array, "*b chain"],
-    commands: Float[Array, "b s command"],
-    numbers: Float[Array, " settings"],
-) -> dict[str, Array]:
-    """What is asked of all rows."""
-    settings = Settings.of(numbers)
-
-    def one(chain: Chain, path: Array) -> dict[str, Array]:
-        loads = command_form.unpack(path)
-        return followed(chain, loads, at_rest(chain), settings, outputs, advance)
-
-    if one_robot:
-        return of_every(partial(one, chain_form.unpack(chains)))(commands)
-    return of_every(lambda vector, path: one(chain_form.unpack(vector), path))(chains, commands)
 
 
 __all__ = ["Batch", "simulate_batch", "solve_batch"]
