@@ -49,6 +49,12 @@ def test_one_kernel_where_it_is_short(short: bool) -> None:
     assert _calls(text) == short
 
 
+def test_left_alone_in_programs_of_others() -> None:
+    """Compiled with other options XLA may put into a kernel what it cannot hold."""
+    program = jax.jit(lambda *given: in_one_kernel(_halved_until_small, *given, short=True))
+    assert _calls(program.lower(_LARGE, np.ones(3)).compile().as_text()) == 0
+
+
 def test_inside_a_loop_with_what_it_does_not_use() -> None:
     """XLA of jaxlib 0.10.1 ends the process there, were it not for what is returned beside."""
 

@@ -5,7 +5,8 @@ Every module that needs JAX imports it from here.
 """
 
 from collections.abc import Callable
-from functools import partial
+from contextvars import ContextVar
+from functools import wraps
 from types import ModuleType
 from typing import Any, TypeVar, cast
 
@@ -30,7 +31,26 @@ if jax.__version_info__ < (0, 11):
     _OPTIONS["xla_cpu_use_fusion_emitters"] = False
     _OPTIONS["xla_cpu_experimental_ynn_fusion_type"] = ""
     _OPTIONS["xla_disable_hlo_passes"] = "cpu-parallel-task-assigner"
-jit = partial(jax.jit, compiler_options=_OPTIONS)
+_compiled_here = ContextVar("_compiled_here", default=False)
+
+
+def jit(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile a function as `jax.jit` does, with the options of this package.
+
+    Args:
+        function: What to compile.
+        options: Others of `jax.jit`.
+    """
+
+    @wraps(function)
+    def traced(*arguments: Any) -> Any:
+        before = _compiled_here.set(True)
+        try:
+            return function(*arguments)
+        finally:
+            _compiled_here.reset(before)
+
+    return jax.jit(traced, compiler_options=_OPTIONS, **options)
 
 
 def array_module(*values: Any) -> ModuleType:
@@ -47,7 +67,8 @@ def in_one_kernel(function: Callable[..., _Told], *arrays: Any, short: bool) -> 
 
     XLA makes a kernel of every few operations. To begin one takes 50 to 100 ns, which for a robot
     of few notches is most of the time. LLVM works longer on one long kernel than on many short
-    ones, out of proportion, so that only short programs gain by it.
+    ones, out of proportion, so that only short programs gain by it. Elsewhere than in functions of
+    `jit` kernels stay as they are: with other options XLA puts into them what they cannot hold.
 
     Args:
         function: What to do with the arrays; it must not close over others that are traced.
@@ -57,7 +78,8 @@ def in_one_kernel(function: Callable[..., _Told], *arrays: Any, short: bool) -> 
     Returns:
         What the function returns.
     """
-    if not short or jax.__version_info__ >= (0, 11) or jax.default_backend() != "cpu":
+    known = _compiled_here.get() and jax.__version_info__ < (0, 11)
+    if not short or not known or jax.default_backend() != "cpu":
         return function(*arrays)
 
     def inside(*given: Any) -> tuple[_Told, Any]:
