@@ -25,7 +25,7 @@ from notchflex._jax import jax, jit
 
 _DIGEST = 32  # bytes
 _CALLED = re.compile(r'custom_call_target="([^"]+)"')
-_making = threading.Lock()
+making = threading.RLock()
 
 
 class Kept:
@@ -61,7 +61,7 @@ class Kept:
         program = Kept.loaded.get(known)
         if program is not None:
             return program(*arrays)
-        with _making:  # threads that ask for the same program wait for the one that makes it
+        with making:  # threads that ask for the same program wait for the one that makes it
             if known in Kept.loaded:
                 return Kept.loaded[known](*arrays)
             told = (self._name, str(structure), kinds, static)
@@ -74,10 +74,7 @@ class Kept:
 
     def _found(self, told: str, arguments: tuple[Any, ...], arrays: list[Any]) -> tuple[Any, Any]:
         """The program of that description, from the folder or made and put there; its result."""
-        assert Kept.folder is not None
-        name = hashlib.sha256(f"{_made_from()} {told}".encode()).hexdigest()[:32]
-        file = Kept.folder / f"program-{name}"
-        program = _read(file)
+        program = _loaded(read(told))
         if program is not None:
             try:
                 return program, program(*arrays)
@@ -86,7 +83,7 @@ class Kept:
         lowered = self._plain.lower(*arguments)
         with _without_cache():
             program = lowered.compile()
-        _write(file, program)
+        write(told, _stored(program))
         return program, program(*arrays)
 
 
@@ -132,31 +129,33 @@ def _made_from() -> str:
     return repr((code.hexdigest(), versions, settings))
 
 
-def _read(file: Path) -> Any:
-    """The program in a file; None where there is none that is whole."""
-    from jax.experimental import serialize_executable
+def _file(told: str) -> Path | None:
+    """Where a program of some description is kept."""
+    if Kept.folder is None:
+        return None
+    name = hashlib.sha256(f"{_made_from()} {told}".encode()).hexdigest()[:32]
+    return Kept.folder / f"program-{name}"
 
+
+def read(told: str) -> Any:
+    """What is kept of a program of that description; None where there is nothing that is whole."""
+    file = _file(told)
     try:
-        content = file.read_bytes()
+        content = b"" if file is None else file.read_bytes()
         if hashlib.sha256(content[_DIGEST:]).digest() != content[:_DIGEST]:
             return None
-        by_lapack, parts = pickle.loads(content[_DIGEST:])
-        if by_lapack:
-            _find_lapack()
-        return serialize_executable.deserialize_and_load(*parts)
+        return pickle.loads(content[_DIGEST:])
     except Exception:  # a file of another version, or no file: the program is made again
         return None
 
 
-def _write(file: Path, program: Any) -> None:
-    """Put a program in a file, as a whole or not at all."""
-    from jax.experimental import serialize_executable
-
+def write(told: str, parts: Any) -> None:
+    """Keep a program, as a whole or not at all."""
+    file = _file(told)
+    if file is None or parts is None:
+        return
     try:
-        called = set(_CALLED.findall(program.as_text()))
-        if not all(target.startswith("lapack_") for target in called):
-            return  # nobody knows here what must be ready before it may run
-        content = pickle.dumps((bool(called), serialize_executable.serialize(program)))
+        content = pickle.dumps(parts)
         own = file.with_suffix(f".{os.getpid()}")
         try:
             own.write_bytes(hashlib.sha256(content).digest() + content)
@@ -165,6 +164,34 @@ def _write(file: Path, program: Any) -> None:
             own.unlink(missing_ok=True)
     except Exception:  # no room, or nothing that can be kept: the next process makes it again
         return
+
+
+def _loaded(kept: Any) -> Any:
+    """The program of XLA that was kept; None where it cannot be run here."""
+    from jax.experimental import serialize_executable
+
+    if kept is None:
+        return None
+    try:
+        by_lapack, parts = kept
+        if by_lapack:
+            _find_lapack()
+        return serialize_executable.deserialize_and_load(*parts)
+    except Exception:  # of another version
+        return None
+
+
+def _stored(program: Any) -> Any:
+    """What to keep of a program of XLA; None where nobody knows what must be ready for it."""
+    from jax.experimental import serialize_executable
+
+    try:
+        called = set(_CALLED.findall(program.as_text()))
+        if not all(target.startswith("lapack_") for target in called):
+            return None
+        return bool(called), serialize_executable.serialize(program)
+    except Exception:  # nothing that can be kept
+        return None
 
 
 def _find_lapack() -> None:
@@ -177,4 +204,4 @@ def _find_lapack() -> None:
     lapack.prepare_lapack_call("getrf", np.dtype(float))
 
 
-__all__ = ["keep_in", "kept"]
+__all__ = ["Kept", "keep_in", "kept", "making", "read", "write"]

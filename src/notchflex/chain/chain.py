@@ -123,11 +123,6 @@ class Chain(Pytree):
         return self.loaded or any(part.acts_on_bodies for part in parts)
 
     @property
-    def is_plain(self) -> bool:
-        """Whether its programs are short: tendons that bend flexures, and no force on a body."""
-        return not self.forces_on_bodies
-
-    @property
     def memory_stiffness(self) -> Float[Array, " t"]:
         """Axial stiffness that the memory of the contacts uses, always finite, N."""
         return jnp.minimum(self.axial_stiffness, MEMORY_STIFFNESS * self.closing_force)

@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.statics.actuation import filled
-from notchflex.statics.batch_rows import followed_rows
+from notchflex.statics.batch_rows import followed_row
 from notchflex.statics.command import command
 from notchflex.statics.given import shown
 from notchflex.statics.load import Load, LoadPath, joined_paths, load_path
@@ -248,17 +248,15 @@ class _Table:
 
     def run(self, start: int, numbers: np.ndarray) -> dict[str, np.ndarray]:
         """Solve a piece of the rows."""
-        size = self.piece
-        count = min(size, len(self.rows) - start)
-        index = start + np.minimum(np.arange(size), count - 1)
+        index = np.arange(start, min(start + self.piece, len(self.rows)))
         commands = self.commands[index if len(self.commands) > 1 else np.zeros_like(index)]
         one_robot = len(self.chains) == 1
         chains = self.chains[0] if one_robot else self.chains[index]
-        given = (chains, commands, numbers, np.array(count))
         forms = (self.ready.chain_form, self.command_form, self.outputs)
-        came = followed_rows(*given, *forms, one_robot)
-        own = self.flexures[index[:count] if len(self.flexures) > 1 else np.zeros(count, int)]
-        return {name: _of_own(name, np.array(values)[:count], own) for name, values in came.items()}
+        by_row = (not one_robot, True, False)
+        came = followed_row.rows(by_row, chains, commands, numbers, *forms)
+        own = self.flexures[index if len(self.flexures) > 1 else np.zeros_like(index)]
+        return {name: _of_own(name, values, own) for name, values in came.items()}
 
 
 def _of_own(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:

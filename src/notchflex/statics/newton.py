@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import in_one_kernel, jax, jnp
+from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual, stroke
@@ -143,9 +143,6 @@ def newton(
     growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
     tolerance = settings.tolerance * growth
 
-    # A short program is one kernel as a whole; of a long one these two parts are one each.
-    part_of_long = partial(in_one_kernel, short=not chain.is_plain)
-
     def searching(search: _Search) -> Bool[Array, ""]:
         return ~search.over & (search.best.iterations <= settings.max_iterations)
 
@@ -153,7 +150,7 @@ def newton(
         best = search.best
         point = jax.tree.map(lambda at, by: at + search.part * by, best.point, search.step)
         here = (point.unknowns, memory, point.base_tension)
-        at = part_of_long(evaluate, chain, *here, command.applied)
+        at = evaluate(chain, *here, command.applied)
         demand = command_residual(chain, command, point.base_tension, at.base)
         residual = ravel_pytree((at.residual, demand))[0]
         largest, size = jnp.max(jnp.abs(residual)), jnp.linalg.norm(residual)
@@ -173,7 +170,7 @@ def newton(
         )
 
         def again() -> tuple[Point, Array]:
-            step = part_of_long(linear_step, chain, command, *here, at)
+            step = linear_step(chain, command, *here, at)
             # Where strokes are given, contacts that turn round must not be held up on their way.
             stops = command.by_stroke is None
             stopped = partial(_stopped_by_lips, chain, point.unknowns, at, step)

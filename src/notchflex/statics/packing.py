@@ -77,10 +77,17 @@ class Form:
         return _as_kind(part.reshape(shape), self.kinds[number])
 
 
+def lane_sizes(chain_form: Form, *_others: Any) -> tuple[int, int]:
+    """Sizes of the axes that run along the chain: as many flexures, and bodies, as it has."""
+    one = jax.ShapeDtypeStruct((chain_form.size,), float)
+    chain = jax.eval_shape(chain_form.unpack, one)
+    return chain.flexures, chain.flexures + 1
+
+
 def _as_kind(values: Array, kind: str) -> Array:
     if kind == "b":
         return values != 0.0
     return values.astype(int) if kind in "iu" else values
 
 
-__all__ = ["Form"]
+__all__ = ["Form", "lane_sizes"]

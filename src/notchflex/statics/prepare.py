@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from notchflex._jax import constant, jax
+from notchflex._jax import constant
 from notchflex.chain import Chain, assemble, padded
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
@@ -33,9 +33,9 @@ class Prepared:
         return Form.of(self.chain)
 
     @cached_property
-    def vector(self) -> Float[Array, " chain"]:
-        """The chain, kept where compiled programs take it from without copying."""
-        return on_processor(self.chain_form.pack(self.chain))
+    def vector(self) -> Float[np.ndarray, " chain"]:
+        """The chain as one vector."""
+        return np.asarray(self.chain_form.pack(self.chain))
 
     @cached_property
     def rest(self) -> Solved:
@@ -51,11 +51,6 @@ class Prepared:
     def state(self) -> Form:
         """Form of a solved state."""
         return Form.of(self.rest)
-
-    @cached_property
-    def rest_on_processor(self) -> Float[Array, " state"]:
-        """The same, kept as the chain is."""
-        return on_processor(self.rest_vector)
 
     def command_form(self, commands: Command) -> Form:
         """Form of one of some loads: by tensions alone, or some by stroke."""
@@ -77,14 +72,6 @@ class Prepared:
     def shape(self) -> Form:
         """Form of what is told of the shape of every state."""
         return Shape.form(self.chain.flexures, self.chain.tendons)
-
-
-def on_processor(values: np.ndarray) -> Array:
-    """Values where compiled programs for one robot run.
-
-    That is the processor, also where JAX has a GPU: one robot is far too small for that.
-    """
-    return jax.device_put(values, jax.local_devices(backend="cpu")[0])
 
 
 @lru_cache(maxsize=64)

@@ -8,20 +8,20 @@ the states beyond their shape is another program, run when it is asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import in_one_kernel, jax, jnp
+from notchflex._jax import jax, jnp
 from notchflex._kept import kept
+from notchflex._native import native
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
 from notchflex.statics.newton import Settings
-from notchflex.statics.packing import Form
-from notchflex.statics.prepare import Prepared, on_processor
+from notchflex.statics.packing import Form, lane_sizes
+from notchflex.statics.prepare import Prepared
 from notchflex.statics.quantities import Quantities, Shape, notch_lips, quantities, shape
 from notchflex.statics.stability import held_stiffness
 from notchflex.statics.stepping import Solved, advance
@@ -29,8 +29,6 @@ from notchflex.statics.walk import evaluate
 
 # Numbers of loads that programs are compiled for: a solve, a usual path, and longer ones.
 _SIZES = (1, 128, 4096)
-# Of solved states so many are told of at once.
-_SIDE_BY_SIDE = 16
 # Beside states and shape: residual, iterations, converged, tried, reached, parts, part before.
 _TOLD = 7
 
@@ -83,8 +81,6 @@ class Run:
         """What is reported of each state, and of the one before the first."""
         states = self._table[:, : self._prepared.state.size]
         rows = np.concatenate([self._first[None], states])
-        if len(rows) > _SIDE_BY_SIDE:
-            rows = np.pad(rows, [(0, -len(rows) % _SIDE_BY_SIDE), (0, 0)])
         every = _quantities(
             self._prepared.vector,
             rows,
@@ -92,7 +88,6 @@ class Run:
             self._prepared.chain_form,
             self._prepared.state,
         )
-        every = jax.tree.map(np.asarray, every)
         return (
             jax.tree.map(lambda leaf: leaf[1 : 1 + self._count], every),
             jax.tree.map(lambda leaf: leaf[0], every),
@@ -144,11 +139,8 @@ def run(
         packed = packed[_padded(count)]
     options = _options(settings, each_from_start, count)
     forms = (prepared.chain_form, form, prepared.state)
-    if start is None:
-        first, given = prepared.rest_vector, prepared.rest_on_processor
-    else:
-        first = given = prepared.state.pack(start)
-    table = np.asarray(_follow(prepared.vector, packed, given, options, *forms))
+    first = prepared.rest_vector if start is None else np.asarray(prepared.state.pack(start))
+    table = _follow(prepared.vector, packed, first, options, *forms)
     return Run(prepared, first, table, count)
 
 
@@ -179,24 +171,27 @@ def lips(
     Returns:
         Contact forces and gaps, loads by notches, and which loads converged.
     """
-    form = prepared.chain_form
-    numbers = np.array(settings.numbers)
-    force, gap, converged = _lips(prepared.vector, commands, start, numbers, form)
-    return np.asarray(force), np.asarray(gap), np.asarray(converged)
+    form = prepared.command_form(commands)
+    given = (form.pack(commands, leading=1), np.asarray(prepared.state.pack(start)))
+    forms = (prepared.chain_form, form, prepared.state)
+    return _lips(prepared.vector, *given, np.array(settings.numbers), *forms)
 
 
-@kept(4)
+@native(4, lane_sizes)
 def _lips(
     vector: Float[Array, " chain"],
-    commands: Command,
-    start: Solved,
+    commands: Float[Array, "s command"],
+    start: Float[Array, " state"],
     numbers: Float[Array, " settings"],
     chain_form: Form,
+    command_form: Form,
+    state_form: Form,
 ) -> tuple[Array, Array, Array]:
     chain, settings = chain_form.unpack(vector), Settings.of(numbers)
+    before = state_form.unpack(start)
 
-    def at_lips(command: Command) -> tuple[Array, Array, Array]:
-        came = advance(chain, command, start, settings)
+    def at_lips(packed: Array) -> tuple[Array, Array, Array]:
+        came = advance(chain, command_form.unpack(packed), before, settings)
         point = came.solved.point
         at = evaluate(
             chain, point.unknowns, came.solved.memory, point.base_tension, came.solved.applied
@@ -208,9 +203,11 @@ def _lips(
 
 
 @lru_cache(maxsize=64)
-def _options(settings: Settings, each_from_start: bool, count: int) -> Float[Array, " options"]:
+def _options(
+    settings: Settings, each_from_start: bool, count: int
+) -> Float[np.ndarray, " options"]:
     """What is told to `_follow` beside robot, loads and start, kept for the next time."""
-    return on_processor(np.array([*settings.numbers, float(each_from_start), float(count)]))
+    return np.array([*settings.numbers, float(each_from_start), float(count)])
 
 
 def _size(count: int) -> int:
@@ -229,7 +226,7 @@ def _pad(tree: Any) -> Any:
     return jax.tree.map(lambda leaf: np.asarray(leaf)[index], tree)
 
 
-@kept(4, 5, 6)
+@native(4, lane_sizes)
 def _follow(
     vector: Float[Array, " chain"],
     commands: Float[Array, "s command"],
@@ -239,25 +236,8 @@ def _follow(
     command_form: Form,
     state_form: Form,
 ) -> Float[Array, "s told"]:
+    """The two states of every load, their shape, and how it went, a row per load."""
     chain: Chain = chain_form.unpack(vector)
-    solve = partial(_solved_states, chain_form, command_form, state_form)
-    tell = partial(_with_shapes, chain_form, state_form)
-    # Two kernels, which are compiled at the same time.
-    table = in_one_kernel(solve, vector, commands, start, options, short=chain.is_plain)
-    return in_one_kernel(tell, vector, table, options[-1], short=chain.is_plain)
-
-
-def _solved_states(
-    chain_form: Form,
-    command_form: Form,
-    state_form: Form,
-    vector: Float[Array, " chain"],
-    commands: Float[Array, "s command"],
-    start: Float[Array, " state"],
-    options: Float[Array, " options"],
-) -> Float[Array, "s states"]:
-    """The two states of every load, and how it went, a row per load."""
-    chain = chain_form.unpack(vector)
     settings = Settings.of(options[:-2])
     each_from_start, count = options[-2] > 0.0, options[-1]
 
@@ -267,43 +247,32 @@ def _solved_states(
         before = jnp.where(each_from_start, start, last)
         tried = (number < count) & (alive | each_from_start)
 
-        def try_it() -> tuple[Array, Array]:
+        def try_it() -> tuple[Array, Array, Array]:
             came = advance(chain, command_form.unpack(packed), state_form.unpack(before), settings)
             told = [came.residual, came.iterations, came.converged, True, came.reached]
             told += [came.parts, came.part_before]
-            states = state_form.pack(came.solved), state_form.pack(came.between)
-            return jnp.concatenate(states), jnp.stack([jnp.asarray(x, float) for x in told])
+            found = shape(chain, came.solved)
+            told = jnp.concatenate(
+                [
+                    state_form.pack(came.between),
+                    Form.of(found).pack(found),
+                    jnp.stack([jnp.asarray(x, float) for x in told]),
+                ]
+            )
+            return state_form.pack(came.solved), told, came.converged
 
-        def skip() -> tuple[Array, Array]:
-            return jnp.concatenate([before, before]), jnp.zeros(_TOLD).at[0].set(jnp.nan)
+        def skip() -> tuple[Array, Array, Array]:
+            told = jnp.zeros(Shape.form(chain.flexures, chain.tendons).size + _TOLD)
+            return before, jnp.concatenate([before, told.at[-_TOLD].set(jnp.nan)]), alive
 
-        states, told = jax.lax.cond(tried, try_it, skip)
-        solved = states[: state_form.size]
-        return (solved, alive & (told[2] > 0.0)), jnp.concatenate([states, told])
+        solved, told, converged = jax.lax.cond(tried, try_it, skip)
+        return (solved, alive & converged), jnp.concatenate([solved, told])
 
     numbers = jnp.arange(len(commands), dtype=float)
     return jax.lax.scan(follow, (start, jnp.array(True)), (commands, numbers))[1]
 
 
-def _with_shapes(
-    chain_form: Form,
-    state_form: Form,
-    vector: Float[Array, " chain"],
-    table: Float[Array, "s states"],
-    count: Float[Array, ""],
-) -> Float[Array, "s told"]:
-    """The same with the shape of every state."""
-    chain = chain_form.unpack(vector)
-
-    def with_shape(row: Array) -> Array:
-        states, told = row[:-_TOLD], row[-_TOLD:]
-        found = shape(chain, state_form.unpack(states[: state_form.size]))
-        return jnp.concatenate([states, Form.of(found).pack(found), told])
-
-    return _of_each(with_shape, table, count)
-
-
-@kept(3, 4)
+@native(3, lane_sizes)
 def _quantities(
     vector: Float[Array, " chain"],
     states: Float[Array, "s state"],
@@ -311,25 +280,19 @@ def _quantities(
     chain_form: Form,
     state_form: Form,
 ) -> Quantities:
+    """What is reported of states beyond their shape; 0 for those that only fill up."""
     chain = chain_form.unpack(vector)
-    return _of_each(lambda packed: quantities(chain, state_form.unpack(packed)), states, count)
 
+    def of_row(item: tuple[Array, Array]) -> Quantities:
+        packed, number = item
 
-def _of_each(function: Callable[[Array], Any], rows: Float[Array, "s k"], count: Array) -> Any:
-    """A function of every row, some rows side by side; 0 for those that only fill up."""
-    if len(rows) == 1:
-        return jax.lax.map(function, rows)
-    beside = min(len(rows), _SIDE_BY_SIDE)
-    pieces = rows.reshape(-1, beside, rows.shape[-1])
+        def told() -> Quantities:
+            return quantities(chain, state_form.unpack(packed))
 
-    def of_piece(item: tuple[Array, Array]) -> Any:
-        some, start = item
-        every = jax.vmap(function)
-        nothing = jax.tree.map(jnp.zeros_like, jax.eval_shape(every, some))
-        return jax.lax.cond(start < count, lambda: every(some), lambda: nothing)
+        nothing = jax.tree.map(jnp.zeros_like, jax.eval_shape(told))
+        return jax.lax.cond(number < count, told, lambda: nothing)
 
-    found = jax.lax.map(of_piece, (pieces, beside * jnp.arange(len(pieces))))
-    return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), found)
+    return jax.lax.map(of_row, (states, jnp.arange(len(states), dtype=float)))
 
 
 @kept(4)
