@@ -33,6 +33,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if version("jax").split(".")[:2] < ["0", "11"]:
         options.append("--xla_cpu_use_fusion_emitters=false")
     os.environ["XLA_FLAGS"] = " ".join([flags, *options]).strip()
+    os.environ["NOTCHFLEX_OPTIMISATION"] = "0"
     # Compiled code is kept beside pytest's own cache, for the other process of `-n 2` and later.
     cache = getattr(config, "cache", None)
     if cache is not None:
@@ -48,7 +49,11 @@ _PIECES = 20_000
 
 @pytest.fixture(autouse=True, scope="module")
 def room_for_compiled_code() -> Iterator[None]:
-    """Let go of compiled programs once there are very many."""
+    """Keep programs for the other process, and let go of them once there are very many."""
+    kept = sys.modules.get("notchflex._kept")
+    folder = os.environ.get("JAX_COMPILATION_CACHE_DIR")
+    if kept is not None and kept.Kept.folder is None and folder and "://" not in folder:
+        kept.keep_in(Path(folder) / "programs")
     yield
     maps = Path("/proc/self/maps")
     jax = sys.modules.get("jax")
@@ -58,3 +63,4 @@ def room_for_compiled_code() -> Iterator[None]:
         if sum(1 for _ in lines) > _PIECES:
             jax.clear_caches()
             sys.modules["notchflex._kept"].Kept.loaded.clear()
+            sys.modules["notchflex._native"].Native.made.clear()

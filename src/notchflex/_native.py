@@ -140,9 +140,7 @@ class Native:
         found: list[Any] = []
         for start in range(0, count, piece):
             index = np.minimum(np.arange(start, start + piece), count - 1)
-            some = [
-                one[index] if rows else one for one, rows in zip(tables, by_row, strict=True)
-            ]
+            some = [one[index] if rows else one for one, rows in zip(tables, by_row, strict=True)]
             found.append(jax.tree.map(np.asarray, many(*some, *others)))
         return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:count], *found)
 

@@ -19,7 +19,7 @@ print(*path.total_angle, *path.tip_position.ravel())
 
 
 def test_optimised_programs_find_the_same(margin) -> None:
-    environment = {**os.environ, "XLA_FLAGS": ""}
+    environment = {**os.environ, "XLA_FLAGS": "", "NOTCHFLEX_OPTIMISATION": ""}
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True
     )
@@ -28,4 +28,5 @@ def test_optimised_programs_find_the_same(margin) -> None:
     here = np.concatenate([path.total_angle, path.tip_position.ravel()])
     there = np.array(done.stdout.split(), float)
     assert "optimization_level=0" in os.environ["XLA_FLAGS"]
+    assert os.environ["NOTCHFLEX_OPTIMISATION"] == "0"
     margin.within("optimised against unoptimised", there - here, 1e-11, "rad, mm")

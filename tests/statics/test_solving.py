@@ -121,11 +121,11 @@ def test_a_new_load_or_robot_of_the_same_shape_compiles_nothing(
     monkeypatch.setattr(Kept, "folder", None)  # programs that are loaded are not counted
     nf.simulate(wrist, nf.pull(0.0, 1.0, steps=5))
     nf.simulate(wrist, nf.draw(0.0, 1.0, steps=5))  # strokes are a program of their own
-    compiled = run_module._follow._cache_size()
+    compiled = run_module._follow.count()
     nf.simulate(wrist, nf.pull(0.0, 2.0, steps=17).release())
     nf.simulate(nf.load_robot("pacheco2021-b-specimen"), nf.draw(0.0, 1.0, steps=40))
     nf.simulate(wrist.with_value("notch[2].depth", 1.3), nf.pull(0.0, 2.0, steps=3))
-    assert run_module._follow._cache_size() == compiled
+    assert run_module._follow.count() == compiled
 
 
 def test_huge_and_tiny_loads(wrist: nf.Robot) -> None:

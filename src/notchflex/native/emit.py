@@ -174,7 +174,9 @@ class Emitter:
             at = self.text.place(place.pointer, place.of_lane(lane))
             return self.text.load(at, self.graph.kind[number], place.rows)
         kind = self.graph.kind[number]
-        return self.text.give(f"extractelement {type_of(kind, True)} {self.value_of_row(number)}, i64 {lane}")
+        return self.text.give(
+            f"extractelement {type_of(kind, True)} {self.value_of_row(number)}, i64 {lane}"
+        )
 
     def _lies(self, number: int) -> bool:
         """Whether lanes are in memory, and no value."""
@@ -314,9 +316,7 @@ class Emitter:
     def _along_run(self, run: _Run) -> Place:
         """Where the lanes of a run lie."""
         own = self.place_of(run.statement)
-        return Place(
-            own.pointer, own.of_lane(run.lane), run.step * own.step, own.rows, own.memory
-        )
+        return Place(own.pointer, own.of_lane(run.lane), run.step * own.step, own.rows, own.memory)
 
     def _store_lane(self, one: int, kind: str, pointer: str, at: int, rows: bool) -> None:
         value = self.lane(one)
@@ -453,10 +453,7 @@ class Emitter:
         length = int(self.graph.length[row])
 
         def trip(index: str | int) -> None:
-            if rows:
-                at = text.give(f"add i64 {index}, {first}")
-            else:
-                at = str(index)
+            at = text.give(f"add i64 {index}, {first}") if rows else str(index)
             own = text.load(self._where(place, at), kind, wide)
             if not rows and (first > 0 or (first + count) % WIDTH or count < length):
                 own = self._within(own, kind, neutral, at, first, first + count)
@@ -515,7 +512,9 @@ class Emitter:
         wide = target.rows
         room = text.place("%arena", self.arena.room(WIDTH))
         neutral = self._neutral(op, kind)
-        text.store(room, text.same("", kind, neutral) if wide else literal(neutral, kind), kind, wide)
+        text.store(
+            room, text.same("", kind, neutral) if wide else literal(neutral, kind), kind, wide
+        )
 
         def trip(index: str) -> None:
             at = text.give(f"sub i64 {length - 1}, {index}") if reverse else index

@@ -18,6 +18,14 @@ from typing import Any
 
 import numpy as np
 
+# A program of more statements is not written out: to compile it would take minutes.
+_MOST = 400_000
+
+
+class UnknownHereError(Exception):
+    """Something that cannot be made here; such a program is left to XLA."""
+
+
 # An entry of an array: number of the statement times this, plus the lane.
 LANE_BITS = 32
 LANE = (1 << LANE_BITS) - 1
@@ -106,6 +114,8 @@ class Graph:
     def add(self, op: str, args: tuple[Any, ...], length: int, kind: str, owner: Block) -> int:
         """A new statement."""
         number = len(self.op)
+        if number == _MOST:
+            raise UnknownHereError("a program that is too long to be written out")
         if number == len(self._length):
             self._length = np.concatenate([self._length, np.zeros_like(self._length)])
         self._length[number] = length
@@ -173,4 +183,4 @@ def entry(statement: int, lane: int = 0) -> int:
     return (statement << LANE_BITS) + lane
 
 
-__all__ = ["LANE", "LANE_BITS", "Block", "Graph", "Memory", "Table", "entry"]
+__all__ = ["LANE", "LANE_BITS", "Block", "Graph", "Memory", "Table", "UnknownHereError", "entry"]

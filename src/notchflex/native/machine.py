@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -16,7 +17,6 @@ import llvmlite.binding as llvm
 # what says so; put back after, as others may use the same LLVM.
 _OPTIONS = {
     "-disable-lsr": ("true", "false"),
-    "-disable-cgp": ("true", "false"),
     "-disable-machine-cse": ("true", "false"),
     "-disable-machine-licm": ("true", "false"),
     "-disable-machine-sink": ("true", "false"),
@@ -30,22 +30,35 @@ _KNOWN_TO = range(18, 23)
 _Called = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
 _lock = threading.Lock()
 
+LEVEL = "NOTCHFLEX_OPTIMISATION"
+"""Environment variable: how hard LLVM tries, 0 to 3. Programs that run a few times want 0."""
+
 
 @cache
-def _machine() -> Any:
+def _begun() -> None:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+
+
+def _machine() -> Any:
+    """What makes machine code; an engine takes its own with it when it ends."""
+    _begun()
     target = llvm.Target.from_default_triple()
     features = llvm.get_host_cpu_features().flatten()
     return target.create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=2, jit=True
+        cpu=llvm.get_host_cpu_name(), features=features, opt=_level(), jit=True
     )
+
+
+def _level() -> int:
+    told = os.environ.get(LEVEL, "")
+    return int(told) if told in ("0", "1", "2", "3") else 2
 
 
 def processor() -> str:
     """What machine code is made for, and by which LLVM."""
     features = llvm.get_host_cpu_features().flatten()
-    return f"{llvm.llvm_version_info} {llvm.get_host_cpu_name()} {features}"
+    return f"{llvm.llvm_version_info} {llvm.get_host_cpu_name()} {features} {_level()}"
 
 
 @contextmanager

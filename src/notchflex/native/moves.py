@@ -11,11 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.native.graph import Table
-
-
-class UnknownHereError(Exception):
-    """Something that cannot be made here; such a program is left to XLA."""
+from notchflex.native.graph import Table, UnknownHereError
 
 
 def _broadcast(
@@ -27,7 +23,9 @@ def _broadcast(
     return np.broadcast_to(table.reshape(own), shape)
 
 
-def _reshape(table: Table, *, new_sizes: tuple[int, ...], dimensions: Any = None, **_: Any) -> Table:
+def _reshape(
+    table: Table, *, new_sizes: tuple[int, ...], dimensions: Any = None, **_: Any
+) -> Table:
     if dimensions is not None:
         table = np.transpose(table, dimensions)
     return table.reshape(new_sizes)
@@ -49,7 +47,9 @@ def _rev(table: Table, *, dimensions: tuple[int, ...], **_: Any) -> Table:
     return np.flip(table, dimensions)
 
 
-def _slice(table: Table, *, start_indices: Any, limit_indices: Any, strides: Any, **_: Any) -> Table:
+def _slice(
+    table: Table, *, start_indices: Any, limit_indices: Any, strides: Any, **_: Any
+) -> Table:
     steps = strides or (1,) * table.ndim
     cut = (slice(*one) for one in zip(start_indices, limit_indices, steps, strict=True))
     return table[tuple(cut)]
@@ -211,7 +211,9 @@ def scattered(
     batch_axes = [a for a in range(updates.ndim) if a not in numbers.update_window_dims]
     grid = np.indices(updates.shape)
     starts = places[tuple(grid[axis] for axis in batch_axes)]
-    window = {own: updates.shape[a] for a, own in zip(numbers.update_window_dims, within, strict=True)}
+    window = {
+        own: updates.shape[a] for a, own in zip(numbers.update_window_dims, within, strict=True)
+    }
     at: list[np.ndarray] = [np.zeros(updates.shape, int) for _ in range(table.ndim)]
     for number, axis in enumerate(numbers.scatter_dims_to_operand_dims):
         most = table.shape[axis] - window.get(axis, 1)
@@ -234,4 +236,4 @@ def _inside(starts: np.ndarray, most: int) -> np.ndarray:
     return starts
 
 
-__all__ = ["MOVES", "UnknownHereError", "gathered", "picked", "scattered"]
+__all__ = ["MOVES", "gathered", "picked", "scattered"]

@@ -12,8 +12,17 @@ import numpy as np
 
 from notchflex._jax import jax
 from notchflex.native.elementary import ELEMENTARY
-from notchflex.native.graph import LANE, LANE_BITS, Block, Graph, Memory, Table, entry
-from notchflex.native.moves import MOVES, UnknownHereError, gathered, picked, scattered
+from notchflex.native.graph import (
+    LANE,
+    LANE_BITS,
+    Block,
+    Graph,
+    Memory,
+    Table,
+    UnknownHereError,
+    entry,
+)
+from notchflex.native.moves import MOVES, gathered, picked, scattered
 from notchflex.native.tables import Tables
 
 WIDTH = 8
@@ -351,14 +360,14 @@ class Reader:
             looked.append(int(table.ravel()[0]))
             own = Memory("step", size, whole, first, rows=whole.rows, inside=whole.inside)
             along.append(own)
-            present.append(entry(self.graph.memory(own, body)) + np.arange(size).reshape(aval.shape))
+            present.append(
+                entry(self.graph.memory(own, body)) + np.arange(size).reshape(aval.shape)
+            )
         with self.inside(body):
             present = [self._unpacked(one) for one in present]
             seen = [self._seen(*one, body) for one in memory]
             came = self.closed(closed, [*given[:known], *seen, *present])
-            after = [
-                self._put(*pair) for pair in zip(came[:carried], memory, strict=True)
-            ]
+            after = [self._put(*pair) for pair in zip(came[:carried], memory, strict=True)]
             results: list[Memory] = []
             for table, aval in zip(came[carried:], avals[carried:], strict=True):
                 size = int(np.prod(aval.shape))
@@ -572,7 +581,9 @@ def _serves(names: tuple[str, ...] | None) -> bool:
 
 
 def _product(reader: Reader, given: list[Table], parameters: Any, _e: Any) -> Table:
-    return reader.tables.product(*given, *parameters["dimension_numbers"])
+    left, right = given
+    contract, batch = parameters["dimension_numbers"]
+    return reader.tables.product(left, right, contract, batch)
 
 
 def _gather(reader: Reader, given: list[Table], parameters: Any, _e: Any) -> Table:
@@ -609,6 +620,25 @@ def _reduced(op: str) -> Callable[..., Table]:
     return put_together
 
 
+def _extreme(op: str) -> Callable[..., Table]:
+    def place(reader: Reader, given: list[Table], parameters: Any, _e: Any) -> Table:
+        """Where the largest or smallest entry is; the first that is no number, if there is one."""
+        each, constant = reader.tables.each, reader.tables.constant
+        (axis,) = parameters["axes"]
+        values = np.moveaxis(reader.tables.local(given[0]), axis, 0)
+        best = values[0]
+        found = np.broadcast_to(constant(0), best.shape)
+        for number in range(1, len(values)):
+            own = values[number]
+            none = each("and", each("ne", own, own), each("eq", best, best))
+            better = each("or", each(op, own, best), none)
+            found = each("select", better, constant(number), found)
+            best = each("select", better, own, best)
+        return found
+
+    return place
+
+
 def _running(op: str) -> Callable[..., Table]:
     def running(reader: Reader, given: list[Table], parameters: Any, _e: Any) -> Table:
         return reader.tables.along(op, given[0], parameters["axis"], parameters["reverse"])
@@ -638,6 +668,8 @@ _OTHER: dict[str, Callable[..., Any]] = {
     "reduce_min": _reduced("min"),
     "reduce_and": _reduced("and"),
     "reduce_or": _reduced("or"),
+    "argmax": _extreme("gt"),
+    "argmin": _extreme("lt"),
     "cumsum": _running("add"),
     "cumprod": _running("mul"),
     "cummax": _running("max"),

@@ -21,8 +21,8 @@ _COMPARE = {
     "ge": ("oge", "sge"),
 }
 _FLOAT = {"add": "fadd contract", "sub": "fsub contract", "mul": "fmul contract", "div": "fdiv"}
-_WHOLE = {"add": "add", "sub": "sub", "mul": "mul", "and": "and", "or": "or", "xor": "xor"}
-_WHOLE |= {"shl": "shl", "lshr": "lshr", "ashr": "ashr", "div": "sdiv"}
+_SAME = ("add", "sub", "mul", "and", "or", "xor", "shl", "lshr", "ashr")
+_WHOLE = {name: name for name in _SAME} | {"div": "sdiv"}
 _CALLS = {
     "sqrt": "sqrt",
     "abs": "fabs",
@@ -196,7 +196,9 @@ class Text:
         mask = ", ".join(f"i1 {'true' if lane < lanes else 'false'}" for lane in range(WIDTH))
         name = f"llvm.masked.store.{self._suffix(kind, True)}.p0"
         self.declared.add(f"declare void @{name}({own}, ptr, <{WIDTH} x i1>)")
-        self.say(f"call void @{name}({own} {value}, ptr align 8 {pointer}, <{WIDTH} x i1> <{mask}>)")
+        self.say(
+            f"call void @{name}({own} {value}, ptr align 8 {pointer}, <{WIDTH} x i1> <{mask}>)"
+        )
 
     def place(self, pointer: str, index: str | int) -> str:
         """Where a number is, so many after another."""

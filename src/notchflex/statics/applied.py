@@ -9,6 +9,7 @@ products p f^T. Forces that turn with the body are constant in its frame.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -167,7 +168,15 @@ def is_planar(load_path: LoadPath, robot: Robot) -> bool:
 
 
 def _base(load_path: LoadPath) -> Float[np.ndarray, "3 3"]:
-    return np.asarray(rotation_about(constant(load_path.base_rotation)))
+    return _turned_by(tuple(map(float, load_path.base_rotation)))
+
+
+@lru_cache(maxsize=64)
+def _turned_by(vector: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
+    """Rotation of a rotation vector: the base stays as it is from load to load."""
+    found = np.array(rotation_about(constant(vector)))
+    found.setflags(write=False)
+    return found
 
 
 def _check(external: ExternalLoad, robot: Robot) -> None:
