@@ -35,6 +35,7 @@ class Emitter:
         self.value: dict[int, str] = {}
         self.vectors: dict[int, str] = {}
         self.slot: dict[int, Place] = {}
+        self._rooms: dict[int, tuple[int, int]] = {}
         self.pointer: dict[int, str] = {}
         self.constants: list[str] = []
         self._given: dict[int, str] = {}
@@ -52,9 +53,10 @@ class Emitter:
     def _write(self) -> None:
         self.block(self.graph.top)
         self.puts(self.program.put)
-        self.text.say("ret void")
+        for line in ("ret void", "stop:", "ret void"):
+            self.text.say(line)
         # Pointers that are given are looked up first of all.
-        looked: list[str] = []
+        looked: list[str] = ["%never = icmp slt i64 %count, 0"]
         for kind, table in (("given", self._given), ("results", self._results)):
             for number, name in table.items():
                 looked.append(f"{name}.at = getelementptr ptr, ptr %{kind}, i64 {number}")
@@ -122,7 +124,9 @@ class Emitter:
         else:
             rows = self.order.varies(number)
             unit = self.unit(rows)
-            first = self.arena.room((length + WIDTH) * unit)
+            room = (length + WIDTH) * unit
+            first = self.arena.room(room)
+            self._rooms[number] = (first, room)
             place = Place("%arena", first, unit, rows)
         self.slot[number] = place
         return place
@@ -133,7 +137,7 @@ class Emitter:
         if op == "load":
             memory: Memory = self.graph.args[args[0]][0]
             unit = self.unit(memory.rows)
-            outside = memory.place == "given" or memory.place == "step"
+            outside = memory.place != "arena"
             if not self.program.rows and (args[2] != 1 or outside):
                 return None
             first = self.offset(memory) + args[1] * unit
@@ -192,12 +196,16 @@ class Emitter:
 
     def block(self, block: Block) -> None:
         """All statements of a block."""
-        for stage in self.order.stages(block):
+        for count, stage in enumerate(self.order.stages(block)):
             for number in stage.straight:
                 self.straight(number)
                 self.text.pause()
             for (length, rows), members in stage.loops.items():
                 self.over_lanes(length, rows, members)
+            for number in self.order.over(block, count):
+                room = self._rooms.pop(number, None)
+                if room is not None:
+                    self.arena.leave(*room)
 
     def straight(self, number: int) -> None:
         """A statement, loop or condition on its own."""
@@ -545,6 +553,7 @@ class Emitter:
                     self._put_run(run, kind, target, mask)
                 else:
                     self._put_one(run.entry(0), kind, target, mask)
+                self.text.pause()
 
     def _unhooked(self, put: Put, targets: set[int]) -> None:
         """Copy rows aside that are seen in memory which is about to be written to elsewhere."""

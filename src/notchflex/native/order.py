@@ -98,12 +98,49 @@ class Order:
         self.kept: set[int] = set()
         self._stages: dict[int, list[Stage]] = {}
         self.place: dict[int, tuple[int, Any]] = {}
+        self._over: dict[int, list[list[int]]] = {}
+        self._handed: set[int] | None = None
         self._in_block(self.graph.top)
         self._find_kept()
 
     def stages(self, block: Block) -> list[Stage]:
         """What runs in a block, in order."""
         return self._stages[id(block)]
+
+    def over(self, block: Block, stage: int) -> list[int]:
+        """Rows of a block that nothing needs after a stage."""
+        found = self._over.get(id(block))
+        if found is None:
+            found = self._over[id(block)] = self._last_used(block)
+        return found[stage]
+
+    def _last_used(self, block: Block) -> list[list[int]]:
+        """Rows in memory that are needed for the last time, by stage."""
+        own = self._own.get(id(block), [])
+        last: dict[int, int] = dict.fromkeys(self._handed_on(), len(self.stages(block)))
+        for number in reversed(own):
+            stage = self.place[number][0]
+            # A row that is taken from another may be seen where that is.
+            until = max(stage, last.get(number, 0)) if self.graph.op[number] == "take" else stage
+            for one in self._closely(number):
+                if self.graph.owner[one] is block and self.graph.op[one] != "item":
+                    last[one] = max(last.get(one, 0), until)
+        found: list[list[int]] = [[] for _ in range(len(self.stages(block)) + 1)]
+        for number, stage in last.items():
+            if self.graph.owner[number] is block and self.looped(number):
+                found[stage].append(number)
+        return found
+
+    def _handed_on(self) -> set[int]:
+        """Statements that are written to memory when the block they are in is over."""
+        if self._handed is None:
+            self._handed = set(_of(self.program.put))
+            for number, item in self._items():
+                _, puts, looked = parts(item)
+                handed = (*_of(puts), *(one >> LANE_BITS for one in looked))
+                within = self.graph.owner[number]
+                self._handed.update(one for one in handed if self.graph.owner[one] is not within)
+        return self._handed
 
     def varies(self, number: int) -> bool:
         """Whether rows of a batch differ in it."""
@@ -139,7 +176,7 @@ class Order:
         return item
 
     def _needed(self) -> set[int]:
-        todo = list(_of(self.program.put))
+        todo = [*_of(self.program.put), *self.program.written]
         if self.program.rows:
             todo += [number for number, item in self._items() if isinstance(item, Rows)]
         found: set[int] = set()

@@ -129,12 +129,14 @@ class Program:
     Attributes:
         graph: Its statements.
         put: What the outermost block writes to what is handed on.
+        written: Statements of memory that is handed on as it is.
         sizes: Numbers handed on, by output; of a row where there are rows.
         rows: Whether it is a batch.
     """
 
     graph: Graph
     put: list[Put]
+    written: list[int]
     sizes: list[int]
     rows: bool
 
@@ -192,7 +194,24 @@ class Reader:
             places = _in_order(aval.shape)
             args.append(self._seen(Memory("given", places.size, number), places, self.graph.top))
         put, sizes = self._handed(closed, args, lambda number: ("result", number))
-        return Program(self.graph, put, sizes, False)
+        written = [self._in_place(one) for one in put]
+        left = [one for one, number in zip(put, written, strict=True) if number is None]
+        whole = [number for number in written if number is not None]
+        return Program(self.graph, left, whole, sizes, False)
+
+    def _in_place(self, put: Put) -> int | None:
+        """A statement of memory that is handed on whole and in order, which then lies there."""
+        if not put.table.size:
+            return None
+        number = int(put.table[0]) >> LANE_BITS
+        if self.graph.op[number] != "memory":
+            return None
+        memory: Memory = self.graph.args[number][0]
+        whole = entry(number) + np.arange(memory.size)
+        if memory.place != "arena" or not np.array_equal(put.table, whole):
+            return None
+        memory.place, memory.number = "result", put.memory.number
+        return number
 
     def batch(self, closed: Any, by_row: Sequence[bool]) -> Program:
         """A program of which some arrays are rows of tables, all rows alike."""
@@ -212,7 +231,7 @@ class Reader:
         for one in put:
             one.memory.rows = True
         self._item(Rows(tables, body, put, [one.memory for one in put]), top)
-        return Program(self.graph, [], sizes, True)
+        return Program(self.graph, [], [], sizes, True)
 
     def _handed(
         self, closed: Any, args: list[Table], where: Callable[[int], tuple[str, Any]]
@@ -228,7 +247,7 @@ class Reader:
     def _as_numbers(self, flat: Table) -> Table:
         if not flat.size:
             return flat
-        kinds = {self.graph.kind[int(one)] for one in np.unique(flat >> LANE_BITS)}
+        kinds = {self.graph.kind[int(one)] for one in np.unique(flat >> LANE_BITS).tolist()}
         return flat if kinds == {"f"} else self.tables.each("to_float", flat)
 
     def _item(self, item: Any, block: Block) -> None:
@@ -376,7 +395,7 @@ class Reader:
                 own = Memory("step", size, whole, 0, rows=self.rows, inside=inside)
                 results.append(whole)
                 along.append(own)
-                after.append(Put(self.tables.local(table).ravel(), own, np.arange(size)))
+                after.append(Put(table.ravel(), own, np.arange(size)))
         item = Steps(before, count, parameters["reverse"], along, looked, body, after)
         self._item(item, self.graph.block)
         carry = [self._seen(*one, self.graph.block) for one in memory]

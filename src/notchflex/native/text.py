@@ -77,10 +77,14 @@ class Text:
         self.lines.append(line)
 
     def pause(self) -> None:
-        """Begin a new part: LLVM's time grows faster than the length of a part."""
+        """Begin a new part: LLVM's time grows faster than the length of a part.
+
+        A plain jump would be taken out again, so it depends on what LLVM cannot know: that there
+        are never fewer than no rows.
+        """
         if self._since > _LONGEST:
             label = self.label()
-            self.say(f"br label %{label}")
+            self.say(f"br i1 %never, label %stop, label %{label}")
             self.say(f"{label}:")
 
     def give(self, line: str) -> str:
