@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from notchflex import _kept
-from notchflex._jax import jax
+from notchflex._jax import jax, jnp
 from notchflex._kept import Kept
 from notchflex.native import Program, UnknownHereError, processor, program
 
@@ -65,7 +65,8 @@ class Native:
         """The function of some vectors."""
         made = self._made(None, arguments)
         if made is None:
-            return jax.tree.map(np.asarray, self._kept(*arguments))
+            vectors = map(jnp.asarray, arguments[: self._vectors])
+            return jax.tree.map(np.asarray, self._kept(*vectors, *arguments[self._vectors :]))
         return made(arguments[: self._vectors])
 
     def rows(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
@@ -107,9 +108,10 @@ class Native:
     ) -> Made | None:
         """The program, from disk or made and put there; None where XLA must make it."""
         told = repr((self._name, by_row, shapes, others, processor()))
-        found = _kept.read(told)
-        if found is not None:
-            return Made(*found)
+        try:
+            return Made(*_kept.read(told))
+        except TypeError:  # nothing is kept, or something else
+            pass
         given = [np.zeros(shape) for shape in shapes]
         try:
             made = program(partial(self._with, others), given, self._long(*others), by_row)
