@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from notchflex.native.graph import LANE_BITS, Block, Graph, Memory
-from notchflex.native.read import WIDTH, Choice, Loop, Program, Put, Rows, Steps
+from notchflex.native.items import WIDTH, Choice, Loop, Program, Put, Rows, Steps
 
 
 @dataclass(eq=False)

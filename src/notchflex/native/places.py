@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from notchflex.native.graph import Memory
-from notchflex.native.read import WIDTH
+from notchflex.native.items import WIDTH
 
 
 @dataclass(frozen=True)

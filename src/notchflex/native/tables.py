@@ -49,6 +49,13 @@ class Tables:
         entries = np.array([entry(self.graph.const(one, kind)) for one in different], np.int64)
         return entries[where.ravel()].reshape(values.shape) if values.size else _empty(values.shape)
 
+    def known(self, table: Table) -> np.ndarray | None:
+        """The numbers of an array where all are known."""
+        flat = [self.graph.value(int(one)) for one in (table >> LANE_BITS).ravel()]
+        if any(value is None for value in flat):
+            return None
+        return np.array(flat).reshape(table.shape) if flat else np.zeros(table.shape, int)
+
     def _constant_row(self, row: np.ndarray, kind: str) -> list[int]:
         if (row == row[0]).all():
             return [entry(self.graph.const(row[0], kind))] * len(row)

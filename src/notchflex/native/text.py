@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from notchflex.native.read import WIDTH
+from notchflex.native.items import WIDTH
 
 # Lines of a part that LLVM works on at once.
 _LONGEST = 200

@@ -1,0 +1,90 @@
+"""Where arrays lie in memory, and tables of what lies there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from notchflex.native.graph import LANE, LANE_BITS, Block, Graph, Memory, Table, entry
+from notchflex.native.items import WIDTH, Put
+from notchflex.native.tables import Tables
+
+
+class Arranger:
+    """Finds memory for arrays.
+
+    Args:
+        long: Sizes of axes along which rows are laid out.
+    """
+
+    def __init__(self, long: Sequence[int]) -> None:
+        """Begin an empty program."""
+        self.graph = Graph()
+        self.tables = Tables(self.graph, long)
+        self.rows = False
+
+    def _arranged(self, shape: tuple[int, ...]) -> tuple[int, np.ndarray]:
+        """How many numbers memory for an array has, and where its entries are in it.
+
+        Rows along the long axis lie together, each filled up to whole vectors.
+        """
+        axis = next((a for a, size in enumerate(shape) if size in self.tables.long), None)
+        count = int(np.prod(shape))
+        if axis is None or len(shape) == 1:
+            return count, np.arange(count).reshape(shape)
+        size = shape[axis]
+        room = size if self.rows else -(-size // WIDTH) * WIDTH
+        others = count // size
+        places = np.arange(others)[:, None] * room + np.arange(size)
+        rest = [length for a, length in enumerate(shape) if a != axis]
+        return others * room, np.moveaxis(places.reshape(*rest, size), -1, axis)
+
+    def _new(self, shape: tuple[int, ...], kind: str) -> tuple[Memory, np.ndarray]:
+        size, places = self._arranged(shape)
+        return Memory("arena", size, rows=self.rows, inside=kind), places
+
+    def _seen(self, memory: Memory, places: np.ndarray, block: Block) -> Table:
+        """The array that memory holds, as seen in a block."""
+        statement = self.graph.memory(memory, block)
+        table = entry(statement) + places.astype(np.int64)
+        return self.tables.local(table) if self._is_long(table.shape) else table
+
+    def _is_long(self, shape: tuple[int, ...]) -> bool:
+        return len(shape) > 1 and any(size in self.tables.long for size in shape)
+
+    def _put(self, table: Table, where: tuple[Memory, np.ndarray]) -> Put:
+        memory, places = where
+        flat = self._rows_of(table, places)
+        return Put(flat.ravel(), memory, places.ravel())
+
+    def _rows_of(self, table: Table, places: np.ndarray) -> Table:
+        """Entries in rows as memory has them, so that they can be written row by row."""
+        table = np.broadcast_to(table, places.shape)
+        if not self._is_long(places.shape):
+            return table
+        table = self.tables.local(table)
+        axis = next(a for a, size in enumerate(places.shape) if size in self.tables.long)
+        return self.tables.rows(table, axis)
+
+    def _whole(self, table: Table, before: list[Put]) -> tuple[Memory, int]:
+        """Memory that holds a table in order, and where it begins there; put there if need be."""
+        flat = table.ravel()
+        first = int(flat[0])
+        statement = first >> LANE_BITS
+        if self.graph.length[statement] == 0 and (np.diff(flat) == 1).all():
+            return self.graph.args[statement][0], first & LANE
+        flat = self.tables.local(flat)
+        kind = self.graph.kind[int(flat[0]) >> LANE_BITS]
+        memory = Memory("arena", flat.size, rows=self.rows, inside=kind)
+        before.append(Put(flat, memory, np.arange(flat.size)))
+        return memory, 0
+
+    def _as_numbers(self, flat: Table) -> Table:
+        if not flat.size:
+            return flat
+        kinds = {self.graph.kind[int(one)] for one in np.unique(flat >> LANE_BITS).tolist()}
+        return flat if kinds == {"f"} else self.tables.each("to_float", flat)
+
+
+__all__ = ["Arranger"]
