@@ -29,7 +29,7 @@ class Arranger:
 
         Rows along the long axis lie together, each filled up to whole vectors.
         """
-        axis = next((a for a, size in enumerate(shape) if size in self.tables.long), None)
+        axis = self.tables.long_axis(shape)
         count = int(np.prod(shape))
         if axis is None or len(shape) == 1:
             return count, np.arange(count).reshape(shape)
@@ -48,10 +48,14 @@ class Arranger:
         """The array that memory holds, as seen in a block."""
         statement = self.graph.memory(memory, block)
         table = entry(statement) + places.astype(np.int64)
+        return self._unpacked(table)
+
+    def _unpacked(self, table: Table) -> Table:
+        """The same; numbers in memory loaded as rows, where there is a long axis for them."""
         return self.tables.local(table) if self._is_long(table.shape) else table
 
     def _is_long(self, shape: tuple[int, ...]) -> bool:
-        return len(shape) > 1 and any(size in self.tables.long for size in shape)
+        return len(shape) > 1 and self.tables.long_axis(shape) is not None
 
     def _put(self, table: Table, where: tuple[Memory, np.ndarray]) -> Put:
         memory, places = where
@@ -63,9 +67,7 @@ class Arranger:
         table = np.broadcast_to(table, places.shape)
         if not self._is_long(places.shape):
             return table
-        table = self.tables.local(table)
-        axis = next(a for a, size in enumerate(places.shape) if size in self.tables.long)
-        return self.tables.rows(table, axis)
+        return self.tables.rows(self.tables.local(table), self.tables.long_axis(places.shape))
 
     def _whole(self, table: Table, before: list[Put]) -> tuple[Memory, int]:
         """Memory that holds a table in order, and where it begins there; put there if need be."""

@@ -13,7 +13,7 @@ loop is computed once before it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,15 +42,11 @@ class Block:
         outer: The block around it.
         depth: How many blocks are around it.
         repeats: Whether it runs again and again, and not at most once each time.
-        items: Loops and conditions in it, by number.
-        out: What it hands on: tables.
     """
 
     outer: Block | None = None
     depth: int = 0
     repeats: bool = False
-    items: dict[int, Any] = field(default_factory=dict[int, Any])
-    out: list[Table] = field(default_factory=list[Table])
 
     def inner(self, *, repeats: bool) -> Block:
         """A block inside this one."""

@@ -244,17 +244,17 @@ class Order:
                 stages[stage].straight.append(number)
             else:
                 stages[stage].loops.setdefault(group, []).append(number)
-        for number, stage in enumerate(stages):
-            stage.straight = self._close_together(stage.straight, (number, None))
+        for stage in stages:
+            stage.straight = self._close_together(stage.straight)
             for group, members in stage.loops.items():
-                stage.loops[group] = self._close_together(members, (number, group))
+                stage.loops[group] = self._close_together(members)
         self._stages[id(block)] = stages
         for number in own:
             if graph.op[number] == "item":
                 for inner in parts(graph.args[number][0])[0]:
                     self._in_block(inner)
 
-    def _close_together(self, members: list[int], place: tuple[int, Any]) -> list[int]:
+    def _close_together(self, members: list[int]) -> list[int]:
         """The same statements, each soon before what it is needed for."""
         inside = set(members)
         used: set[int] = set()
@@ -299,10 +299,8 @@ class Order:
         graph = self.graph
         for number in self.needed:
             if graph.op[number] == "item":
-                users = self.uses(number)
-                blocks, puts, _ = parts(graph.args[number][0])
-                users = users | set(_of(puts))
-                del blocks
+                _, puts, _ = parts(graph.args[number][0])
+                users = self.uses(number) | set(_of(puts))
             else:
                 users = sources(graph, number)
             for one in users:

@@ -86,8 +86,7 @@ class Reader(Arranger):
 
     def _item(self, item: Any, block: Block) -> None:
         """Put a loop or condition in a block, behind all statements that there are so far."""
-        number = self.graph.add("item", (item,), 0, "f", block)
-        block.items[number] = item
+        self.graph.add("item", (item,), 0, "f", block)
 
     # What JAX has traced
 
@@ -146,9 +145,6 @@ class Reader(Arranger):
             return came if isinstance(came, list) else [came]
         raise UnknownHereError(f"JAX's primitive `{name}`")
 
-    def _unpacked(self, table: Table) -> Table:
-        return self.tables.local(table) if self._is_long(table.shape) else table
-
     # Loops and conditions
 
     def inside(self, block: Block) -> _Inside:
@@ -172,7 +168,6 @@ class Reader(Arranger):
             came = self.closed(parameters["body_jaxpr"], [*for_body, *seen])
             after = [self._put(*pair) for pair in zip(came, memory, strict=True)]
         before = [self._put(*pair) for pair in zip(start, memory, strict=True)]
-        # Looked at here, so that it is there before the loop.
         self._item(Loop(before, test, going, body, after, self.rows), self.graph.block)
         return [self._seen(*one, self.graph.block) for one in memory]
 

@@ -38,7 +38,7 @@ class Tables:
         """An array that is known."""
         values = np.asarray(values)
         kind = "b" if values.dtype == bool else "f" if values.dtype.kind == "f" else "i"
-        axis = self._long_axis(values.shape)
+        axis = self.long_axis(values.shape)
         if axis is not None:
             rows = np.moveaxis(values, axis, -1)
             flat = rows.reshape(-1, rows.shape[-1])
@@ -63,7 +63,8 @@ class Tables:
         lanes = self.graph.once("lanes", (row,), len(row), kind, self.graph.top, key=key)
         return [entry(lanes, lane) for lane in range(len(row))]
 
-    def _long_axis(self, shape: tuple[int, ...]) -> int | None:
+    def long_axis(self, shape: tuple[int, ...]) -> int | None:
+        """The first axis along which rows are laid out; None where there is none."""
         return next((axis for axis, size in enumerate(shape) if size in self.long), None)
 
     def local(self, table: Table) -> Table:
@@ -78,7 +79,7 @@ class Tables:
         in_memory = self.graph.length[flat >> LANE_BITS] == 0
         if not in_memory.any():
             return table
-        axis = self._long_axis(table.shape)
+        axis = self.long_axis(table.shape)
         if axis is None:
             return self._load_each(table, in_memory)
         rows = np.moveaxis(table, axis, -1)
