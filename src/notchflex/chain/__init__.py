@@ -3,6 +3,7 @@
 from notchflex.chain.chain import Chain, assemble, flexure_states
 from notchflex.chain.pad import padded
 from notchflex.chain.plane import bending_normal, tendons_in_plane
+from notchflex.chain.structure import structural
 
 __all__ = [
     "Chain",
@@ -10,5 +11,6 @@ __all__ = [
     "bending_normal",
     "flexure_states",
     "padded",
+    "structural",
     "tendons_in_plane",
 ]

@@ -13,6 +13,7 @@ from notchflex.robot import Robot
 _ROUNDING = 1e-12
 
 
+@lru_cache(maxsize=64)
 def bending_normal(robot: Robot) -> Float[np.ndarray, " 3"] | None:
     """Normal of the plane in which all notches bend, in the base frame; None if there is none."""
     direction = np.radians([notch.direction_deg for notch in robot.notches])

@@ -201,11 +201,11 @@ def pull_change(
     force = end @ at_end[axes:]
     arms = _moments(own.stepped, force)
     turn = own.turn[:-1]
-    mixed = jnp.einsum("gci,gcj->ij", arms, turn)
-    along = own.step @ force
-    twice = jnp.einsum("g,gci,gcj->ij", along, turn, turn)
+    # Half of what two turns, one after the other, do to a step along the force, both ways round.
+    along = 0.5 * (own.step @ force)
+    mixed = jnp.einsum("gci,gcj->ij", arms - along[:, None, None] * turn, turn)
     leaving = _moments(_moved(own)[None], force)[0].T @ own.turn[-1]
-    change = mixed + mixed.T - twice - leaving
+    change = mixed + mixed.T - leaving
     if axes == 3:
         change = change + _order_of_turns(rod, own, at_end)
     if rod.small is not None:

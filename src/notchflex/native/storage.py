@@ -112,8 +112,7 @@ class Storage:
         if op == "load":
             memory: Memory = self.graph.args[args[0]][0]
             unit = self.unit(memory.rows)
-            outside = memory.place != "arena"
-            if not self.program.rows and (args[2] != 1 or outside):
+            if not self.program.rows and (args[2] != 1 or not self._has_room(memory, args)):
                 return None
             first = self.offset(memory) + args[1] * unit
             return Place(self.base(memory), first, args[2] * unit, memory.rows, memory)
@@ -125,6 +124,13 @@ class Storage:
                 first = own.of_lane(args[0] & LANE)
                 return Place(own.pointer, first, int(apart[0]) * own.step, own.rows, own.memory)
         return None
+
+    def _has_room(self, memory: Memory, args: tuple[int, ...]) -> bool:
+        """Whether the last vector of a row may be read whole."""
+        _, first, _, length = args
+        if memory.place == "given":
+            return first + -(-length // WIDTH) * WIDTH <= memory.size
+        return memory.place == "arena"
 
     def _lies(self, number: int) -> bool:
         """Whether lanes are in memory, and no value."""

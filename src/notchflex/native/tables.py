@@ -38,20 +38,13 @@ class Tables:
         """An array that is known."""
         values = np.asarray(values)
         kind = "b" if values.dtype == bool else "f" if values.dtype.kind == "f" else "i"
-        axis = self.long_axis(values.shape)
-        if axis is not None:
-            rows = np.moveaxis(values, axis, -1)
-            flat = rows.reshape(-1, rows.shape[-1])
-            if (flat != flat[:, :1]).any():
-                made = np.array([self._constant_row(row, kind) for row in flat])
-                return np.moveaxis(made.reshape(rows.shape), -1, axis)
         different, where = np.unique(values.ravel(), return_inverse=True)
         entries = np.array([entry(self.graph.const(one, kind)) for one in different], np.int64)
         return entries[where.ravel()].reshape(values.shape) if values.size else _empty(values.shape)
 
     def known(self, table: Table) -> np.ndarray | None:
         """The numbers of an array where all are known."""
-        flat = [self.graph.value(int(one)) for one in (table >> LANE_BITS).ravel()]
+        flat = [self._known(int(one)) for one in table.ravel()]
         if any(value is None for value in flat):
             return None
         return np.array(flat).reshape(table.shape) if flat else np.zeros(table.shape, int)

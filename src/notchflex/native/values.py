@@ -106,33 +106,59 @@ class Values(Storage):
 
     def _taken(self, entries: Sequence[int], kind: str) -> str:
         """A vector of some entries."""
+        first = entries[0] >> LANE_BITS
+        ordered = all(one - entries[0] == lane for lane, one in enumerate(entries))
+        if ordered and self._in_vectors(first):
+            return self._vector_from(first, entries[0] & LANE)
         own = type_of(kind, True)
-        by_source: dict[int, list[tuple[int, int]]] = {}
+        pieces: dict[tuple[int, int], dict[int, int]] = {}
         single: list[tuple[int, int]] = []
         for lane, one in enumerate(entries):
-            number = one >> LANE_BITS
-            if int(self.graph.length[number]) > 1 and not self.order.looped(number):
-                by_source.setdefault(number, []).append((lane, one & LANE))
+            number, at = one >> LANE_BITS, one & LANE
+            if self._in_vectors(number):
+                pieces.setdefault((number, at // WIDTH), {})[lane] = at % WIDTH
+            elif int(self.graph.length[number]) > 1 and not self.order.looped(number):
+                pieces.setdefault((number, 0), {})[lane] = at
             else:
                 single.append((lane, one))
         value = "poison"
         filled: set[int] = set()
-        for number, pairs in by_source.items():
-            at = dict(pairs)
+        for (number, piece), at in pieces.items():
             lanes = [
                 WIDTH + at[lane] if lane in at else lane if lane in filled else -1
                 for lane in range(WIDTH)
             ]
             mask = ", ".join("i32 poison" if lane < 0 else f"i32 {lane}" for lane in lanes)
-            both = f"{own} {value}, {own} {self.value_of_row(number)}"
+            both = f"{own} {value}, {own} {self._vector_from(number, piece * WIDTH)}"
             value = self.text.give(f"shufflevector {both}, <{WIDTH} x i32> <{mask}>")
             filled |= set(at)
         for lane, one in single:
             value = self._insert(value, self.lane(one), kind, lane)
         return value
 
+    def _in_vectors(self, number: int) -> bool:
+        """Whether a row lies in memory such that vectors may be read from any of its lanes on."""
+        if self.program.rows or self.graph.op[number] == "memory" or not self.order.looped(number):
+            return False
+        place = self.place_of(number)
+        return place.pointer == "%arena" and place.step == 1
+
+    def _vector_from(self, number: int, lane: int) -> str:
+        """The lanes of a row from one on."""
+        if not self.order.looped(number):
+            return self.value_of_row(number)
+        place = self.place_of(number)
+        at = self.text.place(place.pointer, place.of_lane(lane))
+        return self.text.load(at, self.graph.kind[number], True)
+
     def _fill(self, entries: Sequence[int], kind: str, place: Place) -> None:
         """Put entries in memory one after the other."""
+        if not self.program.rows:
+            for lane in range(0, len(entries), WIDTH):
+                value = self._taken(entries[lane : lane + WIDTH], kind)
+                at = self.text.place(place.pointer, place.of_lane(lane))
+                self.text.store(at, value, kind, True)
+            return
         for run in runs(entries, range(len(entries))):
             target = Place(
                 place.pointer, place.of_lane(run.place), run.apart * place.step, place.rows

@@ -8,8 +8,9 @@ products p f^T. Forces that turn with the body are constant in its frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from notchflex.chain import bending_normal
 from notchflex.errors import InputError
 from notchflex.motion import IN_PLANE, PLANE, rotation_about, turned, unskew
 from notchflex.robot import Robot
-from notchflex.statics.external import BodyForce, ExternalLoad
+from notchflex.statics.external import ExternalLoad
 from notchflex.statics.load import LoadPath
 
 # Part of a vector that may stick out of a plane by rounding.
@@ -68,23 +69,20 @@ def applied(
     """
     base = _base(load_path)
     distinct = list(dict.fromkeys(load_path.external))
+    sums: list[tuple[np.ndarray, ...]] = []
     for external in distinct:
         _check(external, robot)
-    rows = [
-        _sums(_acting(external, body_mass, body_centre, float(body_length[-1])), base)
-        for external in distinct
-    ]
-    sums = [_on_bodies(one, len(body_mass)) for one in rows]
+        sums.append(_sums(external, base, body_mass, body_centre, float(body_length[-1])))
     # Loads that stay the same over many steps are summed up once.
     number = {external: i for i, external in enumerate(distinct)}
     step = np.array([number[external] for external in load_path.external])
-    return Applied(*(constant(np.stack(field)[step]) for field in zip(*sums, strict=True)))
+    return Applied(*(constant(np.array(field)[step]) for field in zip(*sums, strict=True)))
 
 
 def in_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
     """Loads of space as those of the plane that x and z of a frame span."""
     turn = np.asarray(frame)
-    arm = np.einsum("ia,...ij,jb->...ab", turn, loads.dead_arm, turn)
+    arm = turn.T @ np.asarray(loads.dead_arm) @ turn
     following = [np.asarray(loads.following)[..., part] @ turn for part in (_FIRST, _LAST)]
     return Applied(
         dead_force=constant((np.asarray(loads.dead_force) @ turn)[..., IN_PLANE]),
@@ -153,18 +151,40 @@ def is_planar(load_path: LoadPath, robot: Robot) -> bool:
     normal = bending_normal(robot)
     if normal is None:
         return False
-    base, bodies = _base(load_path), robot.number_of_notches + 1
+    turned = _base(load_path) @ normal
     for external in dict.fromkeys(load_path.external):
-        # Only directions matter here, so any mass will do, and where along the axis it is.
-        for force in _acting(external, np.ones(bodies), np.zeros((bodies, 3)), 0.0):
-            turn = np.eye(3) if force.following else base.T
-            acts, turns = turn @ np.asarray(force.force), turn @ np.asarray(force.moment)
-            point = np.asarray(force.point) * bool(acts.any())
-            out = (acts @ normal, np.linalg.norm(np.cross(turns, normal)), point @ normal)
-            size = (np.linalg.norm(acts), np.linalg.norm(turns), np.linalg.norm(point))
-            if (np.abs(out) > _ROUNDING * np.array(size)).any():
+        # Only directions matter here: any mass will do, and where on the tube axis it is.
+        forces = list(_forces(external, 0, 0.0))
+        if external.gravity is not None:
+            forces.append((0, external.weight(1.0), _NONE, _NONE, False))
+        for _, force, moment, point, following in forces:
+            if _sticks_out(force, moment, point, normal if following else turned, normal):
                 return False
     return True
+
+
+def _sticks_out(
+    force: Sequence[float],
+    moment: Sequence[float],
+    point: Sequence[float],
+    normal: Float[np.ndarray, " 3"],
+    normal_of_body: Float[np.ndarray, " 3"],
+) -> bool:
+    """Whether a force leaves a plane or acts beside it, or a moment turns out of it."""
+    x, y, z = normal.tolist()
+    a, b, c = moment
+    across = hypot(b * z - c * y, c * x - a * z, a * y - b * x)
+    at = _along(point, normal_of_body) if any(force) else 0.0
+    return (
+        abs(_along(force, normal)) > _ROUNDING * hypot(*force)
+        or across > _ROUNDING * hypot(*moment)
+        or abs(at) > _ROUNDING * hypot(*point)
+    )
+
+
+def _along(vector: Sequence[float], normal: Float[np.ndarray, " 3"]) -> float:
+    x, y, z = normal.tolist()
+    return vector[0] * x + vector[1] * y + vector[2] * z
 
 
 def _base(load_path: LoadPath) -> Float[np.ndarray, "3 3"]:
@@ -195,49 +215,51 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
         )
 
 
-def _acting(
-    external: ExternalLoad,
-    body_mass: Float[np.ndarray, " bodies"],
-    body_centre: Float[np.ndarray, "bodies 3"],
-    tip: float,
-) -> Iterator[BodyForce]:
-    """All that acts, each as a force on a body; the tip is `tip` (mm) beyond its body's origin."""
-    yield from external.body_forces
-    last = len(body_mass) - 1
+_NONE = (0.0, 0.0, 0.0)
+_Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool]
+
+
+def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
+    """All that acts but the robot's own weight: body, force, moment, point, whether it follows.
+
+    The tip is `tip` (mm) beyond the origin of the last body.
+    """
+    for one in external.body_forces:
+        yield one.body, one.force, one.moment, one.point, one.following
     x, y, z = external.tip_point
     point = (x, y, z + tip)
     if any(external.tip_force) or any(external.tip_moment):
-        yield BodyForce(last, external.tip_force, external.tip_moment, point, external.following)
+        yield last, external.tip_force, external.tip_moment, point, external.following
     if external.tip_mass:
-        yield BodyForce(last, external.weight(external.tip_mass), point=point)
-    if external.gravity is not None:
-        for body, (mass, centre) in enumerate(zip(body_mass, body_centre, strict=True)):
-            yield BodyForce(body, external.weight(float(mass)), point=centre)
+        yield last, external.weight(external.tip_mass), _NONE, point, False
 
 
 def _sums(
-    acting: Iterator[BodyForce], base: Float[np.ndarray, "3 3"]
-) -> Iterator[tuple[int, tuple[np.ndarray, ...]]]:
-    """What each force adds to the sums of its body."""
-    for one in acting:
-        point, force, moment = map(np.asarray, (one.point, one.force, one.moment))
-        if one.following:
-            about_origin = moment + np.cross(point, force)
-            wrench = np.concatenate([about_origin, force])
-            yield one.body, (np.zeros(3), np.zeros(3), np.zeros((3, 3)), wrench)
-        else:
-            held = base.T @ force
-            yield one.body, (held, base.T @ moment, np.outer(point, held), np.zeros(6))
-
-
-def _on_bodies(
-    added: Iterator[tuple[int, tuple[np.ndarray, ...]]], bodies: int
+    external: ExternalLoad,
+    base: Float[np.ndarray, "3 3"],
+    body_mass: Float[np.ndarray, " bodies"],
+    body_centre: Float[np.ndarray, "bodies 3"],
+    tip: float,
 ) -> tuple[np.ndarray, ...]:
-    sums = tuple(np.zeros((bodies, *shape)) for shape in ((3,), (3,), (3, 3), (6,)))
-    for body, parts in added:
-        for total, part in zip(sums, parts, strict=True):
-            total[body] += part
-    return sums
+    """The sums for all bodies."""
+    count = len(body_mass)
+    held, turned = np.zeros((count, 3)), np.zeros((count, 3))
+    arm, following = np.zeros((count, 3, 3)), np.zeros((count, 6))
+    for body, force, moment, point, follows in _forces(external, count - 1, tip):
+        own, about, place = np.array(force), np.array(moment), np.array(point)
+        if follows:
+            following[body, _FIRST] += about + np.cross(place, own)
+            following[body, _LAST] += own
+        else:
+            own = own @ base
+            held[body] += own
+            turned[body] += about @ base
+            arm[body] += place[:, None] * own
+    if external.gravity is not None:
+        weight = body_mass[:, None] * (np.array(external.weight(1.0)) @ base)
+        held += weight
+        arm += body_centre[:, :, None] * weight[:, None]
+    return held, turned, arm, following
 
 
 __all__ = ["Applied", "applied", "body_wrench", "is_planar", "is_unloaded"]

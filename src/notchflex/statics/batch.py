@@ -22,6 +22,7 @@ from notchflex.statics.actuation import filled
 from notchflex.statics.batch_rows import followed_row
 from notchflex.statics.command import command
 from notchflex.statics.given import shown
+from notchflex.statics.known import KnownForm
 from notchflex.statics.load import Load, LoadPath, joined_paths, load_path
 from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.outputs import DEFAULT_OUTPUTS, known_outputs
@@ -224,7 +225,7 @@ class _Table:
     """Rows of a batch whose robots have one form.
 
     Attributes:
-        ready: One of the robots.
+        chain_form: Form of what is not known of the robots.
         rows: Which rows of the batch these are.
         chains: A row per robot, or one for all.
         commands: A row per path, or one for all, then the steps.
@@ -233,7 +234,7 @@ class _Table:
         outputs: What is asked.
     """
 
-    ready: Prepared
+    chain_form: KnownForm
     rows: np.ndarray
     chains: Float[np.ndarray, "k chain"]
     commands: Float[np.ndarray, "k s command"]
@@ -252,7 +253,7 @@ class _Table:
         commands = self.commands[index if len(self.commands) > 1 else np.zeros_like(index)]
         one_robot = len(self.chains) == 1
         chains = self.chains[0] if one_robot else self.chains[index]
-        forms = (self.ready.chain_form, self.command_form, self.outputs)
+        forms = (self.chain_form, self.command_form, self.outputs)
         by_row = (not one_robot, True, False)
         came = followed_row.rows(by_row, chains, commands, numbers, *forms)
         own = self.flexures[index if len(self.flexures) > 1 else np.zeros_like(index)]
@@ -296,9 +297,12 @@ def _tables(
     for (_, form), entries in tables.items():
         numbers, robots_of_one, own, commands = zip(*entries, strict=True)
         rows = np.arange(count) if len(robots) == 1 else np.array(numbers)
-        chains = np.stack([np.asarray(ready.vector) for ready in robots_of_one])
+        whole = np.stack([ready.vector for ready in robots_of_one])
+        own_chains = [ready.chain for ready in robots_of_one]
+        known = KnownForm.of(robots_of_one[0].chain_form, own_chains, whole)
         commands = np.concatenate(commands)
-        made.append(_Table(robots_of_one[0], rows, chains, commands, form, np.array(own), outputs))
+        chains = known.pack(whole)
+        made.append(_Table(known, rows, chains, commands, form, np.array(own), outputs))
     return made
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from jaxtyping import Array, Float
 
 from notchflex._native import native
+from notchflex.statics.known import KnownForm
 from notchflex.statics.newton import Settings
 from notchflex.statics.outputs import followed
 from notchflex.statics.packing import Form, lane_sizes
@@ -16,7 +17,7 @@ def followed_row(
     chain: Float[Array, " chain"],
     commands: Float[Array, "s command"],
     numbers: Float[Array, " settings"],
-    chain_form: Form,
+    chain_form: KnownForm,
     command_form: Form,
     outputs: tuple[str, ...],
 ) -> dict[str, Array]:
@@ -26,7 +27,7 @@ def followed_row(
         chain: The robot.
         commands: Its loads, step by step.
         numbers: How hard the solver tries.
-        chain_form: Form of the robot.
+        chain_form: Form of what is not known of the robot.
         command_form: Form of one step.
         outputs: Names of what is asked.
 

@@ -119,7 +119,10 @@ class ExternalLoad:
         """What acts from outside, without what else a load may command."""
         if self._is_default:
             return NOTHING
-        return ExternalLoad(**{name: getattr(self, name) for name in EXTERNAL})
+        found = object.__new__(ExternalLoad)
+        for name in EXTERNAL:  # checked already
+            object.__setattr__(found, name, getattr(self, name))
+        return found
 
     @property
     def pulls_down(self) -> bool:

@@ -67,6 +67,8 @@ def vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
         >>> vector([0, 0, 1], "tip_force", "N")
         (0.0, 0.0, 1.0)
     """
+    if type(value) is tuple and len(value) == 3 and all(map(_finite, value)):
+        return value  # as most often: nothing to change
     given = np.asarray(value).tolist() if hasattr(value, "__array__") else value
     numbers: list[float] = []
     if isinstance(given, Sequence) and not isinstance(given, str | bytes | bytearray):
@@ -77,6 +79,10 @@ def vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
     if len(numbers) != 3 or not all(isfinite(one) for one in numbers):
         raise InputError(f"{what} needs three finite numbers ({form}); got {shown(value)}")
     return numbers[0], numbers[1], numbers[2]
+
+
+def _finite(value: Any) -> bool:
+    return type(value) is float and isfinite(value)
 
 
 def table(value: Any, what: str) -> np.ndarray:

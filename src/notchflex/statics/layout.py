@@ -28,7 +28,7 @@ class Units(NamedTuple):
     handed: list[Array]
     outside: Array
     drawn: list[Array]
-    stretch: list[Array]
+    stretch: list[Array] | None
 
     @property
     def motions(self) -> list[Array]:
@@ -57,7 +57,12 @@ def _padded(rows: Array, behind: int) -> Array:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything stands among the numbers that may change at one flexure."""
+    """Where everything stands among the numbers that may change at one flexure.
+
+    Of a tendon beyond come back the length that is set free and the stretch (tension times length).
+    What slides over a contact depends on one sum of the two alone, and only that comes back where
+    no stroke is demanded.
+    """
 
     modes: int
     lips: tuple[int, ...]
@@ -65,6 +70,7 @@ class Layout:
     older: int
     wrench: int
     turn: int
+    by_stroke: bool
 
     @property
     def unknowns(self) -> int:
@@ -79,7 +85,8 @@ class Layout:
     @property
     def beyond(self) -> int:
         """Numbers that come back, tendons' drawn and stretched lengths last."""
-        return self.older * self.wrench + bool(self.turn) * self.wrench + 2 * sum(self.tendons)
+        lengths = (1 + self.by_stroke) * sum(self.tendons)
+        return self.older * self.wrench + bool(self.turn) * self.wrench + lengths
 
     def units(self) -> Units:
         """Unit rows of everything, in order."""
@@ -95,20 +102,21 @@ class Layout:
             wrench,
             (outside,),
             self.tendons,
-            self.tendons,
+            self.tendons if self.by_stroke else (),
         ]
         ends = np.cumsum([size for group in sizes for size in group])
         rows = map(constant, np.split(np.eye(ends[-1]), ends[:-1]))
         modes, lips, log_ratio, older, turn, tension, handed, far, drawn, stretch = (
             [next(rows) for _ in group] for group in sizes
         )
+        strokes = stretch if self.by_stroke else None
         return Units(
-            modes[0], lips, log_ratio, older, turn[0], tension, handed, far[0], drawn, stretch
+            modes[0], lips, log_ratio, older, turn[0], tension, handed, far[0], drawn, strokes
         )
 
 
-def layout(chain: Chain) -> Layout:
-    """The layout of a chain."""
+def layout(chain: Chain, *, by_stroke: bool) -> Layout:
+    """The layout of a chain whose tendons are given by tension alone, or some by stroke."""
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
     return Layout(
         modes=chain.stiffness.shape[-1],
@@ -117,4 +125,5 @@ def layout(chain: Chain) -> Layout:
         older=chain.window - 1 if wrench else 0,
         wrench=wrench,
         turn=(3 if wrench == 6 else 1) if chain.loaded else 0,
+        by_stroke=by_stroke,
     )

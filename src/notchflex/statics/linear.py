@@ -10,7 +10,8 @@ robot that only turns as a whole changes nothing. What is carried on are
 
 and what comes back are
 
-    the wrenches of spans and lips that end beyond; those of the loads; tendon set free, stretched.
+    the wrenches of spans and lips that end beyond; those of the loads; tendon set free and
+    stretched.
 
 Only the geometry of a span, an opening or a rod is differentiated by JAX, on its own.
 """
@@ -27,7 +28,7 @@ from notchflex.flexure import held_by_strains, pull_change
 from notchflex.motion import Motion, skew, wrench_turn
 from notchflex.statics.applied import Applied, body_wrench
 from notchflex.statics.element import RATE, STICTION, Memory, Unknowns, driven, heights, pressed
-from notchflex.statics.layout import Layout, Units, layout
+from notchflex.statics.layout import Layout, Units
 from notchflex.statics.strands import Moves, Opening, Strand, moves_of, opening_of, strand_of
 from notchflex.statics.walk import Evaluation, holds, reaches
 
@@ -46,6 +47,7 @@ def blocks(
     memory: Memory,
     applied: Applied | None,
     at: Evaluation,
+    form: Layout,
 ) -> Blocks:
     """Rows of all flexures.
 
@@ -55,8 +57,8 @@ def blocks(
         memory: What its contacts remember.
         applied: Other loads on the bodies.
         at: Its evaluation there.
+        form: What the rows are over.
     """
-    form = layout(chain)
     unit = form.units()
     moves = moves_of(chain, at, unit)
     strands = [strand_of(chain, k, unknowns, at, unit, moves) for k in range(len(chain.groups))]
@@ -102,7 +104,8 @@ def blocks(
     onward = [-unit.spread(moves.relative[number]) for number in range(form.older)]
     onward += [] if moves.turn is None else [moves.turn]
     onward += [strand.carried for strand in strands]
-    behind += [strand.drawn for strand in strands] + [strand.stretch for strand in strands]
+    behind += [strand.drawn for strand in strands]
+    behind += [strand.stretch for strand in strands if strand.stretch is not None]
     return Blocks(*(_stacked(chain, rows, form) for rows in (residual, onward, behind)))
 
 

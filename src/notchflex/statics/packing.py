@@ -7,6 +7,7 @@ of robots is a table of them.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,6 +31,12 @@ class Form:
         sizes = [int(np.prod(shape)) for shape in shapes]
         self.ends = np.cumsum(sizes)[:-1].tolist()
         self.size = sum(sizes)
+
+    @cached_property
+    def places(self) -> list[np.ndarray]:
+        """Where the numbers of every leaf are in a vector, in the shape of the leaf."""
+        parts = np.split(np.arange(self.size), self.ends)
+        return [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
 
     def __repr__(self) -> str:
         """Tell all of it: kept programs are found by this."""
@@ -64,7 +71,7 @@ class Form:
         xp = array_module(vector)
         parts = xp.split(vector, self.ends, axis=-1)
         leaves = [
-            _as_kind(part.reshape(*vector.shape[:-1], *shape), kind)
+            as_kind(part.reshape(*vector.shape[:-1], *shape), kind)
             for part, shape, kind in zip(parts, self.shapes, self.kinds, strict=True)
         ]
         return jax.tree.unflatten(self.structure, leaves)
@@ -74,7 +81,7 @@ class Form:
         starts = [0, *self.ends]
         part = vector[..., starts[number] : [*self.ends, self.size][number]]
         shape = (*vector.shape[:-1], *self.shapes[number])
-        return _as_kind(part.reshape(shape), self.kinds[number])
+        return as_kind(part.reshape(shape), self.kinds[number])
 
 
 def lane_sizes(chain_form: Form, *_others: Any) -> tuple[int, int]:
@@ -84,10 +91,11 @@ def lane_sizes(chain_form: Form, *_others: Any) -> tuple[int, int]:
     return chain.flexures, chain.flexures + 1
 
 
-def _as_kind(values: Array, kind: str) -> Array:
+def as_kind(values: Array, kind: str) -> Array:
+    """Floats as numbers of their own kind."""
     if kind == "b":
         return values != 0.0
     return values.astype(int) if kind in "iu" else values
 
 
-__all__ = ["Form", "lane_sizes"]
+__all__ = ["Form", "as_kind", "lane_sizes"]

@@ -12,6 +12,7 @@ from notchflex._jax import constant
 from notchflex.chain import Chain, assemble, padded
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
+from notchflex.statics.known import KnownForm
 from notchflex.statics.packing import Form
 from notchflex.statics.quantities import Shape
 from notchflex.statics.stepping import Solved, at_rest, unloaded
@@ -36,6 +37,16 @@ class Prepared:
     def vector(self) -> Float[np.ndarray, " chain"]:
         """The chain as one vector."""
         return np.asarray(self.chain_form.pack(self.chain))
+
+    @cached_property
+    def known_form(self) -> KnownForm:
+        """Form of what is not known of the chain beforehand."""
+        return KnownForm.of(self.chain_form, [self.chain], self.vector[None])
+
+    @cached_property
+    def known_vector(self) -> Float[np.ndarray, " unknown"]:
+        """That as one vector."""
+        return self.known_form.pack(self.vector)
 
     @cached_property
     def rest(self) -> Solved:

@@ -19,6 +19,7 @@ from notchflex._kept import kept
 from notchflex._native import native
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
+from notchflex.statics.known import KnownForm
 from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form, lane_sizes
 from notchflex.statics.prepare import Prepared
@@ -82,10 +83,10 @@ class Run:
         states = self._table[:, : self._prepared.state.size]
         rows = np.concatenate([self._first[None], states])
         every = _quantities(
-            self._prepared.vector,
+            self._prepared.known_vector,
             rows,
             np.array(1.0 + self._count),
-            self._prepared.chain_form,
+            self._prepared.known_form,
             self._prepared.state,
         )
         return (
@@ -138,9 +139,9 @@ def run(
     if count != _size(count):
         packed = packed[_padded(count)]
     options = _options(settings, each_from_start, count)
-    forms = (prepared.chain_form, form, prepared.state)
+    forms = (prepared.known_form, form, prepared.state)
     first = prepared.rest_vector if start is None else np.asarray(prepared.state.pack(start))
-    table = _follow(prepared.vector, packed, first, options, *forms)
+    table = _follow(prepared.known_vector, packed, first, options, *forms)
     return Run(prepared, first, table, count)
 
 
@@ -173,8 +174,8 @@ def lips(
     """
     form = prepared.command_form(commands)
     given = (form.pack(commands, leading=1), np.asarray(prepared.state.pack(start)))
-    forms = (prepared.chain_form, form, prepared.state)
-    return _lips(prepared.vector, *given, np.array(settings.numbers), *forms)
+    forms = (prepared.known_form, form, prepared.state)
+    return _lips(prepared.known_vector, *given, np.array(settings.numbers), *forms)
 
 
 @native(4, lane_sizes)
@@ -183,7 +184,7 @@ def _lips(
     commands: Float[Array, "s command"],
     start: Float[Array, " state"],
     numbers: Float[Array, " settings"],
-    chain_form: Form,
+    chain_form: KnownForm,
     command_form: Form,
     state_form: Form,
 ) -> tuple[Array, Array, Array]:
@@ -232,7 +233,7 @@ def _follow(
     commands: Float[Array, "s command"],
     start: Float[Array, " state"],
     options: Float[Array, " options"],
-    chain_form: Form,
+    chain_form: KnownForm,
     command_form: Form,
     state_form: Form,
 ) -> Float[Array, "s told"]:
@@ -277,7 +278,7 @@ def _quantities(
     vector: Float[Array, " chain"],
     states: Float[Array, "s state"],
     count: Float[Array, ""],
-    chain_form: Form,
+    chain_form: KnownForm,
     state_form: Form,
 ) -> Quantities:
     """What is reported of states beyond their shape; 0 for those that only fill up."""

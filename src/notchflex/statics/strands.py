@@ -43,8 +43,9 @@ class Strand(NamedTuple):
         gap_tension: Of the tension in the gap.
         carried: Of the tension handed on.
         at_edges: Of the tendon slid over both edges, by the memory's stiffness.
-        drawn: Of the tendon set free, this gap included.
-        stretch: Of tension times length, this gap included.
+        drawn: Of the tendon set free, this gap included; stretched by the memory's stiffness
+            where no stroke is demanded.
+        stretch: Of tension times length, this gap included; None where no stroke is demanded.
     """
 
     turning: Float[Array, "n 2 t short"]
@@ -54,7 +55,7 @@ class Strand(NamedTuple):
     carried: Float[Array, "n t z"]
     at_edges: Float[Array, "n t 2 z"]
     drawn: Float[Array, "n t z"]
-    stretch: Float[Array, "n t z"]
+    stretch: Float[Array, "n t z"] | None
 
 
 class Opening(NamedTuple):
@@ -164,16 +165,24 @@ def strand_of(
     )
     in_body = body_tension * group.body_length[..., None]
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
-    drawn = unit.drawn[k][None] - runs * unit.spread(cast("Array", sum(length)))
-    stretch = unit.stretch[k][None] + gap_tension * group.natural_gap[..., None] + in_body
-    at_entry = unit.drawn[k][None] + (unit.stretch[k][None] + in_body) / stiffness
+    here = gap_tension * group.natural_gap[..., None] + in_body
+    drawn, slid = runs * unit.spread(cast("Array", sum(length))), unit.drawn[k][None]
+    stretch = None
+    if unit.stretch is None:
+        drawn = slid - drawn + here / stiffness
+        at_exit, at_entry = drawn, slid + in_body / stiffness
+    else:
+        stretch = unit.stretch[k][None] + here
+        drawn = slid - drawn
+        at_exit = drawn + stretch / stiffness
+        at_entry = slid + (unit.stretch[k][None] + in_body) / stiffness
     return Strand(
         turning=cast("Array", sum(turning)),
         wrench=wrench,
         log_ratio=log_ratio,
         gap_tension=gap_tension,
         carried=jnp.where(runs > 0.0, body_tension, unit.tension[k][None]),
-        at_edges=jnp.stack([drawn + stretch / stiffness, at_entry], axis=2),
+        at_edges=jnp.stack([at_exit, at_entry], axis=2),
         drawn=drawn,
         stretch=stretch,
     )

@@ -11,9 +11,10 @@ All elements eliminate their own unknowns at once. What each then says is
 
 and two neighbours together say the same of their ends (Redheffer's star product), what passes
 between them being eliminated. So all neighbours are joined at once, then all pairs of them, until
-one is left; nothing comes back from beyond the tip, and at the base only the tensions are left to
-find. On the way back every pair learns what passes between its two. It is the elimination of a
-block-tridiagonal matrix by nested dissection: a few wide operations instead of many narrow ones.
+few are left: a few wide operations instead of many narrow ones. These few are joined from the tip
+on, beyond which is nothing, until at the base only the tensions are left to find. On the way back
+every pair learns what passes between its two. It is the elimination of a block-tridiagonal matrix
+by nested dissection.
 """
 
 from __future__ import annotations
@@ -28,11 +29,13 @@ from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual
 from notchflex.statics.element import Memory, Unknowns
-from notchflex.statics.layout import layout
+from notchflex.statics.layout import Layout, layout
 from notchflex.statics.linear import blocks
 from notchflex.statics.walk import Evaluation
 
 _HELD, _TIED = 1e-9, 1e-7
+# So many parts of the chain are not worth to be joined side by side.
+_ONE_BY_ONE = 4
 
 
 class Step(NamedTuple):
@@ -71,9 +74,9 @@ def linear_step(
     Returns:
         The step.
     """
-    form = layout(chain)
+    form = layout(chain, by_stroke=command.by_stroke is not None)
     here = (chain, unknowns, memory, command.applied, at)
-    rows = blocks(*jax.tree.map(jax.lax.stop_gradient, here))
+    rows = blocks(*jax.tree.map(jax.lax.stop_gradient, here), form=form)
     imbalance = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
     own = form.unknowns
     # Own unknowns as functions of 1, what is carried, and what comes back: du = answer @ (1, c, b).
@@ -86,14 +89,15 @@ def linear_step(
 
     ports = Ports(answered(rows.onward), answered(rows.behind))
     levels: list[Ports] = []
-    while len(ports.onward) > 1:
+    while len(ports.onward) > _ONE_BY_ONE:
         between, ports = _joined(ports, form.carried)
         levels.append(between)
+    leave = _leaving(chain, form)
+    passed, back = _from_tip(ports, leave)
     tension_step = command.value - base_tension
     if command.by_stroke is not None:
-        tension_step = _drawn(chain, command, base_tension, at, ports.behind[0])
-    carried = _leaving(chain) @ tension_step
-    known = jnp.concatenate([jnp.ones(1), carried, jnp.zeros(form.beyond)])[None]
+        tension_step = _drawn(chain, command, base_tension, at, back)
+    known = _from_base(passed, tension_step, leave, form.beyond)
     for between in reversed(levels):
         known = _parted(between, known, form.carried)
     steps = jnp.einsum("nuz,nz->nu", answer, known)
@@ -106,10 +110,10 @@ def _drawn(
     command: Command,
     base_tension: Float[Array, " t"],
     at: Evaluation,
-    behind: Float[Array, "b z"],
+    back: Float[Array, "b 1+t"],
 ) -> Float[Array, " t"]:
     """Change of the base tensions that meets the strokes, from what the whole chain hands back."""
-    form, leave, order = layout(chain), _leaving(chain), chain.tendon_order
+    order = chain.tendon_order
     assert command.by_stroke is not None
 
     def demand(tension: Array, drawn: Array, stretch: Array) -> Array:
@@ -118,22 +122,21 @@ def _drawn(
 
     here = (base_tension, at.base.drawn, at.base.stretch)
     slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, here))
-    back = jnp.concatenate([behind[:, 1 : 1 + form.carried] @ leave, behind[:, :1]], axis=1)
-    back = back[form.beyond - 2 * len(order) :].reshape(2, len(order), -1)
+    back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
     # Rows in the order of the robot's tendons.
     drawn, stretch = jnp.zeros_like(back).at[:, order].set(back)
     by_base = slopes[1] @ drawn + slopes[2] @ stretch
-    matrix = slopes[0] + by_base[:, :-1]
+    matrix = slopes[0] + by_base[:, 1:]
     # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; a
     # small entry keeps such a step finite.
     tied = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _TIED)
-    missing = demand(*here) + by_base[:, -1]
+    missing = demand(*here) + by_base[:, 0]
     return -eliminated(matrix + _HELD * jnp.diag(tied.astype(float)), missing[:, None])[:, 0]
 
 
-def _leaving(chain: Chain) -> Float[np.ndarray, "c t"]:
+def _leaving(chain: Chain, form: Layout) -> Float[np.ndarray, "c t"]:
     """What is carried to the first flexure, per unit of base tension: the tension itself."""
-    order, carried = chain.tendon_order, layout(chain).carried
+    order, carried = chain.tendon_order, form.carried
     leave = np.zeros((carried, chain.tendons))
     leave[carried - len(order) + np.arange(len(order)), order] = 1.0
     return leave
@@ -172,6 +175,57 @@ def _joined(ports: Ports, carried: int) -> tuple[Ports, Ports]:
         jnp.concatenate([behind, ports.behind[whole:]]),
     )
     return Ports(between, back), left
+
+
+def _from_tip(
+    ports: Ports, leave: Float[np.ndarray, "c t"]
+) -> tuple[list[tuple[Array, Array]], Float[Array, "b 1+t"]]:
+    """Join the parts that are left one after the other, from the tip on, beyond which is nothing.
+
+    Returns:
+        For each part but the last, what it carries on and what comes back to it, as rows over 1 and
+        what is carried to it; to the first, the base tensions. And what the first hands back.
+    """
+    own, last = 1 + len(leave), len(ports.onward) - 1
+
+    def split(rows: Array, number: int) -> tuple[Array, Array]:
+        to_it = rows[:, :own]
+        if number == 0:
+            to_it = jnp.concatenate([rows[:, :1], rows[:, 1:own] @ leave], axis=1)
+        return to_it, rows[:, own:]
+
+    passed: list[tuple[Array, Array]] = []
+    back, _ = split(ports.behind[last], last)
+    for number in reversed(range(last)):
+        onward, by_back = split(ports.onward[number], number)
+        closed = jnp.eye(len(leave)) - by_back @ back[:, 1:]
+        onward = eliminated(closed, _more(onward, by_back @ back[:, 0]))
+        returned = _more(back[:, 1:] @ onward, back[:, 0])
+        passed.insert(0, (onward, returned))
+        back, by_back = split(ports.behind[number], number)
+        back = back + by_back @ returned
+    return passed, back
+
+
+def _more(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Array, "k z"]:
+    """Rows with something added to their first column, that of 1."""
+    return jnp.concatenate([rows[:, :1] + by[:, None], rows[:, 1:]], axis=1)
+
+
+def _from_base(
+    passed: list[tuple[Array, Array]],
+    tension_step: Float[Array, " t"],
+    leave: Float[np.ndarray, "c t"],
+    beyond: int,
+) -> Float[Array, "parts z"]:
+    """(1, carried, from beyond) of the parts that were joined one after the other."""
+    one, known = jnp.ones(1), []
+    to_it, carried = tension_step, leave @ tension_step
+    for onward, returned in passed:
+        given = jnp.concatenate([one, to_it])
+        known.append(jnp.concatenate([one, carried, returned @ given]))
+        to_it = carried = onward @ given
+    return jnp.stack([*known, jnp.concatenate([one, carried, jnp.zeros(beyond)])])
 
 
 def _without(rows: Float[Array, "parts k z"], own: int) -> Float[Array, "parts k z"]:
