@@ -24,6 +24,8 @@ CASES = {
     "wrist, loaded": ("pacheco2021-a", nf.Load(tension=1.0, **TIP), 0.05),
     "wrist in space": ("pacheco2021-a", nf.Load(tension=1.0, **SIDE), 0.05),
     "strips": ("liu2022", nf.Load(tension=5.0), 0.02),
+    "wrist in space, held": ("pacheco2021-a", nf.Load(tension=1.0, tip_force=(0, 0.02, 0)), 0.05),
+    "links, following": ("gao2017", nf.Load(tension=6.0, following=True, **TIP), 0.01),
     "links, loaded": ("gao2017", nf.Load(tension=6.0, **TIP), 0.01),
     "two axes": ("two-axis-wrist", nf.Load(tension=[0.5, None, 0.2], stroke=[None, 0.1]), 0.05),
 }
@@ -33,7 +35,7 @@ CASES = {
 def test_it_is_the_dense_step(case: str, margin) -> None:
     name, load, size = CASES[case]
     robot = nf.load_robot(name)
-    if case == "wrist in space":
+    if case.startswith("wrist in space"):
         robot = robot.with_value("material.density", 6450.0)
     path = load_path(load, robot.number_of_tendons)
     ready = prepared_for(robot, path)

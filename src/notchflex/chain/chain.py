@@ -72,6 +72,7 @@ class Chain(Pytree):
             (flexure, edge) flattened, -1 to fill up.
         level: For which loads the flexures have modes enough.
         loaded: Whether loads other than the tendons' act.
+        follows: Whether any of them may turn with a body.
         refinement: How many more modes the flexures have than for usual loads.
         window: Over how many flexures a span or an opening reaches at most.
     """
@@ -98,6 +99,7 @@ class Chain(Pytree):
     contacts: Int[Array, "t edges"]
     level: str = static()
     loaded: bool = static()
+    follows: bool = static()
     refinement: int = static()
     window: int = static()
 
@@ -133,6 +135,7 @@ def assemble(
     level: str = "tendons",
     *,
     loaded: bool = False,
+    follows: bool = True,
     refinement: int = 0,
     flat: bool = True,
 ) -> Chain:
@@ -143,6 +146,7 @@ def assemble(
         level: For which loads: "tendons" alone, loads in the "plane" of bending, or in "space".
             More modes of the flexures are kept the more is asked for.
         loaded: Whether loads other than the tendons' act.
+        follows: Whether any of them may turn with a body.
         refinement: How many times more modes than the flexures need for usual loads.
         flat: Whether a robot that stays in a plane, under such loads, is given as one of the plane.
 
@@ -186,6 +190,7 @@ def assemble(
         contacts=_contacts(laid.groups, len(tendons)),
         level=level,
         loaded=loaded,
+        follows=follows,
         refinement=refinement,
         window=max((int(np.max(part.back)) for part in (*laid.groups, *shaped.lips)), default=1),
     )

@@ -126,6 +126,18 @@ class Robot:
             )
 
     @functools.cached_property
+    def _hash(self) -> int:
+        return hash(tuple(getattr(self, one.name) for one in dataclasses.fields(self)))
+
+    def __hash__(self) -> int:
+        """Of all its values, worked out once: robots are looked up at every solve."""
+        return self._hash
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the hash, which is another one in another process."""
+        return {name: value for name, value in vars(self).items() if name != "_hash"}
+
+    @functools.cached_property
     def notches(self) -> tuple[Notch, ...]:
         """Every notch from base to tip, each with `repeat` 1."""
         return tuple(single for notch in self.notch for single in notch.expanded())

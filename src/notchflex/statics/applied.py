@@ -51,6 +51,7 @@ def applied(
     body_mass: Float[np.ndarray, " bodies"],
     body_centre: Float[np.ndarray, "bodies 3"],
     body_length: Float[np.ndarray, " bodies"],
+    frame: Float[np.ndarray, "3 3"] | None = None,
 ) -> Applied:
     """Sum up what acts from outside on each body.
 
@@ -60,6 +61,7 @@ def applied(
         body_mass: Mass of each body, base first, g; zeros where the density is not known.
         body_centre: Centre of mass of each body in its frame, mm.
         body_length: Axial length of each body, mm; the tip is the end of the last one.
+        frame: Frame whose x and z span the plane of a flat chain, in which the sums are wanted.
 
     Returns:
         The sums, s steps as leading axis; those on the base too.
@@ -67,12 +69,16 @@ def applied(
     Raises:
         InputError: A body that the robot does not have, or gravity where nothing has a mass.
     """
-    base = _base(load_path)
+    base = tuple(map(float, load_path.base_rotation))
+    axes = _axes(base, None if frame is None else tuple(frame.ravel().tolist()))
     distinct = list(dict.fromkeys(load_path.external))
     sums: list[tuple[np.ndarray, ...]] = []
     for external in distinct:
         _check(external, robot)
-        sums.append(_sums(external, base, body_mass, body_centre, float(body_length[-1])))
+        tip = float(body_length[-1])
+        sums.append(_sums(external, axes, body_mass, body_centre, tip))
+    if len(load_path) == 1:
+        return Applied(*(constant(field[None]) for field in sums[0]))
     # Loads that stay the same over many steps are summed up once.
     number = {external: i for i, external in enumerate(distinct)}
     step = np.array([number[external] for external in load_path.external])
@@ -133,6 +139,11 @@ def body_wrench(rotation: Float[Array, "d d"], one: Applied) -> Float[Array, " w
 def is_unloaded(load_path: LoadPath) -> bool:
     """Whether nothing acts from outside in any step."""
     return all(external.is_nothing for external in dict.fromkeys(load_path.external))
+
+
+def follows(load_path: LoadPath) -> bool:
+    """Whether anything turns with a body in any step."""
+    return any(external.follows for external in dict.fromkeys(load_path.external))
 
 
 def is_planar(load_path: LoadPath, robot: Robot) -> bool:
@@ -234,32 +245,59 @@ def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
         yield last, external.weight(external.tip_mass), _NONE, point, False
 
 
+class _Axes(NamedTuple):
+    """Axes, as columns, that sums are wanted along and about.
+
+    Attributes:
+        along: In the frame of the bodies.
+        about: Likewise.
+        held_along: The same in the world.
+        held_about: Likewise.
+    """
+
+    along: Float[np.ndarray, "3 d"]
+    about: Float[np.ndarray, "3 a"]
+    held_along: Float[np.ndarray, "3 d"]
+    held_about: Float[np.ndarray, "3 a"]
+
+
+@lru_cache(maxsize=64)
+def _axes(base: tuple[float, ...], frame: tuple[float, ...] | None) -> _Axes:
+    """Axes of a frame (of all three axes, or of the plane of its x and z) on a turned base."""
+    turn, along, about = _turned_by(base), np.eye(3), np.eye(3)
+    if frame is not None:
+        own = np.reshape(frame, (3, 3))
+        along, about = own[:, IN_PLANE], own[:, 1:2]
+    return _Axes(along, about, turn @ along, turn @ about)
+
+
 def _sums(
     external: ExternalLoad,
-    base: Float[np.ndarray, "3 3"],
+    axes: _Axes,
     body_mass: Float[np.ndarray, " bodies"],
     body_centre: Float[np.ndarray, "bodies 3"],
     tip: float,
 ) -> tuple[np.ndarray, ...]:
     """The sums for all bodies."""
-    count = len(body_mass)
-    held, turned = np.zeros((count, 3)), np.zeros((count, 3))
-    arm, following = np.zeros((count, 3, 3)), np.zeros((count, 6))
+    along, about, held_along, held_about = axes
+    count, d, a = len(body_mass), along.shape[1], about.shape[1]
+    held, turned = np.zeros((count, d)), np.zeros((count, a))
+    arm, following = np.zeros((count, d, d)), np.zeros((count, a + d))
     for body, force, moment, point, follows in _forces(external, count - 1, tip):
-        own, about, place = np.array(force), np.array(moment), np.array(point)
+        own, turning, place = np.array(force), np.array(moment), np.array(point)
         if follows:
-            following[body, _FIRST] += about + np.cross(place, own)
-            following[body, _LAST] += own
+            following[body, :a] += (turning + np.cross(place, own)) @ about
+            following[body, a:] += own @ along
         else:
-            own = own @ base
+            own = own @ held_along
             held[body] += own
-            turned[body] += about @ base
-            arm[body] += place[:, None] * own
+            turned[body] += turning @ held_about
+            arm[body] += (place @ along)[:, None] * own
     if external.gravity is not None:
-        weight = body_mass[:, None] * (np.array(external.weight(1.0)) @ base)
+        weight = body_mass[:, None] * (np.array(external.weight(1.0)) @ held_along)
         held += weight
-        arm += body_centre[:, :, None] * weight[:, None]
+        arm += (body_centre @ along)[:, :, None] * weight[:, None]
     return held, turned, arm, following
 
 
-__all__ = ["Applied", "applied", "body_wrench", "is_planar", "is_unloaded"]
+__all__ = ["Applied", "applied", "body_wrench", "follows", "is_planar", "is_unloaded"]

@@ -11,7 +11,7 @@ from notchflex._jax import constant
 from notchflex.chain import Chain
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
-from notchflex.statics.applied import applied, in_frame
+from notchflex.statics.applied import applied
 from notchflex.statics.load import LoadPath
 
 
@@ -29,9 +29,8 @@ def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
             np.asarray(chain.body_mass),
             np.asarray(chain.body_centre),
             np.asarray(chain.body_length),
+            None if chain.frame is None else np.asarray(chain.frame),
         )
-        if chain.frame is not None:
-            others = in_frame(others, chain.frame)
     return Command(constant(value), drawn, others)
 
 

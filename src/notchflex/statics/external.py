@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 from notchflex.errors import InputError
@@ -90,24 +91,10 @@ class ExternalLoad:
 
     def __post_init__(self) -> None:
         """Check the numbers and keep them as tuples, so that equal loads are found equal."""
-        if self._is_default:
-            return
-        mass = number(self.tip_mass, "tip_mass", "a number of grams")
-        if not 0.0 <= mass < float("inf"):
-            raise InputError(f"tip_mass must be finite and 0 g or more; got {mass:g}")
-        taken = {
-            "tip_force": vector(self.tip_force, "tip_force", "N"),
-            "tip_moment": vector(self.tip_moment, "tip_moment", "N mm"),
-            "tip_point": vector(self.tip_point, "tip_point", "mm, from the tip"),
-            "following": truth(self.following, "following"),
-            "body_forces": _body_forces(self.body_forces),
-            "tip_mass": mass,
-            "gravity": None
-            if self.gravity is None
-            else vector(self.gravity, "gravity", "m/s^2, in the world"),
-        }
-        for name, value in taken.items():
-            object.__setattr__(self, name, value)
+        for name, default in _DEFAULTS:
+            value = getattr(self, name)
+            if value is not default:
+                object.__setattr__(self, name, _CHECKS[name](value))
 
     @property
     def _is_default(self) -> bool:
@@ -135,10 +122,23 @@ class ExternalLoad:
         acting = any(self.tip_force) or any(self.tip_moment) or self.pulls_down
         return not acting and not any(any(one.force) or any(one.moment) for one in self.body_forces)
 
+    @property
+    def follows(self) -> bool:
+        """Whether anything turns with a body."""
+        tip = self.following and (any(self.tip_force) or any(self.tip_moment))
+        return tip or any(one.following for one in self.body_forces)
+
     def weight(self, mass: float) -> tuple[float, float, float]:
         """Weight of a mass (g) in the world, N."""
         x, y, z = HANGING if self.gravity is None else self.gravity
         return 1e-3 * mass * x, 1e-3 * mass * y, 1e-3 * mass * z
+
+
+def _mass(value: Any) -> float:
+    mass = number(value, "tip_mass", "a number of grams")
+    if not 0.0 <= mass < float("inf"):
+        raise InputError(f"tip_mass must be finite and 0 g or more; got {mass:g}")
+    return mass
 
 
 def _body_forces(value: Any) -> tuple[BodyForce, ...]:
@@ -150,6 +150,15 @@ def _body_forces(value: Any) -> tuple[BodyForce, ...]:
     return tuple(value)
 
 
+_CHECKS: dict[str, Callable[[Any], Any]] = {
+    "tip_force": partial(vector, what="tip_force", form="N"),
+    "tip_moment": partial(vector, what="tip_moment", form="N mm"),
+    "tip_point": partial(vector, what="tip_point", form="mm, from the tip"),
+    "following": partial(truth, what="following"),
+    "body_forces": _body_forces,
+    "tip_mass": _mass,
+    "gravity": partial(vector, what="gravity", form="m/s^2, in the world"),
+}
 EXTERNAL = tuple(one.name for one in fields(ExternalLoad))
 _DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))
 NOTHING = ExternalLoad()

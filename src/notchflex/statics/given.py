@@ -91,6 +91,8 @@ def table(value: Any, what: str) -> np.ndarray:
     Raises:
         InputError: They are no such numbers.
     """
+    if type(value) is np.ndarray and value.dtype == float:
+        return value
     try:
         if value is None or np.asarray(value).dtype.kind not in "iufO":
             raise TypeError

@@ -70,6 +70,7 @@ class Layout:
     older: int
     wrench: int
     turn: int
+    follows: bool
     by_stroke: bool
 
     @property
@@ -86,12 +87,20 @@ class Layout:
     def beyond(self) -> int:
         """Numbers that come back, tendons' drawn and stretched lengths last."""
         lengths = (1 + self.by_stroke) * sum(self.tendons)
-        return self.older * self.wrench + bool(self.turn) * self.wrench + lengths
+        return self.older * self.wrench + self.outside + lengths
+
+    @property
+    def outside(self) -> int:
+        """Numbers that say how the loads from outside beyond change.
+
+        Forces that keep their direction change as the body turns that they are seen from; only
+        their moment comes back.
+        """
+        return self.wrench if self.turn and self.follows else self.turn
 
     def units(self) -> Units:
         """Unit rows of everything, in order."""
         wrench = [self.wrench] * self.older
-        outside = self.wrench if self.turn else 0
         sizes = [
             (self.modes,),
             self.lips,
@@ -100,7 +109,7 @@ class Layout:
             (self.turn,),
             self.tendons,
             wrench,
-            (outside,),
+            (self.outside,),
             self.tendons,
             self.tendons if self.by_stroke else (),
         ]
@@ -125,5 +134,6 @@ def layout(chain: Chain, *, by_stroke: bool) -> Layout:
         older=chain.window - 1 if wrench else 0,
         wrench=wrench,
         turn=(3 if wrench == 6 else 1) if chain.loaded else 0,
+        follows=chain.follows,
         by_stroke=by_stroke,
     )

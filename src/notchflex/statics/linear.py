@@ -10,8 +10,8 @@ robot that only turns as a whole changes nothing. What is carried on are
 
 and what comes back are
 
-    the wrenches of spans and lips that end beyond; those of the loads; tendon set free and
-    stretched.
+    the wrenches of spans and lips that end beyond; those of the loads, or their moments alone;
+    tendon set free and stretched.
 
 Only the geometry of a span, an opening or a rod is differentiated by JAX, on its own.
 """
@@ -165,9 +165,19 @@ def _forces(
     if applied is not None and moves.turn is not None and at.rotation is not None:
         on_bodies = jax.tree.map(lambda leaf: leaf[1:], applied)
         turns = jax.vmap(_by_turn)(at.rotation, on_bodies)
+        total = cast("Array", wrenches.outside)
         own = jnp.einsum("nwa,naz->nwz", turns, moves.turn)
-        whole = whole + unit.outside[None] + own
-        behind.append(handed_back(unit.outside[None] + own, cast("Array", wrenches.outside)))
+        axes = moves.turn.shape[1]
+        if chain.follows:
+            outside = unit.outside[None] + own
+        else:
+            # All forces together keep their direction: they turn against the body.
+            against = -jax.vmap(wrench_turn)(total)[:, axes:, :axes]
+            forces = jnp.einsum("nwa,naz->nwz", against, moves.turn)
+            outside = jnp.concatenate([unit.outside[None] + own[:, :axes], forces], axis=1)
+        whole = whole + outside
+        back_here = handed_back(outside, total)
+        behind.append(back_here if chain.follows else back_here[:, :axes])
     return whole, behind
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from math import isfinite, nan
+from itertools import chain
+from math import isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,21 @@ class LoadPath:
             raise InputError(
                 "tension and stroke are both given for one tendon in one step; give one of them"
             )
+
+    @classmethod
+    def checked(
+        cls,
+        tension: np.ndarray,
+        stroke: np.ndarray,
+        base_rotation: np.ndarray,
+        external: tuple[ExternalLoad, ...],
+    ) -> LoadPath:
+        """A path of what needs no check any more; a control loop makes one for every solve."""
+        made = object.__new__(cls)
+        vars(made).update(
+            tension=tension, stroke=stroke, base_rotation=base_rotation, external=external
+        )
+        return made
 
     def __len__(self) -> int:
         """Number of steps."""
@@ -269,12 +285,14 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     }
     if len(turns) > 1:
         raise InputError("base_rotation must be the same for all loads of a path")
-    return LoadPath(
-        np.array([_entries(load.tension, tendons, "tension") for load in every]),
-        np.array([_entries(load.stroke, tendons, "stroke") for load in every]),
-        np.array(turns.pop()),
-        tuple(load.external for load in every),
-    )
+    tension = [_entries(load.tension, tendons, "tension") for load in every]
+    stroke = [_entries(load.stroke, tendons, "stroke") for load in every]
+    given = np.array(tension), np.array(stroke), np.array(turns.pop())
+    external = tuple(load.external for load in every)
+    pulled = all(map(isnan, chain.from_iterable(stroke)))
+    if pulled and not any(entry < 0.0 for entry in chain.from_iterable(tension)):
+        return LoadPath.checked(*given, external)
+    return LoadPath(*given, external)
 
 
 def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:

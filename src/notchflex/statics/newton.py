@@ -170,7 +170,7 @@ def newton(
         )
 
         def again() -> tuple[Point, Array]:
-            step = linear_step(chain, command, *here, at)
+            step = _moderate(chain, point, linear_step(chain, command, *here, at))
             # Where strokes are given, contacts that turn round must not be held up on their way.
             stops = command.by_stroke is None
             stopped = partial(_stopped_by_lips, chain, point.unknowns, at, step)
@@ -224,6 +224,24 @@ def newton(
         over=jnp.array(False),
     )
     return jax.lax.while_loop(searching, iterate, search).best
+
+
+def _moderate(chain: Chain, point: Point, step: Step) -> Step:
+    """A step that changes log ratios of slack tendons by no more than is of use.
+
+    Without tension they act on nothing, and a contact that sticks would throw them about: all that
+    matters is which way it slides. The rest of the step need not be shortened for their sake.
+    """
+    slack = (point.base_tension == 0.0) & (step.base_tension == 0.0)
+    logs = tuple(
+        jnp.where(
+            slack[jnp.array(group.numbers)][None, :, None],
+            jnp.clip(own, -_LARGEST_LOG_RATIO, _LARGEST_LOG_RATIO),
+            own,
+        )
+        for group, own in zip(chain.groups, step.unknowns.log_ratio, strict=True)
+    )
+    return step._replace(unknowns=step.unknowns._replace(log_ratio=logs))
 
 
 def _stopped_by_lips(

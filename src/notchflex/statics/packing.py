@@ -60,10 +60,8 @@ class Form:
         """
         leaves = self.structure.flatten_up_to(tree)
         xp = array_module(*leaves)
-        flat = [
-            xp.reshape(xp.asarray(leaf, dtype=float), (*np.shape(leaf)[:leading], -1))
-            for leaf in leaves
-        ]
+        arrays = [xp.asarray(leaf, dtype=float) for leaf in leaves]
+        flat = [array.reshape(*array.shape[:leading], -1) for array in arrays]
         return xp.concatenate(flat, axis=-1)
 
     def unpack(self, vector: Any) -> Any:

@@ -91,6 +91,7 @@ def prepared(
     level: str = "tendons",
     *,
     loaded: bool = False,
+    follows: bool = True,
     refinement: int = 0,
     flat: bool = True,
 ) -> Prepared:
@@ -98,7 +99,8 @@ def prepared(
 
     The last robots asked for are remembered: a control loop solves the same one again and again.
     """
-    return Prepared(assemble(robot, level, loaded=loaded, refinement=refinement, flat=flat))
+    how = {"loaded": loaded, "follows": follows, "refinement": refinement, "flat": flat}
+    return Prepared(assemble(robot, level, **how))
 
 
 def lengthened(ready: Prepared, flexures: int, edges: int) -> Prepared:

@@ -8,7 +8,7 @@ from notchflex.chain import tendons_in_plane
 from notchflex.errors import InputError
 from notchflex.flexure import LEVELS
 from notchflex.robot import Robot
-from notchflex.statics.applied import is_planar, is_unloaded
+from notchflex.statics.applied import follows, is_planar, is_unloaded
 from notchflex.statics.command import command
 from notchflex.statics.equilibrium import Equilibrium
 from notchflex.statics.load import Load, LoadPath, load_path
@@ -160,7 +160,8 @@ def prepared_for(
         level = "space"
     if from_state is not None:
         level = max(level, from_state.level, key=LEVELS.index)
-    return prepared(robot, level, loaded=loaded, refinement=refinement)
+    turning = loaded and (follows(load) or (from_state is not None and from_state.follows))
+    return prepared(robot, level, loaded=loaded, follows=turning, refinement=refinement)
 
 
 __all__ = ["simulate", "solve", "solve_each"]

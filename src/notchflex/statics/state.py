@@ -65,6 +65,12 @@ class State:
             raise InputError(f"the state cannot be written to {path}: {reason}") from None
 
     @property
+    def follows(self) -> bool:
+        """Whether any load in it turns with a body."""
+        applied = self.solved.applied
+        return applied is not None and bool(np.any(applied.following))
+
+    @property
     def arrays(self) -> dict[str, np.ndarray]:
         """Its numbers by name."""
         leaves, _ = tree_util.tree_flatten_with_path(self.solved)
@@ -116,6 +122,11 @@ class SavedState:
     loaded: bool
     refinement: int
     source: str
+
+    @property
+    def follows(self) -> bool:
+        """Whether any load in it may turn with a body."""
+        return self.loaded
 
     def fitted(self, chain: Chain) -> Solved:
         """The state for a chain.
