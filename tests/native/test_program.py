@@ -204,3 +204,19 @@ def test_what_is_not_known_is_said():
         program(jnp.sort, [np.ones(4)], (4,))
     with pytest.raises(UnknownHereError, match="long"):
         program(lambda v: jnp.sin(v[:, None] * v[None, :] + 1.0), [np.ones(700)], ())
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_lanes_picked_in_any_order(size):
+    """Every second lane, shifted ones, and a few of several rows put together."""
+
+    def function(vector):
+        table, _ = parted(vector, size)
+        rows = jnp.sin(table[:, :, 0]) * table[:, :, 1]
+        even, odd = rows[::2], rows[1::2]
+        joined = even[: len(odd)] * odd
+        mixed = jnp.concatenate([rows[size // 2 :], rows[: size // 2, ::-1]])
+        around = rows[(7 * np.arange(size)) % size]
+        return joined, mixed * rows, around - rows, rows[1:] / (2.0 + rows[:-1])
+
+    check(function, given(size), long=(size, size + 1))

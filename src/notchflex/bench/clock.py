@@ -11,6 +11,8 @@ from threadpoolctl import threadpool_limits
 
 # Time one case may take when it is repeated, s, and how often it is repeated at least.
 _ENOUGH, _FEWEST = 1.5, 5
+# What is compared takes turns, so many times: the speed of a machine changes from second to second.
+_ROUNDS = 10
 _UNKNOWNS = 135
 
 
@@ -52,7 +54,14 @@ class Clock:
         with threadpool_limits(1):
             return _median(lambda: np.linalg.solve(self._matrix, self._right), repeats)
 
-    def time(self, name: str, run: Callable[[], object], per: float, target: float | None) -> Row:
+    def time(
+        self,
+        name: str,
+        run: Callable[[], object],
+        per: float,
+        target: float | None,
+        other: Callable[[], object] | None = None,
+    ) -> tuple[Row, float]:
         """Time a function that has been called before.
 
         Args:
@@ -60,14 +69,24 @@ class Clock:
             run: The function.
             per: How many solves or steps it does.
             target: What is aimed at, multiples of LU135.
+            other: What else it is compared with.
+
+        Returns:
+            The line of the table, and the time in multiples of that of the other.
         """
         started = time.perf_counter()
         run()
         once = time.perf_counter() - started
-        before = self.lu135()
-        taken = _median(run, max(_FEWEST, min(300, int(_ENOUGH / max(once, 1e-6)))))
-        unit = 0.5 * (before + self.lu135())
-        return Row(name, taken / per, taken / per / unit, target)
+        repeats = max(_FEWEST, min(300, int(_ENOUGH / max(once, 1e-6))))
+        rounds = min(_ROUNDS, repeats)
+        taken, unit, others = (np.full(rounds, np.nan) for _ in range(3))
+        for number in range(rounds):
+            unit[number] = self.lu135(_FEWEST)
+            taken[number] = _median(run, -(-repeats // rounds)) / per
+            if other is not None:
+                others[number] = _median(other, -(-repeats // rounds))
+        row = Row(name, float(np.median(taken)), float(np.median(taken / unit)), target)
+        return row, float(np.median(taken / others))
 
 
 def _median(run: Callable[[], object], repeats: int) -> float:

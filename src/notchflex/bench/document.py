@@ -38,27 +38,32 @@ def measured(only: str | None = None, told: Callable[[str], None] | None = None)
     wanted |= {case.of for case in CASES if case.name in wanted}
     clock = Clock()
     rows: dict[str, Row] = {}
+    runs: dict[str, Callable[[], object]] = {}
     for one in every:
         if one.name not in wanted:
             continue
         if told is not None:
             told(one.name)
-        rows[one.name] = _case(one, clock, rows) if isinstance(one, Case) else _process(one, clock)
+        if isinstance(one, Process):
+            rows[one.name] = _process(one, clock)
+        else:
+            runs[one.name] = one.make()
+            rows[one.name] = _case(one, clock, rows, runs)
     return list(rows.values())
 
 
-def _case(case: Case, clock: Clock, rows: dict[str, Row]) -> Row:
-    run = case.make()
+def _case(
+    case: Case, clock: Clock, rows: dict[str, Row], runs: dict[str, Callable[[], object]]
+) -> Row:
+    run = runs[case.name]
     run()
-    row = clock.time(case.name, run, case.per, case.target)
+    row, times = clock.time(case.name, run, case.per, case.target, runs.get(case.of))
     if not case.of or case.target is None:
         return row
     base = rows[case.of]
-    assert base.us is not None
     assert base.lu135 is not None
-    assert row.us is not None
-    ratio = f"{row.us / base.us:.2f} times '{case.of}'; target {case.target:.3g} times"
-    return replace(row, target=case.target * base.lu135, note=ratio)
+    note = f"{times:.2f} times '{case.of}'; target {case.target:.3g} times"
+    return replace(row, target=case.target * base.lu135, note=note)
 
 
 def _process(process: Process, clock: Clock) -> Row:

@@ -199,7 +199,7 @@ def pull_change(
     at_end = _tail(rod).wrench(wrench)
     end = own.rotation[-1]
     force = end @ at_end[axes:]
-    arms = _moments(own.stepped, force)
+    arms = _arms(rod, own, force)
     turn = own.turn[:-1]
     # Half of what two turns, one after the other, do to a step along the force, both ways round.
     along = 0.5 * (own.step @ force)
@@ -212,6 +212,16 @@ def pull_change(
         small = jax.jacfwd(lambda varied: _small_twist(rod, varied).T @ at_end)(modes)
         change = jnp.where(rod.small > 0.0, small, change)
     return change
+
+
+def _arms(rod: Rod, own: Bent, force: Array) -> Float[Array, "gauss a modes"]:
+    """Moments of a force that moves along with each step, per unit of mode, about the start."""
+    if len(force) == 3:
+        return _moments(own.stepped, force)
+    # A number, whichever way the axes are turned: the force is, and not the steps of all modes.
+    across = jnp.stack([-force[1], force[0]])
+    across = jnp.einsum("gdc,d->gc", own.rotation[:-1], across)
+    return jnp.einsum("gc,gci->gi", across, rod.step[..., 1:])[:, None]
 
 
 def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:

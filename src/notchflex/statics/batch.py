@@ -210,14 +210,16 @@ def _put(
 ) -> None:
     """Put the values of some rows where they belong; robots with fewer notches leave NaN."""
     if name not in found:
-        found[name] = np.zeros((count, *values.shape[1:]), values.dtype)
-        if values.dtype == float:
-            found[name].fill(np.nan)
+        found[name] = np.empty((count, *values.shape[1:]), values.dtype)
     shape = tuple(np.maximum(found[name].shape[1:], values.shape[1:]))
     if shape != found[name].shape[1:]:
         wider = [(0, 0), *((0, b - a) for a, b in zip(found[name].shape[1:], shape, strict=True))]
         found[name] = np.pad(found[name], wider, constant_values=np.nan)
-    found[name][(rows, *(slice(size) for size in values.shape[1:]))] = values
+    first, last = int(rows[0]), int(rows[-1]) + 1
+    own = rows if last - first > len(rows) else slice(first, last)
+    if shape != values.shape[1:]:
+        found[name][own] = np.nan
+    found[name][(own, *(slice(size) for size in values.shape[1:]))] = values
 
 
 @dataclass(frozen=True)
@@ -249,14 +251,17 @@ class _Table:
 
     def run(self, start: int, numbers: np.ndarray) -> dict[str, np.ndarray]:
         """Solve a piece of the rows."""
-        index = np.arange(start, min(start + self.piece, len(self.rows)))
-        commands = self.commands[index if len(self.commands) > 1 else np.zeros_like(index)]
+        stop = min(start + self.piece, len(self.rows))
+        index = slice(start, stop)
+        commands = self.commands[index]
+        if len(self.commands) == 1:
+            commands = np.repeat(self.commands, stop - start, axis=0)
         one_robot = len(self.chains) == 1
         chains = self.chains[0] if one_robot else self.chains[index]
         forms = (self.chain_form, self.command_form, self.outputs)
         by_row = (not one_robot, True, False)
         came = followed_row.rows(by_row, chains, commands, numbers, *forms)
-        own = self.flexures[index if len(self.flexures) > 1 else np.zeros_like(index)]
+        own = self.flexures[index] if len(self.flexures) > 1 else self.flexures
         return {name: _of_own(name, values, own) for name, values in came.items()}
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from itertools import chain
 from math import isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
 
 from notchflex.errors import InputError
 from notchflex.statics.external import NOTHING, BodyForce, ExternalLoad
@@ -128,6 +130,21 @@ class LoadPath:
         """Number of steps."""
         return len(self.tension)
 
+    @cached_property
+    def different(self) -> list[ExternalLoad]:
+        """What acts from outside, each different load once, in order."""
+        if len(self.external) == 1:
+            return list(self.external)
+        # Usually all steps carry the very same, which is sooner seen than that they are equal.
+        return list(dict.fromkeys({id(one): one for one in self.external}.values()))
+
+    @cached_property
+    def which(self) -> Int[np.ndarray, " s"]:
+        """Which of the different loads acts at each step."""
+        number = {one: i for i, one in enumerate(self.different)}
+        seen = {id(one): number[one] for one in {id(one): one for one in self.external}.values()}
+        return np.array([seen[id(one)] for one in self.external])
+
     def release(self) -> LoadPath:
         """The same way there and back, the peak twice.
 
@@ -218,12 +235,14 @@ class LoadPath:
         }
         given = {name: value for name, value in every.items() if value is not None}
         # Usually all steps carry the same: each different load is made and checked once.
-        changed = {one: replace(one, **given) for one in dict.fromkeys(self.external)}
-        return replace(self, external=tuple(changed[one] for one in self.external))
+        changed = [replace(one, **given) for one in self.different]
+        return replace(self, external=tuple(changed[number] for number in self.which.tolist()))
 
     def for_tendons(self, count: int) -> LoadPath:
         """The same path for a robot of so many tendons; tendons not named hang slack."""
         given = self.tension.shape[1]
+        if given == count:
+            return self
         if given > count:
             raise InputError(
                 f"the load commands {given} tendons, but the robot has {count}; "
@@ -299,7 +318,8 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     """What acts from outside, one entry per step."""
     try:
         given = tuple(external)
-        if not all(isinstance(one, ExternalLoad) for one in given):
+        different = {id(one): one for one in given}
+        if not all(isinstance(one, ExternalLoad) for one in different.values()):
             raise TypeError
     except TypeError:
         raise InputError(
@@ -311,8 +331,9 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
             f"external of a load path has {len(given)} entries, but there are {steps} steps; "
             "give one per step"
         )
-    plain = tuple(one.external if isinstance(one, Load) else one for one in given)
-    return plain or (NOTHING,) * steps
+    if any(isinstance(one, Load) for one in different.values()):
+        given = tuple(one.external for one in given)
+    return given or (NOTHING,) * steps
 
 
 def _entries(value: Any, tendons: int, what: str) -> list[float]:

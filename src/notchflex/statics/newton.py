@@ -15,7 +15,7 @@ from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual, stroke
 from notchflex.statics.element import Memory, Unknowns, pressed
 from notchflex.statics.play import played
-from notchflex.statics.sweep import Step, linear_step
+from notchflex.statics.sweep import ONE_BY_ONE, Step, linear_step
 from notchflex.statics.walk import Evaluation, evaluate
 
 
@@ -118,6 +118,7 @@ def newton(
     before: Float[Array, " t"],
     start: Point,
     settings: Settings,
+    one_by_one: int = ONE_BY_ONE,
 ) -> NewtonResult:
     """Find the equilibrium under a command near a starting point.
 
@@ -131,6 +132,7 @@ def newton(
         before: Base tensions of the last solved state, N.
         start: Where to begin.
         settings: How hard to try.
+        one_by_one: As for `linear_step`.
 
     Returns:
         The result; a failure is told by `converged`, never raised.
@@ -155,8 +157,10 @@ def newton(
         residual = ravel_pytree((at.residual, demand))[0]
         largest, size = jnp.max(jnp.abs(residual)), jnp.linalg.norm(residual)
         unlimited = (best.iterations < _UNLIMITED) & (best.residual >= _ROUNDING * tolerance)
-        better = (size <= search.allowed) | (unlimited & jnp.isfinite(size))
-        at_rounding = (best.residual < _ROUNDING * tolerance) & (largest >= best.residual)
+        falls = size <= search.allowed
+        better = falls | (unlimited & jnp.isfinite(size))
+        near = best.residual < _ROUNDING * tolerance
+        at_rounding = near & (largest >= best.residual) & ~falls
         taken = better | (jnp.isfinite(size) & (search.tries >= _TRIES) & ~at_rounding)
         solved = taken & (largest < tolerance)
         found = NewtonResult(
@@ -170,7 +174,8 @@ def newton(
         )
 
         def again() -> tuple[Point, Array]:
-            step = _moderate(chain, point, linear_step(chain, command, *here, at))
+            step = linear_step(chain, command, *here, at, one_by_one)
+            step = _moderate(chain, point, step)
             # Where strokes are given, contacts that turn round must not be held up on their way.
             stops = command.by_stroke is None
             stopped = partial(_stopped_by_lips, chain, point.unknowns, at, step)

@@ -99,8 +99,9 @@ def prepared(
 
     The last robots asked for are remembered: a control loop solves the same one again and again.
     """
-    how = {"loaded": loaded, "follows": follows, "refinement": refinement, "flat": flat}
-    return Prepared(assemble(robot, level, **how))
+    return Prepared(
+        assemble(robot, level, loaded=loaded, follows=follows, refinement=refinement, flat=flat)
+    )
 
 
 def lengthened(ready: Prepared, flexures: int, edges: int) -> Prepared:

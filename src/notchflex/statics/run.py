@@ -35,31 +35,51 @@ _TOLD = 7
 
 
 class Run:
-    """States of many loads, loads as leading axis.
-
-    Attributes:
-        residual: Largest scaled imbalance of the last attempt.
-        iterations: Newton iterations.
-        converged: Whether the load was reached.
-        tried: Whether it was tried at all; after a failure the rest of a path is not.
-        reached: Part of the way from the load before that was reached.
-        parts: How many parts of that way were solved one after the other.
-        part_before: Part of the way at which the last of them began.
-    """
+    """States of many loads, loads as leading axis."""
 
     def __init__(
         self, prepared: Prepared, start: np.ndarray, table: np.ndarray, count: int
     ) -> None:
         """Take what the program returned, of which the first rows count."""
         self._prepared, self._first, self._table, self._count = prepared, start, table, count
-        told = table[:count, -_TOLD:]
-        self.residual: Float[np.ndarray, " s"] = told[:, 0]
-        self.iterations: Int[np.ndarray, " s"] = told[:, 1].astype(int)
-        self.converged: Bool[np.ndarray, " s"] = told[:, 2] != 0.0
-        self.tried: Bool[np.ndarray, " s"] = told[:, 3] != 0.0
-        self.reached: Float[np.ndarray, " s"] = told[:, 4]
-        self.parts: Int[np.ndarray, " s"] = told[:, 5].astype(int)
-        self.part_before: Float[np.ndarray, " s"] = told[:, 6]
+
+    def _told(self, number: int) -> np.ndarray:
+        return self._table[: self._count, number - _TOLD]
+
+    @cached_property
+    def residual(self) -> Float[np.ndarray, " s"]:
+        """Largest scaled imbalance of the last attempt."""
+        return self._told(0)
+
+    @cached_property
+    def iterations(self) -> Int[np.ndarray, " s"]:
+        """Newton iterations."""
+        return self._told(1).astype(int)
+
+    @cached_property
+    def converged(self) -> Bool[np.ndarray, " s"]:
+        """Whether the load was reached."""
+        return self._told(2) != 0.0
+
+    @cached_property
+    def tried(self) -> Bool[np.ndarray, " s"]:
+        """Whether it was tried at all; after a failure the rest of a path is not."""
+        return self._told(3) != 0.0
+
+    @cached_property
+    def reached(self) -> Float[np.ndarray, " s"]:
+        """Part of the way from the load before that was reached."""
+        return self._told(4)
+
+    @cached_property
+    def parts(self) -> Int[np.ndarray, " s"]:
+        """How many parts of that way were solved one after the other."""
+        return self._told(5).astype(int)
+
+    @cached_property
+    def part_before(self) -> Float[np.ndarray, " s"]:
+        """Part of the way at which the last of them began."""
+        return self._told(6)
 
     @property
     def states(self) -> Float[np.ndarray, "s state"]:

@@ -15,6 +15,7 @@ from notchflex.statics.applied import Applied
 from notchflex.statics.element import Memory, Unknowns
 from notchflex.statics.newton import NewtonResult, Point, Settings, newton
 from notchflex.statics.play import played
+from notchflex.statics.sweep import ONE_BY_ONE
 
 
 class Solved(NamedTuple):
@@ -83,7 +84,14 @@ def unloaded(chain: Chain) -> Applied | None:
     return Applied(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
 
 
-def advance(chain: Chain, command: Command, last: Solved, settings: Settings) -> Advance:
+def advance(
+    chain: Chain,
+    command: Command,
+    last: Solved,
+    settings: Settings,
+    *,
+    one_by_one: int = ONE_BY_ONE,
+) -> Advance:
     """Follow a load from a solved state.
 
     The whole way is tried first. Where Newton's method fails, the way is halved until it
@@ -97,6 +105,7 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
         command: The load.
         last: The solved state before.
         settings: How hard to try.
+        one_by_one: As for `sweep.linear_step`.
 
     Returns:
         What came of it.
@@ -108,7 +117,8 @@ def advance(chain: Chain, command: Command, last: Solved, settings: Settings) ->
         tension = wanted.either(solved.point.base_tension, wanted.value)
         guess = played(chain, solved.point.base_tension, tension, solved.memory)
         start = Point(solved.point.unknowns._replace(log_ratio=guess), tension)
-        found = newton(chain, wanted, solved.memory, solved.point.base_tension, start, settings)
+        before = solved.point.base_tension
+        found = newton(chain, wanted, solved.memory, before, start, settings, one_by_one)
         return found, wanted
 
     def going(state: tuple[Advance, Array, Array]) -> Bool[Array, ""]:

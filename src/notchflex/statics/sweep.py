@@ -34,8 +34,8 @@ from notchflex.statics.linear import blocks
 from notchflex.statics.walk import Evaluation
 
 _HELD, _TIED = 1e-9, 1e-7
-# So many parts of the chain are not worth to be joined side by side.
-_ONE_BY_ONE = 4
+# So many parts of the chain are joined one by one, where a vector holds what is done to several.
+ONE_BY_ONE = 4
 
 
 class Step(NamedTuple):
@@ -57,6 +57,7 @@ def linear_step(
     memory: Memory,
     base_tension: Float[Array, " t"],
     at: Evaluation,
+    one_by_one: int = ONE_BY_ONE,
 ) -> Step:
     """Solve the linearised balance for the step that would meet it.
 
@@ -67,6 +68,8 @@ def linear_step(
         memory: What its contacts remember.
         base_tension: Its base tensions, N.
         at: Its evaluation there.
+        one_by_one: How many parts of the chain are joined one after the other and not side by side:
+            that is less to do, but nothing can be done at once.
 
     Its derivatives are those of the imbalance it meets, not those of the linear system: a step
     from a solved state then changes as the solution does (implicit function theorem).
@@ -89,7 +92,7 @@ def linear_step(
 
     ports = Ports(answered(rows.onward), answered(rows.behind))
     levels: list[Ports] = []
-    while len(ports.onward) > _ONE_BY_ONE:
+    while len(ports.onward) > one_by_one:
         between, ports = _joined(ports, form.carried)
         levels.append(between)
     leave = _leaving(chain, form)
