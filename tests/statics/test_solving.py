@@ -242,3 +242,26 @@ def test_a_notch_that_would_pass_through_itself_is_no_answer():
         state = nf.solve(robot, nf.Load(tip_moment=(0.0, -moment, 0.0)))
         assert not state.converged
         assert "half a turn" in state.reason or "equilibrium" in state.reason
+
+
+def test_a_notch_bent_about_several_axes_at_once_is_not_known():
+    # Draw 10066 of seed 5 of benchmarks/robustness.py in short: bent by 105 degrees in one notch,
+    # sideways and twisted. Its balance, added up outside the solver, is off by 1e-5.
+    robot = nf.Robot(
+        name="far",
+        tube=nf.Tube(4.516, 2.258, base_length=3.68),
+        notch=tuple(
+            nf.ArcNotch("on-axis", depth, height, uncut_length=1.351)
+            for depth, height in ((3.074, 3.249), (3.247, 3.293), (3.213, 3.285))
+        ),
+        tendon=(nf.Tendon(0.852),),
+        material=nf.Superelastic(18135.0, 6670.0, 0.02509, plastic_strain=0.1),
+        friction=nf.Capstan(0.0666, wrap="geometric"),
+    )
+    tip = {"tip_force": (-83.75, -37.02, 88.01), "tip_moment": (293.8, -956.7, 491.9)}
+    body = nf.BodyForce(1, force=(8.696, 25.46, 57.52))
+    load = nf.Load(tension=49.06, **tip, following=True, body_forces=[body], tip_mass=12950.0)
+    state = nf.solve(robot, load)
+    assert not state.converged
+    assert "several axes" in state.reason
+    assert nf.solve(robot, nf.Load(tension=49.06, tip_force=(-0.5, -0.2, 0.5))).converged

@@ -6,7 +6,7 @@ from notchflex.flexure.elastica import Elastica, elastica, modulus_from_single_n
 from notchflex.flexure.plane import flattened
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
-from notchflex.flexure.shape import free_pose, pull_change, relative_pose, rod_end
+from notchflex.flexure.shape import free_pose, pull_change, relative_pose, rod_end, turn_doubt
 from notchflex.flexure.state import (
     FlexureState,
     fibre_slope,
@@ -39,5 +39,6 @@ __all__ = [
     "rod",
     "rod_end",
     "stack",
+    "turn_doubt",
     "with_level",
 ]

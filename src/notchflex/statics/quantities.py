@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex.chain import Chain
-from notchflex.flexure import FlexureState, in_space, relative_pose
+from notchflex.flexure import FlexureState, in_space, relative_pose, turn_doubt
 from notchflex.motion import IN_PLANE, Motion, wrench_at
 from notchflex.statics.applied import Applied, body_wrench
 from notchflex.statics.element import Unknowns, at_bound
@@ -21,6 +21,8 @@ from notchflex.statics.walk import Evaluation, body_poses, evaluate, per_tendon
 
 # A state whose moments are off by this part of the largest is none.
 MODES_FAIL = 0.35
+# A state whose turns are known worse is none, rad.
+_DOUBT = 1e-6
 
 
 class Shape(NamedTuple):
@@ -76,14 +78,21 @@ def shape(chain: Chain, solved: Solved) -> Shape:
         tip_position=last.point(jnp.array([0.0, 0.0, 1.0]) * chain.body_length[-1]),
         friction_holds=jnp.all(chain.friction.valid(turning[0], turning[1])),
         moment_error=moment_error(chain, point.unknowns, at),
-        bend_possible=_bend_possible(chain, at.flexure),
+        bend_possible=_bend_possible(chain, point.unknowns.modes, at.flexure),
     )
 
 
-def _bend_possible(chain: Chain, flexure: FlexureState) -> Bool[Array, ""]:
-    """Whether every flexure is bent by less than half a turn, and no fibre shortened to nothing."""
+def _bend_possible(
+    chain: Chain, modes: Float[Array, "n modes"], flexure: FlexureState
+) -> Bool[Array, ""]:
+    """Whether every flexure is bent as it can be, and as its pose can be computed.
+
+    By less than half a turn, with no fibre shortened to nothing, and not so far about several axes
+    that the order of its turns is not known well.
+    """
     turn = jnp.sum(flexure.bend**2, axis=-1) < np.pi**2
-    return jnp.all(turn) & jnp.all(_fibre_strain(chain, flexure) < 1.0)
+    known = jax.vmap(turn_doubt)(chain.rods, modes) < _DOUBT
+    return jnp.all(turn & known) & jnp.all(_fibre_strain(chain, flexure) < 1.0)
 
 
 def _fibre_strain(chain: Chain, flexure: FlexureState) -> Float[Array, "n nodes"]:

@@ -25,8 +25,8 @@ def why_not(path: Path, step: int) -> str:
         return f"not tried, because step {failed + 1} of the path did not converge"
     if path.run.converged[step] and not path.run.quantity("bend_possible")[step]:
         return (
-            "a notch is bent by more than half a turn, or so sharply that a fibre would have "
-            "no length left; take smaller loads"
+            "a notch is bent by more than half a turn, so sharply that a fibre would have no "
+            "length left, or too far about several axes at once; take smaller loads"
         )
     if path.run.converged[step] and path.run.quantity("friction_holds")[step]:
         return (
