@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jnp
-from notchflex._kept import kept
 from notchflex._native import native
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
@@ -24,12 +23,11 @@ from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form, lane_sizes
 from notchflex.statics.prepare import Prepared
 from notchflex.statics.quantities import Quantities, Shape, notch_lips, quantities, shape
-from notchflex.statics.stability import held_stiffness
+from notchflex.statics.sizes import padded, size
+from notchflex.statics.stability import stability
 from notchflex.statics.stepping import Solved, advance
 from notchflex.statics.walk import evaluate
 
-# Numbers of loads that programs are compiled for: a solve, a usual path, and longer ones.
-_SIZES = (1, 128, 4096)
 # Beside states and shape: residual, iterations, converged, tried, reached, parts, part before.
 _TOLD = 7
 
@@ -156,29 +154,13 @@ def run(
     count = len(commands.value)
     form = prepared.command_form(commands)
     packed = form.pack(commands, leading=1)
-    if count != _size(count):
-        packed = packed[_padded(count)]
+    if count != size(count):
+        packed = packed[padded(count)]
     options = _options(settings, each_from_start, count)
     forms = (prepared.known_form, form, prepared.state)
     first = prepared.rest_vector if start is None else np.asarray(prepared.state.pack(start))
     table = _follow(prepared.known_vector, packed, first, options, *forms)
     return Run(prepared, first, table, count)
-
-
-def stability(
-    prepared: Prepared, commands: Command, solved: Solved
-) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
-    count = len(commands.value)
-    items = (_pad(commands), _pad(solved), np.array(count))
-    stiffness, sign = _stability(prepared.vector, *items, prepared.chain_form)
-    # Modes that only fill up the arrays are none of the robot's.
-    own = np.flatnonzero(np.asarray(prepared.chain.rods.idle).ravel() == 0.0)
-    held = np.asarray(stiffness)[:count][:, own[:, None], own]
-    whole = np.isfinite(held).all(axis=(1, 2))
-    eigenvalue = np.full(count, np.nan)
-    eigenvalue[whole] = np.real(np.linalg.eigvals(held[whole])).min(axis=-1)
-    return eigenvalue, np.asarray(sign)[:count]
 
 
 def lips(
@@ -229,22 +211,6 @@ def _options(
 ) -> Float[np.ndarray, " options"]:
     """What is told to `_follow` beside robot, loads and start, kept for the next time."""
     return np.array([*settings.numbers, float(each_from_start), float(count)])
-
-
-def _size(count: int) -> int:
-    """The number of loads that programs are compiled for."""
-    return next((size for size in _SIZES if size >= count), -(-count // _SIZES[-1]) * _SIZES[-1])
-
-
-def _padded(count: int) -> Int[np.ndarray, " size"]:
-    """Entries up to one of the sizes, the last one repeated."""
-    return np.minimum(np.arange(_size(count)), count - 1)
-
-
-def _pad(tree: Any) -> Any:
-    """Repeat the last entry until the leading axis has one of the sizes."""
-    index = _padded(len(jax.tree.leaves(tree)[0]))
-    return jax.tree.map(lambda leaf: np.asarray(leaf)[index], tree)
 
 
 @native(4, lane_sizes)
@@ -314,23 +280,3 @@ def _quantities(
         return jax.lax.cond(number < count, told, lambda: nothing)
 
     return jax.lax.map(of_row, (states, jnp.arange(len(states), dtype=float)))
-
-
-@kept(4)
-def _stability(
-    vector: Float[Array, " chain"],
-    commands: Command,
-    solved: Solved,
-    count: Array,
-    chain_form: Form,
-) -> tuple[Array, Array]:
-    chain = chain_form.unpack(vector)
-    modes = chain.stiffness.size
-
-    def one(item: tuple[Command, Solved, Array]) -> tuple[Array, Array]:
-        command, state, number = item
-        nothing = (jnp.full((modes, modes), jnp.nan), jnp.array(jnp.nan))
-        wanted = number < count
-        return jax.lax.cond(wanted, lambda: held_stiffness(chain, command, state), lambda: nothing)
-
-    return jax.lax.map(one, (commands, solved, jnp.arange(len(commands.value))))

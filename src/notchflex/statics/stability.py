@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
+from notchflex._kept import kept
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual
 from notchflex.statics.element import Memory, at_bound
 from notchflex.statics.newton import Point
+from notchflex.statics.packing import Form
+from notchflex.statics.prepare import Prepared
+from notchflex.statics.sizes import pad
 from notchflex.statics.stepping import Solved
 from notchflex.statics.walk import evaluate
 
@@ -79,3 +84,39 @@ def held_stiffness(
     )
     sign, _ = jnp.linalg.slogdet(matrix)
     return stiffness, sign
+
+
+def stability(
+    prepared: Prepared, commands: Command, solved: Solved
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
+    count = len(commands.value)
+    items = (pad(commands), pad(solved), np.array(count))
+    stiffness, sign = _stability(prepared.vector, *items, prepared.chain_form)
+    # Modes that only fill up the arrays are none of the robot's.
+    own = np.flatnonzero(np.asarray(prepared.chain.rods.idle).ravel() == 0.0)
+    held = np.asarray(stiffness)[:count][:, own[:, None], own]
+    whole = np.isfinite(held).all(axis=(1, 2))
+    eigenvalue = np.full(count, np.nan)
+    eigenvalue[whole] = np.real(np.linalg.eigvals(held[whole])).min(axis=-1)
+    return eigenvalue, np.asarray(sign)[:count]
+
+
+@kept(4)
+def _stability(
+    vector: Float[Array, " chain"],
+    commands: Command,
+    solved: Solved,
+    count: Array,
+    chain_form: Form,
+) -> tuple[Array, Array]:
+    chain = chain_form.unpack(vector)
+    modes = chain.stiffness.size
+
+    def one(item: tuple[Command, Solved, Array]) -> tuple[Array, Array]:
+        command, state, number = item
+        nothing = (jnp.full((modes, modes), jnp.nan), jnp.array(jnp.nan))
+        wanted = number < count
+        return jax.lax.cond(wanted, lambda: held_stiffness(chain, command, state), lambda: nothing)
+
+    return jax.lax.map(one, (commands, solved, jnp.arange(len(commands.value))))
