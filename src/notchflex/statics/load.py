@@ -308,10 +308,10 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     stroke = [_entries(load.stroke, tendons, "stroke") for load in every]
     given = np.array(tension), np.array(stroke), np.array(turns.pop())
     external = tuple(load.external for load in every)
-    pulled = all(map(isnan, chain.from_iterable(stroke)))
-    if pulled and not any(entry < 0.0 for entry in chain.from_iterable(tension)):
-        return LoadPath.checked(*given, external)
-    return LoadPath(*given, external)
+    entries = zip(chain.from_iterable(tension), chain.from_iterable(stroke), strict=True)
+    if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
+        return LoadPath(*given, external)  # which says what is wrong
+    return LoadPath.checked(*given, external)
 
 
 def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
