@@ -27,6 +27,15 @@ def test_loads_of_one_robot(wrist, margin):
     assert told[-1] == (70, 70)
 
 
+@pytest.mark.parametrize("steps", [4, 5, 6])
+def test_as_many_steps_as_flexures_or_bodies(wrist: nf.Robot, steps: int) -> None:
+    """What lies along the steps is not taken for what lies along the chain."""
+    paths = [nf.pull(0.0, 1.0 + 0.1 * number, steps=steps) for number in range(9)]
+    found = nf.simulate_batch(wrist, paths)["total_angle"]
+    alone = [nf.simulate(wrist, path).total_angle for path in paths]
+    np.testing.assert_allclose(found, alone, atol=1e-11)
+
+
 def test_paths_remember(wrist, margin):
     paths = [nf.pull(0.0, top, steps=5).release() for top in (1.0, 1.5, 2.0)]
     names = ("total_angle", "contact_log_ratio", "iterations", "converged")

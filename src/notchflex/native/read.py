@@ -64,7 +64,9 @@ class Reader(Arranger):
             if own:
                 tables[number] = Memory("arena", places.size, rows=True)
             memory = tables.get(number) or Memory("given", places.size, number)
-            args.append(self._seen(memory, places, body if own else top))
+            block = body if own else top
+            with self.inside(block):
+                args.append(self._seen(memory, places, block))
         self.graph.block, self.rows = body, True
         put, sizes = self._handed(closed, args, lambda _: ("arena", None))
         self.graph.block, self.rows = top, False
