@@ -116,7 +116,7 @@ def turn_doubt(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
     hat = jnp.concatenate([jnp.ones(1), modes])
     turns, _ = _turns(rod, hat)
     second = jnp.einsum("kcab,b->kca", rod.turn_pair, hat) @ hat
-    return 0.1 * jnp.sum(jnp.linalg.norm(turns, axis=-1) * jnp.linalg.norm(second, axis=-1))
+    return 0.05 * jnp.sum(jnp.linalg.norm(turns, axis=-1) * jnp.linalg.norm(second, axis=-1))
 
 
 def _about(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:

@@ -22,7 +22,7 @@ from notchflex.statics.walk import Evaluation, body_poses, evaluate, per_tendon
 # A state whose moments are off by this part of the largest is none.
 MODES_FAIL = 0.35
 # A state whose turns are known worse is none, rad.
-_DOUBT = 1e-6
+_DOUBT = 2e-6
 
 
 class Shape(NamedTuple):
