@@ -190,7 +190,7 @@ def assemble(
         contacts=_contacts(laid.groups, len(tendons)),
         level=level,
         loaded=loaded,
-        follows=follows,
+        follows=loaded and follows,  # unloaded chains are of one form
         refinement=refinement,
         window=max((int(np.max(part.back)) for part in (*laid.groups, *shaped.lips)), default=1),
     )

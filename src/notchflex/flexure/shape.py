@@ -100,8 +100,13 @@ def _turns(
     """Rotation vectors from place to place, and their slopes by the modes."""
     xp = array_module(hat)
     parts = xp.concatenate([rod.turn[:1], rod.turn[1:] - rod.turn[:-1]])
-    by_pair = xp.einsum("kcab,b->kca", rod.turn_pair, hat)
+    by_pair = _by_pair(rod, hat)
     return (parts + by_pair) @ hat, parts[..., 1:] + 2.0 * by_pair[..., 1:]
+
+
+def _by_pair(rod: Rod, hat: Float[Array, " hat"]) -> Float[Array, "places 3 hat"]:
+    """What the order of turns adds from place to place, per unit of (1, modes)."""
+    return array_module(hat).einsum("kcab,b->kca", rod.turn_pair, hat)
 
 
 def turn_doubt(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
@@ -115,7 +120,7 @@ def turn_doubt(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, ""]:
         return jnp.zeros(())
     hat = jnp.concatenate([jnp.ones(1), modes])
     turns, _ = _turns(rod, hat)
-    second = jnp.einsum("kcab,b->kca", rod.turn_pair, hat) @ hat
+    second = _by_pair(rod, hat) @ hat
     return 0.05 * jnp.sum(jnp.linalg.norm(turns, axis=-1) * jnp.linalg.norm(second, axis=-1))
 
 

@@ -144,10 +144,8 @@ def _little(array: NDArray[Any]) -> Any:
 
 def _loads_of(path: Path) -> str:
     """The loads from outside: each different one, and which of them every step has."""
-    distinct = path.load.different
-    number = {one: i for i, one in enumerate(distinct)}
-    step = [number[one] for one in path.load.external]
-    return json.dumps({"distinct": [asdict(one) for one in distinct], "step": step})
+    distinct = [asdict(one) for one in path.load.different]
+    return json.dumps({"distinct": distinct, "step": path.load.which.tolist()})
 
 
 def _loads_from(text: str) -> tuple[Any, ...]:

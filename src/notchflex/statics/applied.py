@@ -69,8 +69,7 @@ def applied(
     Raises:
         InputError: A body that the robot does not have, or gravity where nothing has a mass.
     """
-    base = tuple(map(float, load_path.base_rotation))
-    axes = _axes(base, None if frame is None else tuple(frame.ravel().tolist()))
+    axes = _axes(_turn(load_path), None if frame is None else tuple(frame.ravel().tolist()))
     sums: list[tuple[np.ndarray, ...]] = []
     for external in load_path.different:
         _check(external, robot)
@@ -160,7 +159,7 @@ def is_planar(load_path: LoadPath, robot: Robot) -> bool:
     normal = bending_normal(robot)
     if normal is None:
         return False
-    turned = _base(load_path) @ normal
+    turned = _turned_by(_turn(load_path)) @ normal
     for external in load_path.different:
         # Only directions matter here: any mass will do, and where on the tube axis it is.
         forces = list(_forces(external, 0, 0.0))
@@ -196,8 +195,9 @@ def _along(vector: Sequence[float], normal: Float[np.ndarray, " 3"]) -> float:
     return vector[0] * x + vector[1] * y + vector[2] * z
 
 
-def _base(load_path: LoadPath) -> Float[np.ndarray, "3 3"]:
-    return _turned_by(tuple(map(float, load_path.base_rotation)))
+def _turn(load_path: LoadPath) -> tuple[float, ...]:
+    """Rotation vector of the base, by which rotations are looked up."""
+    return tuple(map(float, load_path.base_rotation))
 
 
 @lru_cache(maxsize=64)

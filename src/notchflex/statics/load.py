@@ -135,15 +135,19 @@ class LoadPath:
         """What acts from outside, each different load once, in order."""
         if len(self.external) == 1:
             return list(self.external)
-        # Usually all steps carry the very same, which is sooner seen than that they are equal.
-        return list(dict.fromkeys({id(one): one for one in self.external}.values()))
+        return list(dict.fromkeys(self._by_identity.values()))
 
     @cached_property
     def which(self) -> Int[np.ndarray, " s"]:
         """Which of the different loads acts at each step."""
         number = {one: i for i, one in enumerate(self.different)}
-        seen = {id(one): number[one] for one in {id(one): one for one in self.external}.values()}
+        seen = {identity: number[one] for identity, one in self._by_identity.items()}
         return np.array([seen[id(one)] for one in self.external])
+
+    @property
+    def _by_identity(self) -> dict[int, ExternalLoad]:
+        """Usually all steps carry the very same, which is sooner seen than that they are equal."""
+        return {id(one): one for one in self.external}
 
     def release(self) -> LoadPath:
         """The same way there and back, the peak twice.

@@ -166,16 +166,16 @@ def strand_of(
     in_body = body_tension * group.body_length[..., None]
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
     here = gap_tension * group.natural_gap[..., None] + in_body
-    drawn, slid = runs * unit.spread(cast("Array", sum(length))), unit.drawn[k][None]
-    stretch = None
+    beyond = unit.drawn[k][None]
+    drawn = beyond - runs * unit.spread(cast("Array", sum(length)))
     if unit.stretch is None:
-        drawn = slid - drawn + here / stiffness
-        at_exit, at_entry = drawn, slid + in_body / stiffness
+        stretch = None
+        at_exit = drawn = drawn + here / stiffness
+        at_entry = beyond + in_body / stiffness
     else:
         stretch = unit.stretch[k][None] + here
-        drawn = slid - drawn
         at_exit = drawn + stretch / stiffness
-        at_entry = slid + (unit.stretch[k][None] + in_body) / stiffness
+        at_entry = beyond + (unit.stretch[k][None] + in_body) / stiffness
     return Strand(
         turning=cast("Array", sum(turning)),
         wrench=wrench,
