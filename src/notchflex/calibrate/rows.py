@@ -7,9 +7,7 @@ theorem, `statics.sensitivity`).
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -17,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Array, Float
 
+from notchflex._cores import number_of_cores, on_cores
 from notchflex._jax import jax, jnp
 from notchflex._kept import kept
 from notchflex.chain import Chain
@@ -191,11 +190,7 @@ class Rows:
             return jax.tree.map(np.asarray, found)
 
         starts = range(0, len(index), piece)
-        if len(starts) == 1:
-            found = [some(0)]
-        else:
-            with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-                found = list(pool.map(some, starts))
+        found = [some(0)] if len(starts) == 1 else list(on_cores(some, starts))
         return self._gathered(found)
 
     @cached_property
@@ -223,7 +218,7 @@ class Rows:
 
 def _piece(paths: int) -> int:
     """How many paths are solved in one call of the program, so that all cores have work."""
-    each = -(-paths // (os.cpu_count() or 1))
+    each = -(-paths // number_of_cores())
     return next((size for size in _PIECES if size >= each), _PIECES[-1])
 
 

@@ -7,21 +7,20 @@ is bounded whatever the batch. Where JAX has a GPU they run there, whole pieces 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from notchflex._cores import on_cores
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.statics.actuation import filled
 from notchflex.statics.batch_rows import followed_row
 from notchflex.statics.command import command
-from notchflex.statics.given import shown
+from notchflex.statics.given import shown, whole
 from notchflex.statics.known import KnownForm
 from notchflex.statics.load import Load, LoadPath, joined_paths, load_path
 from notchflex.statics.newton import DEFAULT, Settings
@@ -103,7 +102,7 @@ def solve_batch(
         and holds the last good state.
 
     Raises:
-        InputError: Robots and loads that are not one or equally many, or no such output.
+        InputError: Robots and loads that are not one or equally many, no such output, or no core.
 
     Example:
         >>> from notchflex import load_robot, pull
@@ -142,8 +141,8 @@ def simulate_batch(
         Arrays by name, rows and then steps as leading axes.
 
     Raises:
-        InputError: Robots and paths that are not one or equally many, paths of unlike lengths, or
-            no such output.
+        InputError: Robots and paths that are not one or equally many, paths of unlike lengths, no
+            such output, or no core.
 
     Example:
         >>> from notchflex import load_robot, pull
@@ -181,6 +180,8 @@ def _simulate(
 ) -> dict[str, np.ndarray]:
     """Follow paths, given one after the other as a long one, each from rest."""
     asked = known_outputs(outputs)
+    if cores is not None and whole(cores, "cores") < 1:
+        raise InputError(f"cores must be 1 or more, or None for all; got {shown(cores)}")
     count = max(len(robots), paths)
     if len(robots) not in (1, count) or paths not in (1, count):
         raise InputError(
@@ -190,18 +191,19 @@ def _simulate(
     numbers = np.array([*(settings or DEFAULT).numbers])
     found: dict[str, np.ndarray] = {}
     done = 0
-    with ThreadPoolExecutor(cores or os.cpu_count() or 1) as pool:
-        work = [
-            (table.rows[start : start + table.piece], pool.submit(table.run, start, numbers))
-            for table in _tables(robots, joined, paths, count, asked, refinement)
-            for start in range(0, len(table.rows), table.piece)
-        ]
-        for rows, piece in work:
-            for name, values in piece.result().items():
-                _put(found, name, rows, values, count)
-            done += len(rows)
-            if progress is not None:
-                progress(done, count)
+    work = [
+        (table, start)
+        for table in _tables(robots, joined, paths, count, asked, refinement)
+        for start in range(0, len(table.rows), table.piece)
+    ]
+    came = on_cores(lambda piece: piece[0].run(piece[1], numbers), work, cores)
+    for (table, start), piece in zip(work, came, strict=True):
+        rows = table.rows[start : start + table.piece]
+        for name, values in piece.items():
+            _put(found, name, rows, values, count)
+        done += len(rows)
+        if progress is not None:
+            progress(done, count)
     return found
 
 

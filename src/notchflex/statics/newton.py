@@ -118,6 +118,7 @@ def newton(
     before: Float[Array, " t"],
     start: Point,
     settings: Settings,
+    enough: Float[Array, ""],
     one_by_one: int = ONE_BY_ONE,
 ) -> NewtonResult:
     """Find the equilibrium under a command near a starting point.
@@ -132,6 +133,7 @@ def newton(
         before: Base tensions of the last solved state, N.
         start: Where to begin.
         settings: How hard to try.
+        enough: Imbalance that is small enough, should it be above the tolerance.
         one_by_one: As for `linear_step`.
 
     Returns:
@@ -144,6 +146,7 @@ def newton(
     largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
     growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
     tolerance = settings.tolerance * growth
+    small_enough = jnp.maximum(tolerance, enough)
 
     def searching(search: _Search) -> Bool[Array, ""]:
         return ~search.over & (search.best.iterations <= settings.max_iterations)
@@ -162,7 +165,7 @@ def newton(
         near = best.residual < _ROUNDING * tolerance
         at_rounding = near & (largest >= best.residual) & ~falls
         taken = better | (jnp.isfinite(size) & (search.tries >= _TRIES) & ~at_rounding)
-        solved = taken & (largest < tolerance)
+        solved = taken & (largest < small_enough)
         found = NewtonResult(
             point=point,
             slid=tuple(span.slid for span in at.spans),
@@ -170,7 +173,7 @@ def newton(
             stroke=stroke(chain, point.base_tension, at.base),
             residual=largest,
             iterations=best.iterations + 1,
-            converged=largest < _ROUNDING * tolerance,
+            converged=solved | (largest < _ROUNDING * tolerance),
         )
 
         def again() -> tuple[Point, Array]:

@@ -58,6 +58,9 @@ class Advance(NamedTuple):
     part_before: Float[Array, ""]
 
 
+# A state on the way, of which memory alone is left, need not be within the tolerance, but within
+# this multiple of it.
+_ON_THE_WAY = 1e3
 # Part of the way at which the other loads are on, where they come before the tendons.
 _LOADS_ON = 0.5
 
@@ -118,7 +121,8 @@ def advance(
         guess = played(chain, solved.point.base_tension, tension, solved.memory)
         start = Point(solved.point.unknowns._replace(log_ratio=guess), tension)
         before = solved.point.base_tension
-        found = newton(chain, wanted, solved.memory, before, start, settings, one_by_one)
+        enough = jnp.where(part < 1.0, _ON_THE_WAY * settings.tolerance, 0.0)
+        found = newton(chain, wanted, solved.memory, before, start, settings, enough, one_by_one)
         return found, wanted
 
     def going(state: tuple[Advance, Array, Array]) -> Bool[Array, ""]:
