@@ -99,7 +99,7 @@ class Storage:
         else:
             rows = self.order.varies(number)
             unit = self.unit(rows)
-            room = (length + WIDTH) * unit
+            room = length * unit
             first = self.arena.room(room)
             self.rooms[number] = (first, room)
             place = Place("%arena", first, unit, rows)
