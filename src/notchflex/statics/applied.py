@@ -197,7 +197,7 @@ def _along(vector: Sequence[float], normal: Float[np.ndarray, " 3"]) -> float:
 
 def _turn(load_path: LoadPath) -> tuple[float, ...]:
     """Rotation vector of the base, by which rotations are looked up."""
-    return tuple(map(float, load_path.base_rotation))
+    return tuple(load_path.base_rotation.tolist())
 
 
 @lru_cache(maxsize=64)
@@ -244,7 +244,7 @@ def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
 
 
 class _Axes(NamedTuple):
-    """Axes, as columns, that sums are wanted along and about.
+    """Axes that sums are wanted along and about, as plain numbers: there are few, and rarely many.
 
     Attributes:
         along: In the frame of the bodies.
@@ -253,10 +253,10 @@ class _Axes(NamedTuple):
         held_about: Likewise.
     """
 
-    along: Float[np.ndarray, "3 d"]
-    about: Float[np.ndarray, "3 a"]
-    held_along: Float[np.ndarray, "3 d"]
-    held_about: Float[np.ndarray, "3 a"]
+    along: tuple[Sequence[float], ...]
+    about: tuple[Sequence[float], ...]
+    held_along: tuple[Sequence[float], ...]
+    held_about: tuple[Sequence[float], ...]
 
 
 @lru_cache(maxsize=64)
@@ -266,7 +266,13 @@ def _axes(base: tuple[float, ...], frame: tuple[float, ...] | None) -> _Axes:
     if frame is not None:
         own = np.reshape(frame, (3, 3))
         along, about = own[:, IN_PLANE], own[:, 1:2]
-    return _Axes(along, about, turn @ along, turn @ about)
+    columns = (along, about, turn @ along, turn @ about)
+    return _Axes(*(tuple(map(tuple, one.T.tolist())) for one in columns))
+
+
+def _components(vector: Sequence[float], axes: tuple[Sequence[float], ...]) -> list[float]:
+    x, y, z = vector
+    return [x * a + y * b + z * c for a, b, c in axes]
 
 
 def _sums(
@@ -278,24 +284,25 @@ def _sums(
 ) -> tuple[np.ndarray, ...]:
     """The sums for all bodies."""
     along, about, held_along, held_about = axes
-    count, d, a = len(body_mass), along.shape[1], about.shape[1]
-    held, turned = np.zeros((count, d)), np.zeros((count, a))
-    arm, following = np.zeros((count, d, d)), np.zeros((count, a + d))
+    count, d, a = len(body_mass), len(along), len(about)
+    moments, arms_end = d + a, d + a + d * d
+    table = np.zeros((count, arms_end + a + d))
     for body, force, moment, point, follows in _forces(external, count - 1, tip):
-        own, turning, place = np.array(force), np.array(moment), np.array(point)
         if follows:
-            following[body, :a] += (turning + np.cross(place, own)) @ about
-            following[body, a:] += own @ along
+            (x, y, z), (u, v, w), (k, m, n) = point, force, moment
+            turning = (k + y * w - z * v, m + z * u - x * w, n + x * v - y * u)
+            table[body, arms_end:] += _components(turning, about) + _components(force, along)
         else:
-            own = own @ held_along
-            held[body] += own
-            turned[body] += turning @ held_about
-            arm[body] += (place @ along)[:, None] * own
+            own = _components(force, held_along)
+            arms = [part * one for part in _components(point, along) for one in own]
+            table[body, :arms_end] += own + _components(moment, held_about) + arms
     if external.gravity is not None:
-        weight = body_mass[:, None] * (np.array(external.weight(1.0)) @ held_along)
-        held += weight
-        arm += (body_centre @ along)[:, :, None] * weight[:, None]
-    return held, turned, arm, following
+        weight = body_mass[:, None] * np.array(_components(external.weight(1.0), held_along))
+        arms = (body_centre @ np.array(along).T)[:, :, None] * weight[:, None]
+        table[:, :d] += weight
+        table[:, moments:arms_end] += arms.reshape(count, -1)
+    arm = table[:, moments:arms_end].reshape(count, d, d)
+    return table[:, :d], table[:, d:moments], arm, table[:, arms_end:]
 
 
 __all__ = ["Applied", "applied", "body_wrench", "follows", "is_planar", "is_unloaded"]

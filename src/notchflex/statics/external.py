@@ -91,15 +91,17 @@ class ExternalLoad:
 
     def __post_init__(self) -> None:
         """Check the numbers and keep them as tuples, so that equal loads are found equal."""
+        given = vars(self)
         for name, default in _DEFAULTS:
-            value = getattr(self, name)
+            value = given[name]
             if value is not default:
-                object.__setattr__(self, name, _CHECKS[name](value))
+                given[name] = _CHECKS[name](value)
 
     @property
     def _is_default(self) -> bool:
         """Whether no field was given, as in most loads: then there is nothing to check."""
-        return all(getattr(self, name) is default for name, default in _DEFAULTS)
+        given = vars(self)
+        return all(given[name] is default for name, default in _DEFAULTS)
 
     @property
     def external(self) -> ExternalLoad:
@@ -107,8 +109,8 @@ class ExternalLoad:
         if self._is_default:
             return NOTHING
         found = object.__new__(ExternalLoad)
-        for name in EXTERNAL:  # checked already
-            object.__setattr__(found, name, getattr(self, name))
+        given = vars(self)
+        vars(found).update({name: given[name] for name in EXTERNAL})  # checked already
         return found
 
     @property

@@ -19,6 +19,8 @@ def number(value: Any, what: str, form: str = "a number") -> float:
     Raises:
         InputError: It is none.
     """
+    if type(value) is float:  # as most often
+        return value
     try:
         if isinstance(value, str | bytes | bytearray | bool | np.bool_):
             raise TypeError

@@ -291,17 +291,7 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     """
     if isinstance(loads, LoadPath):
         return loads.for_tendons(tendons)
-    try:
-        every = [loads] if isinstance(loads, Load) else list(loads)
-    except TypeError:
-        raise InputError(
-            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {shown(loads)}"
-        ) from None
-    if not every:
-        raise InputError("there are no loads; give at least one")
-    for load in every:
-        if not isinstance(load, Load):
-            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
+    every = [loads] if isinstance(loads, Load) else _several(loads)
     turns = {
         _NO_TURN if load.base_rotation is _NO_TURN else vector(load.base_rotation, *_BASE_TURN)
         for load in every
@@ -316,6 +306,22 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
         return LoadPath(*given, external)  # which says what is wrong
     return LoadPath.checked(*given, external)
+
+
+def _several(loads: Any) -> list[Load]:
+    """Loads in order, one or more."""
+    try:
+        every = list(loads)
+    except TypeError:
+        raise InputError(
+            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {shown(loads)}"
+        ) from None
+    if not every:
+        raise InputError("there are no loads; give at least one")
+    for load in every:
+        if not isinstance(load, Load):
+            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
+    return every
 
 
 def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
@@ -342,6 +348,8 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
 
 def _entries(value: Any, tendons: int, what: str) -> list[float]:
     """One number per tendon, NaN where nothing is commanded."""
+    if value is None:
+        return [nan] * tendons
     if hasattr(value, "__array__"):
         value = np.asarray(value).tolist()
     several = isinstance(value, Sequence) and not isinstance(value, str | bytes)

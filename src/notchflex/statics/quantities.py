@@ -67,7 +67,7 @@ def shape(chain: Chain, solved: Solved) -> Shape:
     bodies = _in_space(chain, body_poses(relative))
     last = jax.tree.map(lambda leaf: leaf[-1], bodies)
     turning = _turning(chain, at)
-    angles = notch_angles(bodies, chain)
+    angles = notch_angles(chain, relative.rotation)
     return Shape(
         tension=point.base_tension,
         stroke=solved.stroke,
@@ -244,16 +244,17 @@ def base_wrench(
     return -acting - jnp.sum(jax.vmap(wrench_at)(chain.tendon_place, pulled), axis=0)
 
 
-def notch_angles(bodies: Motion, chain: Chain) -> Float[Array, " n"]:
+def notch_angles(chain: Chain, relative: Float[Array, "n d d"]) -> Float[Array, " n"]:
     """Rotation of every body against the one before, about the axis of bending of its notch.
 
     The axis is y of the notch's frame, turned by the notch's direction about the tube; angles of
     up to half a turn are told apart.
     """
-    relative = jnp.einsum("nba,nbc->nac", bodies.rotation[:-1], bodies.rotation[1:])
-    frame = chain.notch_frame
-    turned = jnp.einsum("nba,nbc,ncd->nad", frame, relative, frame)
-    return jnp.atan2(turned[:, 0, 2] - turned[:, 2, 0], turned[:, 0, 0] + turned[:, 2, 2])
+    across = chain.notch_frame[..., IN_PLANE]
+    if chain.frame is not None:
+        across = chain.frame[:, IN_PLANE].T @ across
+    turned = jnp.einsum("nba,nbc,ncd->nad", across, relative, across)
+    return jnp.atan2(turned[:, 0, 1] - turned[:, 1, 0], turned[:, 0, 0] + turned[:, 1, 1])
 
 
 def _chords(chain: Chain, flexure: FlexureState) -> Float[Array, " n"]:

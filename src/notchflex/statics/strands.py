@@ -156,12 +156,13 @@ def strand_of(
         turning.append(unit.of_modes(both))
     log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
     runs = group.runs[..., None]
-    falls = jnp.exp(-unknowns.log_ratio[k])[..., None]
+    passed_on = span.passed_on[..., None]
     gap_tension = runs * (
-        falls[:, :, 0] * unit.tension[k][None] - span.gap_tension[..., None] * log_ratio[None, :, 0]
+        passed_on[:, :, 0] * unit.tension[k][None]
+        - span.gap_tension[..., None] * log_ratio[None, :, 0]
     )
     body_tension = (
-        falls[:, :, 1] * gap_tension - span.body_tension[..., None] * log_ratio[None, :, 1]
+        passed_on[:, :, 1] * gap_tension - span.body_tension[..., None] * log_ratio[None, :, 1]
     )
     in_body = body_tension * group.body_length[..., None]
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]

@@ -27,6 +27,7 @@ class Spans(NamedTuple):
 
     Attributes:
         crossing: Its way over every gap.
+        passed_on: Part of its tension that each edge of the gap leaves it.
         gap_tension: Tension in the gap; 0 where the tendon has no span there.
         body_tension: Tension inside the distal body, likewise.
         drawn: How much tendon the shape has set free beyond the distal body.
@@ -38,6 +39,7 @@ class Spans(NamedTuple):
     """
 
     crossing: Crossing
+    passed_on: Float[Array, "n t 2"]
     gap_tension: Float[Array, "n t"]
     body_tension: Float[Array, "n t"]
     drawn: Float[Array, "n t"]
@@ -231,12 +233,12 @@ def _spans(
     """Tensions, lengths set free and bounds of the k-th group."""
     group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
     runs = group.runs
-    falls = runs * jnp.sum(log_ratio, axis=-1)
     # Not written with ln T, so that a slack tendon stays regular.
     at_base = base_tension[jnp.array(group.numbers)][None]
-    brought = at_base * jnp.exp(falls - jnp.cumsum(falls, axis=0))
-    gap_tension = runs * brought * jnp.exp(-log_ratio[..., 0])
-    body_tension = gap_tension * jnp.exp(-log_ratio[..., 1])
+    passed_on = jnp.exp(-runs[..., None] * log_ratio)
+    beyond_both = at_base * jnp.cumprod(passed_on[..., 0] * passed_on[..., 1], axis=0)
+    gap_tension = runs * passed_on[..., 0] * _from_base_side(beyond_both, at_base[0])
+    body_tension = passed_on[..., 1] * gap_tension
     shortening = runs * (group.natural_gap - crossing.length)
     in_body = body_tension * group.body_length
     lengths = jnp.stack([shortening, gap_tension * group.natural_gap + in_body])
@@ -248,6 +250,7 @@ def _spans(
     bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
     return Spans(
         crossing=crossing,
+        passed_on=passed_on,
         gap_tension=gap_tension,
         body_tension=body_tension,
         drawn=beyond[0],
