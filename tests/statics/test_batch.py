@@ -84,6 +84,12 @@ def test_what_makes_no_batch(wrist, robots, loads, outputs, said):
         nf.solve_batch(given, loads, outputs=outputs)
 
 
+@pytest.mark.parametrize("cores", [0, -2, 1.5, True])
+def test_cores_that_there_cannot_be(wrist, cores):
+    with pytest.raises(nf.InputError, match="cores"):
+        nf.solve_batch(wrist, nf.pull(0.0, 1.0, steps=2), cores=cores)
+
+
 def test_paths_of_unlike_lengths(wrist):
     with pytest.raises(InputError, match="equally many steps"):
         nf.simulate_batch(wrist, [nf.pull(0, 1, steps=2), nf.pull(0, 1, steps=3)])

@@ -73,6 +73,20 @@ def test_going_on_with_loads_from_a_state_without(margin) -> None:
     margin.within("tensions", after.span_tension - whole.span_tension[3:], 1e-9, "N")
 
 
+@pytest.mark.parametrize(
+    ("name", "tension", "force"),
+    [("two-axis-wrist", [0.3, 0.1], (0.02, 0.01, 0.0)), ("gao2017", [6.0], (0.4905, 0.0, 0.0))],
+)
+def test_loads_come_before_the_tendons(name, tension, force, margin) -> None:
+    """The state in between, which is solved less exactly, leaves no trace in the friction."""
+    robot, both = nf.load_robot(name), nf.Load(tension=tension, tip_force=force)
+    at_once = nf.solve(robot, both).raise_if_failed()
+    in_turn = nf.simulate(robot, [nf.Load(tip_force=force), both])[-1].raise_if_failed()
+    margin.within("tip", at_once.tip_position - in_turn.tip_position, 1e-11, "mm")
+    friction = at_once.contact_log_ratio - in_turn.contact_log_ratio
+    margin.within("log ratios", friction[np.isfinite(friction)], 1e-11)
+
+
 def test_saved_state_with_loads_goes_on(tmp_path, margin) -> None:
     wrist = nf.load_robot("pacheco2021-a")
     loads = [nf.Load(tension=1.0, tip_force=(push, 0.0, 0.0)) for push in (0.03, -0.01, 0.02)]
