@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -40,12 +41,13 @@ def on_cores(
     Yields:
         The results; pieces that nobody waits for any more are not begun.
     """
-    begun = [_threads(cores or number_of_cores()).submit(work, piece) for piece in pieces]
+    threads = _threads(cores or number_of_cores())
+    todo = deque(threads.submit(work, piece) for piece in pieces)
     try:
-        for one in begun:
-            yield one.result()
+        while todo:
+            yield todo.popleft().result()  # which keeps no result that has been taken
     finally:
-        for one in begun:
+        for one in todo:
             one.cancel()
 
 

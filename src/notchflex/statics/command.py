@@ -17,10 +17,10 @@ from notchflex.statics.load import LoadPath
 
 def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
-    slack = np.isnan(load.stroke)
+    no_stroke = np.isnan(load.stroke)
     drawn, value = None, np.where(np.isnan(load.tension), 0.0, load.tension)
-    if not slack.all():
-        drawn, value = cast("Array", ~slack), np.where(slack, value, load.stroke)
+    if not no_stroke.all():
+        drawn, value = cast("Array", ~no_stroke), np.where(no_stroke, value, load.stroke)
     others = None
     if chain.loaded:
         others = applied(
