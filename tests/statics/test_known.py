@@ -60,3 +60,29 @@ def test_a_form_serves_all_chains_of_a_batch() -> None:
     np.testing.assert_array_equal(second, numbers[1])
     # Every chain that the first form serves is served by the wider one, which is there now.
     assert KnownForm.of(own.chain_form, [own.chain], own.vector[None]) is own.known_form
+
+
+def test_robots_that_differ_soon_share_a_form() -> None:
+    """Where tendons end and where notches point: the second robot asks for a form, no other."""
+    name, sides = "shared forms", [0.0, 90.0, 180.0, 270.0]
+    random = np.random.default_rng(0)
+    forms = []
+    for number in range(12):
+        directions = random.permutation(sides) if number else np.zeros(4)
+        notches = tuple(
+            nf.ArcNotch("on-axis", 1.3, 1.0, uncut_length=0.6, direction_deg=side)
+            for side in directions
+        )
+        ends = (4, *random.integers(2, 5, size=2)) if number else (4, 4, 4)
+        tendons = tuple(
+            nf.Tendon(0.7, side, end_body=int(end)) for side, end in zip(sides, ends, strict=False)
+        )
+        robot = nf.load_robot("two-axis-wrist").replace(name=name, notch=notches, tendon=tendons)
+        own = ready(robot, nf.Load(tension=[0.1], tip_force=(0.001, 0.002, 0.0)))
+        forms.append(own.known_form)
+        np.testing.assert_array_equal(
+            own.chain_form.pack(own.known_form.unpack(own.known_vector)), own.vector
+        )
+    assert len({id(one.form) for one in forms}) == 1
+    assert len({id(one) for one in forms}) <= 3
+    assert len({id(one) for one in forms[3:]}) == 1

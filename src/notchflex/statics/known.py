@@ -61,6 +61,9 @@ class KnownForm:
     ) -> KnownForm:
         """A form that serves for some chains: one that is there already, if any does.
 
+        A new one beside others knows only what they know too: it serves for their chains as well,
+        so that robots that differ a little soon share one.
+
         Args:
             form: Form of the whole chains.
             chains: The chains.
@@ -72,9 +75,23 @@ class KnownForm:
             flexures = chains[0].flexures
             may_be = form.pack(structural(chains[0])) > 0.0
             known = may_be & _same(form, flexures, numbers)
+            if found:
+                known = cls._shared(form, found, known, numbers[0])
             fitting = [cls(form, flexures, known, numbers[0])]
             found += fitting
         return min(fitting, key=lambda one: one.size)
+
+    @staticmethod
+    def _shared(
+        form: Form, found: list[KnownForm], known: Bool[np.ndarray, " chain"], numbers: np.ndarray
+    ) -> Bool[np.ndarray, " chain"]:
+        """What is known of a chain and by all forms that were found before."""
+        for one in found:
+            known = known & one._known & (one._numbers == numbers)
+        for places, kind in zip(form.places, form.kinds, strict=True):
+            if kind != "f":  # tables of whole numbers that differ do so in ever other places
+                known[places] = known[places].all()
+        return known
 
     def _fits(self, numbers: Float[np.ndarray, "k chain"]) -> bool:
         return bool((numbers[:, self._known] == self._numbers[self._known]).all())
