@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from contextlib import closing
 
 import pytest
 
@@ -44,6 +45,45 @@ def test_after_a_failure_nothing_more_is_begun() -> None:
     time.sleep(0.1)
     assert len(begun) < 10
     assert list(on_cores(abs, [-1], 1)) == [1]
+
+
+def test_closed_early_nothing_more_is_begun() -> None:
+    """Also where the traceback of what ended it is kept, and the frames in it with that."""
+    begun: list[int] = []
+
+    def slow(piece: int) -> None:
+        begun.append(piece)
+        time.sleep(0.01)
+
+    def stopped() -> None:
+        with closing(on_cores(slow, range(50), 1)) as results:
+            next(results)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as kept:
+        stopped()
+    time.sleep(0.1)
+    assert len(begun) < 10
+    del kept
+
+
+def test_a_small_batch_need_not_wait_for_a_long_one() -> None:
+    done: list[str] = []
+
+    def piece(whose: str) -> None:
+        time.sleep(0.005)
+        done.append(whose)
+
+    def long() -> None:
+        list(on_cores(piece, ["long"] * 60, 2))
+
+    other = threading.Thread(target=long)
+    other.start()
+    time.sleep(0.02)
+    list(on_cores(piece, ["small"], 2))
+    assert done.count("long") < 30
+    other.join()
+    assert done.count("long") == 60
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")

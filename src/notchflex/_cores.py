@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
 from typing import TypeVar
 
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
+
+# So many pieces wait for each thread, that none stands still while results are put together.
+_AHEAD = 4
 
 
 def number_of_cores() -> int:
@@ -33,21 +36,28 @@ def on_cores(
 ) -> Generator[Result]:
     """What comes of pieces of work, done by several threads, in the order of the pieces.
 
+    Only a few pieces are begun ahead, so that those of others who ask meanwhile have their turn.
+    Closed early (`contextlib.closing`), no more of them are begun.
+
     Args:
         work: What is done with a piece.
         pieces: The pieces.
         cores: How many threads; one per core where not given.
 
     Yields:
-        The results; pieces that nobody waits for any more are not begun.
+        The results.
     """
-    threads = _threads(cores or number_of_cores())
-    todo = deque(threads.submit(work, piece) for piece in pieces)
+    cores = cores or number_of_cores()
+    threads, begun = _threads(cores), deque[Future[Result]]()
     try:
-        while todo:
-            yield todo.popleft().result()  # which keeps no result that has been taken
+        for piece in pieces:
+            begun.append(threads.submit(work, piece))
+            if len(begun) > _AHEAD * cores:
+                yield begun.popleft().result()
+        while begun:
+            yield begun.popleft().result()
     finally:
-        for one in todo:
+        for one in begun:
             one.cancel()
 
 

@@ -84,6 +84,19 @@ def test_what_makes_no_batch(wrist, robots, loads, outputs, said):
         nf.solve_batch(given, loads, outputs=outputs)
 
 
+def test_cores_may_be_any_whole_number(wrist):
+    found = nf.solve_batch(wrist, nf.pull(0.0, 1.0, steps=2), cores=np.array(2))
+    assert found["converged"].all()
+
+
+@pytest.mark.parametrize("given", [1, None])
+def test_what_is_no_batch_of_paths(wrist, given):
+    with pytest.raises(InputError, match="LoadPath"):
+        nf.simulate_batch(wrist, given)
+    with pytest.raises(InputError, match="Robot"):
+        nf.simulate_batch(given, nf.pull(0.0, 1.0, steps=2))
+
+
 @pytest.mark.parametrize("cores", [0, -2, 1.5, True])
 def test_cores_that_there_cannot_be(wrist, cores):
     with pytest.raises(nf.InputError, match="cores"):

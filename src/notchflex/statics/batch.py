@@ -8,6 +8,7 @@ is bounded whatever the batch. Where JAX has a GPU they run there, whole pieces 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -152,7 +153,12 @@ def simulate_batch(
     """
     every = _robots(robots)
     tendons = max(robot.number_of_tendons for robot in every)
-    given = [loads] if isinstance(loads, LoadPath) else list(loads)
+    try:
+        given = [loads] if isinstance(loads, LoadPath) else list(loads)
+    except TypeError:
+        raise InputError(
+            f"simulate_batch needs a notchflex.LoadPath, or some in order; got {shown(loads)}"
+        ) from None
     paths = [load_path(one, tendons) for one in given]
     if not paths or len({len(path) for path in paths}) > 1:
         raise InputError("a batch needs one path or more, all of equally many steps")
@@ -162,7 +168,10 @@ def simulate_batch(
 
 
 def _robots(robots: Any) -> list[Robot]:
-    every = [robots] if isinstance(robots, Robot) else list(robots)
+    try:
+        every = [robots] if isinstance(robots, Robot) else list(robots)
+    except TypeError:
+        every = []
     if not every or not all(isinstance(robot, Robot) for robot in every):
         raise InputError(f"a batch needs a notchflex.Robot, or some of them; got {shown(robots)}")
     return every
@@ -180,8 +189,9 @@ def _simulate(
 ) -> dict[str, np.ndarray]:
     """Follow paths, given one after the other as a long one, each from rest."""
     asked = known_outputs(outputs)
-    if cores is not None and whole(cores, "cores") < 1:
-        raise InputError(f"cores must be 1 or more, or None for all; got {shown(cores)}")
+    number = None if cores is None else whole(cores, "cores")
+    if number is not None and number < 1:
+        raise InputError(f"cores must be 1 or more, or None for all; got {number}")
     count = max(len(robots), paths)
     if len(robots) not in (1, count) or paths not in (1, count):
         raise InputError(
@@ -196,14 +206,14 @@ def _simulate(
         for table in _tables(robots, joined, paths, count, asked, refinement)
         for start in range(0, len(table.rows), table.piece)
     ]
-    came = on_cores(lambda piece: piece[0].run(piece[1], numbers), work, cores)
-    for (table, start), piece in zip(work, came, strict=True):
-        rows = table.rows[start : start + table.piece]
-        for name, values in piece.items():
-            _put(found, name, rows, values, count)
-        done += len(rows)
-        if progress is not None:
-            progress(done, count)
+    with closing(on_cores(lambda one: one[0].run(one[1], numbers), work, number)) as came:
+        for (table, start), piece in zip(work, came, strict=True):
+            rows = table.rows[start : start + table.piece]
+            for name, values in piece.items():
+                _put(found, name, rows, values, count)
+            done += len(rows)
+            if progress is not None:
+                progress(done, count)
     return found
 
 

@@ -59,8 +59,8 @@ class Advance(NamedTuple):
 
 
 # A state on the way, of which memory alone is left, need not be within the tolerance, but within
-# this multiple of it.
-_ON_THE_WAY = 1e3
+# this multiple of it, and this imbalance.
+_ON_THE_WAY, _AT_MOST = 1e3, 1e-10
 # Part of the way at which the other loads are on, where they come before the tendons.
 _LOADS_ON = 0.5
 
@@ -121,7 +121,8 @@ def advance(
         guess = played(chain, solved.point.base_tension, tension, solved.memory)
         start = Point(solved.point.unknowns._replace(log_ratio=guess), tension)
         before = solved.point.base_tension
-        enough = jnp.where(part < 1.0, _ON_THE_WAY * settings.tolerance, 0.0)
+        enough = jnp.minimum(_ON_THE_WAY * settings.tolerance, _AT_MOST)
+        enough = jnp.where(part < 1.0, enough, 0.0)
         found = newton(chain, wanted, solved.memory, before, start, settings, enough, one_by_one)
         return found, wanted
 
