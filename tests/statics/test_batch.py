@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,21 @@ def test_what_makes_no_batch(wrist, robots, loads, outputs, said):
     given = [wrist] * robots if isinstance(robots, int) else robots
     with pytest.raises(InputError, match=said):
         nf.solve_batch(given, loads, outputs=outputs)
+
+
+@pytest.mark.parametrize("rows", [1, 7, 64, 65, 600, 1030])
+@pytest.mark.parametrize("cores", [1, 3])
+def test_rows_come_back_in_order_however_they_are_cut(wrist, rows, cores):
+    loads, seen = nf.pull(0.1, 2.0, steps=rows), []
+    found = nf.solve_batch(wrist, loads, cores=cores, progress=lambda *done: seen.append(done))
+    # Solved one at a time they are the same to the last bit: lanes do not touch each other.
+    some = np.unique([0, rows // 2, rows - 1])
+    for row in some:
+        alone = nf.solve_batch(wrist, loads.part(int(row), 1))
+        assert alone["total_angle"][0] == found["total_angle"][row]
+    assert seen[-1] == (rows, rows)
+    assert all(before < after for (before, _), (after, _) in itertools.pairwise(seen))
+    assert len(seen) >= min(cores, -(-rows // 8))
 
 
 def test_cores_may_be_any_whole_number(wrist):

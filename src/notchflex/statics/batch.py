@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._cores import on_cores
+from notchflex._cores import number_of_cores, on_cores
 from notchflex.errors import InputError
+from notchflex.native import WIDTH
 from notchflex.robot import Robot
 from notchflex.statics.actuation import filled
 from notchflex.statics.batch_rows import followed_row
@@ -41,8 +42,8 @@ _BY_FLEXURE = (
 )
 _BY_BODY = ("body_position", "body_rotation")
 
-# Rows of a piece, by how many rows there are, so that all cores have work.
-_PIECES = {0: 64, 512: 256, 8192: 1024}
+# Rows of a piece at most, by how many rows there are.
+_PIECES = {0: 64, 512: 256, 8192: 2048}
 
 
 class Batch(Mapping[str, np.ndarray]):
@@ -189,9 +190,9 @@ def _simulate(
 ) -> dict[str, np.ndarray]:
     """Follow paths, given one after the other as a long one, each from rest."""
     asked = known_outputs(outputs)
-    number = None if cores is None else whole(cores, "cores")
-    if number is not None and number < 1:
-        raise InputError(f"cores must be 1 or more, or None for all; got {number}")
+    threads = number_of_cores() if cores is None else whole(cores, "cores")
+    if threads < 1:
+        raise InputError(f"cores must be 1 or more, or None for all; got {threads}")
     count = max(len(robots), paths)
     if len(robots) not in (1, count) or paths not in (1, count):
         raise InputError(
@@ -202,13 +203,13 @@ def _simulate(
     found: dict[str, np.ndarray] = {}
     done = 0
     work = [
-        (table, start)
+        (table, index)
         for table in _tables(robots, joined, paths, count, asked, refinement)
-        for start in range(0, len(table.rows), table.piece)
+        for index in table.pieces(threads)
     ]
-    with closing(on_cores(lambda one: one[0].run(one[1], numbers), work, number)) as came:
-        for (table, start), piece in zip(work, came, strict=True):
-            rows = table.rows[start : start + table.piece]
+    with closing(on_cores(lambda one: one[0].run(one[1], numbers), work, threads)) as came:
+        for (table, index), piece in zip(work, came, strict=True):
+            rows = table.rows[index]
             for name, values in piece.items():
                 _put(found, name, rows, values, count)
             done += len(rows)
@@ -256,18 +257,19 @@ class _Table:
     flexures: Int[np.ndarray, " k"]
     outputs: tuple[str, ...]
 
-    @property
-    def piece(self) -> int:
-        """How many rows are solved in one call of the program."""
-        return max(size for least, size in _PIECES.items() if len(self.rows) >= least)
+    def pieces(self, cores: int) -> Iterator[slice]:
+        """Rows that are solved in one call of the program: pieces alike, as many for each core."""
+        rows = len(self.rows)
+        most = max(size for least, size in _PIECES.items() if rows >= least)
+        each = -(-rows // (most * cores))
+        size = -(-rows // (each * cores * WIDTH)) * WIDTH
+        return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
 
-    def run(self, start: int, numbers: np.ndarray) -> dict[str, np.ndarray]:
+    def run(self, index: slice, numbers: np.ndarray) -> dict[str, np.ndarray]:
         """Solve a piece of the rows."""
-        stop = min(start + self.piece, len(self.rows))
-        index = slice(start, stop)
         commands = self.commands[index]
         if len(self.commands) == 1:
-            commands = np.repeat(self.commands, stop - start, axis=0)
+            commands = np.repeat(self.commands, index.stop - index.start, axis=0)
         one_robot = len(self.chains) == 1
         chains = self.chains[0] if one_robot else self.chains[index]
         forms = (self.chain_form, self.command_form, self.outputs)
