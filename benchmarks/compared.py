@@ -8,7 +8,6 @@ call it, tip and `converged` included; what is written by hand returns angles or
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from statistics import median
 from typing import Any, NamedTuple
@@ -16,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from compiled_chain import SIDEWAYS, gao_batch, gao_solve
 from compiled_sections import gao_arrays
-from compiled_wrist import wrist_arrays, wrist_batch, wrist_path
+from compiled_wrist import median_us, wrist_arrays, wrist_batch, wrist_path
 
 import notchflex as nf
 
@@ -72,23 +71,12 @@ def _of_links(name: str, links: nf.Robot, c: Any, force: float) -> dict[str, Pai
     }
 
 
-def timed(work: Callable[[], Any], repeats: int) -> float:
-    """Median time, us."""
-    taken = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        work()
-        taken.append(1e6 * (time.perf_counter() - start))
-    return median(taken)
-
-
 def main() -> None:
     """Print a line for each pair, us of one solve and the ratio."""
     print(f"{'':24} {'library, us':>12} {'by hand, us':>12} {'ratio':>8}")
     for name, pair in pairs().items():
-        pair.library(), pair.by_hand()  # both compile
         rounds = [
-            (timed(pair.library, pair.repeats), timed(pair.by_hand, pair.repeats))
+            (median_us(pair.library, pair.repeats), median_us(pair.by_hand, pair.repeats))
             for _ in range(ROUNDS)
         ]
         library, by_hand = (median(times) / pair.solves for times in zip(*rounds, strict=True))

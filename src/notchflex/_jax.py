@@ -44,7 +44,9 @@ def array_module(*values: Any) -> ModuleType:
     Formulas that turn a robot into arrays run once per robot. Written with the module that this
     returns they take microseconds there, and can still be differentiated.
     """
-    return jnp if any(isinstance(value, jax.Array) for value in values) else np
+    # To ask for jax.Array takes long; most that is asked for is a plain array.
+    traced = (type(value) is not np.ndarray and isinstance(value, jax.Array) for value in values)
+    return jnp if any(traced) else np
 
 
 def constant(value: ArrayLike) -> jax.Array:

@@ -179,9 +179,7 @@ def _sticks_out(
     normal_of_body: Float[np.ndarray, " 3"],
 ) -> bool:
     """Whether a force leaves a plane or acts beside it, or a moment turns out of it."""
-    x, y, z = normal.tolist()
-    a, b, c = moment
-    across = hypot(b * z - c * y, c * x - a * z, a * y - b * x)
+    across = hypot(*_crossed(moment, normal.tolist()))
     at = _along(point, normal_of_body) if any(force) else 0.0
     return (
         abs(_along(force, normal)) > _ROUNDING * hypot(*force)
@@ -193,6 +191,12 @@ def _sticks_out(
 def _along(vector: Sequence[float], normal: Float[np.ndarray, " 3"]) -> float:
     x, y, z = normal.tolist()
     return vector[0] * x + vector[1] * y + vector[2] * z
+
+
+def _crossed(first: Sequence[float], second: Sequence[float]) -> list[float]:
+    """Cross product of plain numbers."""
+    (a, b, c), (x, y, z) = first, second
+    return [b * z - c * y, c * x - a * z, a * y - b * x]
 
 
 def _turn(load_path: LoadPath) -> tuple[float, ...]:
@@ -289,8 +293,7 @@ def _sums(
     table = np.zeros((count, arms_end + a + d))
     for body, force, moment, point, follows in _forces(external, count - 1, tip):
         if follows:
-            (x, y, z), (u, v, w), (k, m, n) = point, force, moment
-            turning = (k + y * w - z * v, m + z * u - x * w, n + x * v - y * u)
+            turning = [one + more for one, more in zip(moment, _crossed(point, force), strict=True)]
             table[body, arms_end:] += _components(turning, about) + _components(force, along)
         else:
             own = _components(force, held_along)

@@ -59,13 +59,10 @@ class Form:
         A vector of NumPy where all leaves are plain.
         """
         leaves = self.structure.flatten_up_to(tree)
-        if all(type(leaf) is np.ndarray for leaf in leaves):  # as for every load
-            flat = [leaf.reshape(*leaf.shape[:leading], -1) for leaf in leaves]
-            return np.concatenate(flat, axis=-1, dtype=float)
         xp = array_module(*leaves)
-        arrays = [xp.asarray(leaf, dtype=float) for leaf in leaves]
+        arrays = [xp.asarray(leaf) for leaf in leaves]
         flat = [array.reshape(*array.shape[:leading], -1) for array in arrays]
-        return xp.concatenate(flat, axis=-1)
+        return xp.concatenate(flat, axis=-1, dtype=float)
 
     def unpack(self, vector: Any) -> Any:
         """The tree of a vector (NumPy's or JAX's), with the vector's leading axes."""
