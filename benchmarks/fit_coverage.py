@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.calibrate import calibrate, synthetic
+from notchflex.fit import calibrate, synthetic
 from notchflex.robot.paths import number_at
 from notchflex.statics import LoadPath
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.calibrate import Measurements, SumOfDistances, calibrate, synthetic
+from notchflex.fit import Measurements, SumOfDistances, calibrate, synthetic
 from notchflex.statics import axis_points
 
 NOISE = 0.1  # mm

@@ -15,8 +15,8 @@ import dataclasses
 import numpy as np
 
 import notchflex as nf
-from notchflex.calibrate import FrictionReadings, calibrate, friction_rig, synthetic
-from notchflex.calibrate.two_weights import weight_held
+from notchflex.fit import FrictionReadings, calibrate, friction_rig, synthetic
+from notchflex.fit.two_weights import weight_held
 
 TRUE_FRICTION, TRUE_MODULUS = 0.2, 1000.406
 ANGLE_NOISE = np.radians(0.3)

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.calibrate import (
+from notchflex.fit import (
     Calibration,
     Constant,
     LeastSquares,

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.calibrate import calibrate, posterior, read_measurements
+from notchflex.fit import calibrate, posterior, read_measurements
 
 THREE = ("material.elastic_modulus", "material.superelastic_modulus", "friction.coefficient")
 

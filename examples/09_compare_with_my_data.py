@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.compare import compare, read_measured
+from notchflex.comparison import compare, read_measured
 
 # What you would have in a file: tension at the base, angle of each notch, base to tip.
 MEASURED = """\

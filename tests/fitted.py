@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 
 import notchflex as nf
-from notchflex.calibrate import Calibration, Measurements, calibrate, synthetic
+from notchflex.fit import Calibration, Measurements, calibrate, synthetic
 
 ROBOT = "pacheco2021-a"
 NAMES = ("friction.coefficient", "material.elastic_modulus")

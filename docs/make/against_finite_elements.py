@@ -10,7 +10,7 @@ from page import table
 
 import notchflex as nf
 from notchflex.friction import friction_law
-from notchflex.plot.style import BLUE, VERMILLION, house_style, new_figure, save
+from notchflex.plotting.style import BLUE, VERMILLION, house_style, new_figure, save
 from reference_data import FOLDER
 
 COEFFICIENT = 0.13

@@ -9,7 +9,7 @@ from differences import Difference, difference, joined, told
 
 import notchflex as nf
 from liu2022 import liu, pulled
-from notchflex.plot.style import house_style, new_figure, save, sequence_colours
+from notchflex.plotting.style import house_style, new_figure, save, sequence_colours
 from reference_data import choose, reference
 
 READINGS = ("pull along the gap", "small deflection", "dead pull", "follower")

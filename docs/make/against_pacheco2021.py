@@ -9,7 +9,7 @@ from differences import Difference, difference, joined, told
 
 import notchflex as nf
 from loads import tensions
-from notchflex.plot.style import house_style, new_figure, save, sequence_colours
+from notchflex.plotting.style import house_style, new_figure, save, sequence_colours
 from reference_data import CUTS, choose, reference
 from robots import linear_copy, ready
 

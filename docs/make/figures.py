@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import notchflex as nf
-from notchflex.plot.style import (
+from notchflex.plotting.style import (
     BLUE,
     GREEN,
     GREY,

@@ -12,7 +12,7 @@ import numpy as np
 from page import main, table
 
 import notchflex as nf
-from notchflex.compare import Comparison, compare, read_measured
+from notchflex.comparison import Comparison, compare, read_measured
 
 PAGE = "pacheco2021.md"
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"

@@ -88,7 +88,7 @@ _HOME = {
             "write_fitted",
             "write_measurements",
         ),
-        "notchflex.calibrate",
+        "notchflex.fit",
     ),
 }
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-import notchflex.calibrate as fitting
+import notchflex.fit as fitting
 from fitted import NAMES, ROBOT, fitted, measured
-from notchflex.calibrate import Fold, LeftOut, Posterior
+from notchflex.fit import Fold, LeftOut, Posterior
 from notchflex.cli import calibrate_tables, run
 from notchflex.cli.calibrate_words import parse_fit, parse_pairs, robots_of
 

@@ -64,7 +64,7 @@ def test_the_loop_tells_pulling_from_letting_go_and_keeps_the_loop_before():
 
 
 def test_colours_of_contacts_and_strains():
-    from notchflex.plot.style import BLUE, GREEN, GREY, VERMILLION
+    from notchflex.plotting.style import BLUE, GREEN, GREY, VERMILLION
     from notchflex.viewer.colours import METAL, of_contacts, of_strain
 
     robot = ready("A").with_value("friction.wrap", "geometric")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plot.bent import bent_at
+from notchflex.plotting.bent import bent_at
 from notchflex.viewer.skins import PIECES, at_rest, skins
 from notchflex.viewer.solids import ROUND, body_solids
 from robots import ready

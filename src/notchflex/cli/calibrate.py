@@ -32,8 +32,8 @@ from notchflex.results.files import (
 )
 
 if TYPE_CHECKING:
-    from notchflex.calibrate import Calibration, LeftOut, NextMeasurement, Posterior
-    from notchflex.calibrate.objective import FitObjective
+    from notchflex.fit import Calibration, LeftOut, NextMeasurement, Posterior
+    from notchflex.fit.objective import FitObjective
     from notchflex.robot import Robot
 
 MORE = Group("Beyond the fit", sort_key=8)
@@ -149,7 +149,7 @@ def calibrate(
         from notchflex.cli.compile_cache import use_compile_cache
 
         use_compile_cache()
-        import notchflex.calibrate as fitting
+        import notchflex.fit as fitting
         from notchflex.statics import LoadPath
 
     check_sensor([one.name for one in wanted])
@@ -225,7 +225,7 @@ def _check_targets(
 
 
 def _objective(name: str, huber: float | None) -> FitObjective:
-    from notchflex.calibrate import LeastSquares, SumOfDistances, SumOfRobotErrors
+    from notchflex.fit import LeastSquares, SumOfDistances, SumOfRobotErrors
 
     if name == "robot-errors":
         return SumOfRobotErrors()
@@ -243,10 +243,10 @@ def _write(
     json: str | None,
     plot: str | None,
 ) -> None:
-    from notchflex.calibrate import documents
+    from notchflex.fit import documents
 
     if output is not None:
-        from notchflex.calibrate.fitted_robots import write_fitted
+        from notchflex.fit.fitted_robots import write_fitted
 
         files = write_fitted(found, output, inputs=inputs)
         terminal.note(f"written: {', '.join(map(str, files))}.")
@@ -263,7 +263,7 @@ def _write(
         write_json(json, document)
     if plot is not None:
         with terminal.working(f"drawing {plot}"):
-            from notchflex.plot import calibration_picture
+            from notchflex.plotting import calibration_picture
 
             calibration_picture(found).save(plot)
 

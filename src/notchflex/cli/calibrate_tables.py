@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from notchflex.calibrate import Calibration, Interval, LeftOut, NextMeasurement, Posterior
+    from notchflex.fit import Calibration, Interval, LeftOut, NextMeasurement, Posterior
 
 # More candidates than that are thinned.
 _ROWS = 16
@@ -21,8 +21,8 @@ _ROWS = 16
 
 def print_calibration(found: Calibration) -> None:
     """Print constants, how far to trust them, and the errors of every part."""
-    from notchflex.calibrate.documents import data_of
-    from notchflex.calibrate.verdict import verdict
+    from notchflex.fit.documents import data_of
+    from notchflex.fit.verdict import verdict
 
     console = terminal.output()
     for label in found.given:
@@ -48,7 +48,7 @@ def print_calibration(found: Calibration) -> None:
 
 def print_left_out(left_out: LeftOut) -> None:
     """Print what constants fitted without a part make of it."""
-    from notchflex.calibrate.errors_of_parts import edge
+    from notchflex.fit.errors_of_parts import edge
 
     console = terminal.output()
     console.print(f"\nFitted without each {left_out.by}, and tried on it (root mean square):")
@@ -119,7 +119,7 @@ def _print_constants(console: Console, found: Calibration) -> None:
 
 
 def _print_errors(console: Console, found: Calibration) -> None:
-    from notchflex.calibrate.errors_of_parts import errors_of_parts
+    from notchflex.fit.errors_of_parts import errors_of_parts
 
     table = _table("robot", "measured")
     _number_columns(table, "rms error", "between repeats")

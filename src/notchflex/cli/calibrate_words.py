@@ -163,7 +163,7 @@ def check_beyond(
 
 def check_sensor(names: list[str]) -> None:
     """Tell a wrong name of a constant of the measurement, which is in no robot file."""
-    from notchflex.calibrate.rows import SENSOR
+    from notchflex.fit.rows import SENSOR
 
     for name in names:
         path = name.rpartition(":")[2]

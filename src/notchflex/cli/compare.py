@@ -28,7 +28,7 @@ from notchflex.results.files import (
 from notchflex.results.quantities import DEGREES
 
 if TYPE_CHECKING:
-    from notchflex.compare import Comparison
+    from notchflex.comparison import Comparison
 
 MOST_COLUMNS = 6
 """Notches of a robot side by side in one table; more of them go below."""
@@ -88,7 +88,7 @@ def compare(
     chosen = chosen_robot(robot, settings)
     variants = [_variant(text) for text in beside]
 
-    from notchflex.compare.measured import read_measured
+    from notchflex.comparison.measured import read_measured
 
     measured = read_measured(data, chosen)
     robots = {
@@ -99,7 +99,7 @@ def compare(
         from notchflex.cli.compile_cache import use_compile_cache
 
         use_compile_cache()
-        from notchflex import compare as comparing
+        from notchflex import comparison as comparing
 
         comparison = comparing.compare(chosen, measured, from_rest=not path)
         others: dict[str, Comparison] = {}
@@ -131,7 +131,7 @@ def _write(
     csv: str | None,
     plot: str | None,
 ) -> None:
-    from notchflex.compare import comparison_columns, comparison_document, errors_document
+    from notchflex.comparison import comparison_columns, comparison_document, errors_document
 
     if json is not None:
         from notchflex.results.json import write_json
@@ -147,7 +147,7 @@ def _write(
         write_csv(csv, list(columns), zip(*columns.values(), strict=True))
     if plot is not None:
         with terminal.working(f"drawing {plot}"):
-            from notchflex.plot import comparison_picture
+            from notchflex.plotting import comparison_picture
 
             comparison_picture(comparison, others).save(plot)
 

@@ -41,9 +41,9 @@ def friction_rig(
     if plot is not None:
         check_picture(plot, "--plot", inputs=[data])
 
-    from notchflex.calibrate.friction_documents import friction_document
-    from notchflex.calibrate.friction_readings import read_friction_rig
-    from notchflex.calibrate.friction_rig import friction_rig as estimate
+    from notchflex.fit.friction_documents import friction_document
+    from notchflex.fit.friction_readings import read_friction_rig
+    from notchflex.fit.friction_rig import friction_rig as estimate
 
     rig = estimate(read_friction_rig(data))
     if json is not None:
@@ -52,7 +52,7 @@ def friction_rig(
         write_json(json, friction_document(rig))
     if plot is not None:
         with terminal.working(f"drawing {plot}"):
-            from notchflex.plot import friction_picture
+            from notchflex.plotting import friction_picture
 
             friction_picture(rig).save(plot)
     if json != STANDARD_OUTPUT:

@@ -256,12 +256,12 @@ def _draw(paths: dict[str, Path], target: str) -> None:
     path, *others = paths.values()
     if FilePath(target).suffix.lower() in MOVING:
         with terminal.counting(f"drawing {target}") as counted:
-            from notchflex.plot import save_animation
+            from notchflex.plotting import save_animation
 
             save_animation(path, target, progress=counted)
         return
     with terminal.working(f"drawing {target}"):
-        from notchflex.plot import beside_picture, path_picture
+        from notchflex.plotting import beside_picture, path_picture
 
         picture = beside_picture(paths) if others else path_picture(path)
         picture.save(target)

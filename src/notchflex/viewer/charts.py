@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex.plot.curves import COLOUR
-from notchflex.plot.drive import LETTING_GO, PULLING, branches
-from notchflex.plot.style import GREY
+from notchflex.plotting.curves import COLOUR
+from notchflex.plotting.drive import LETTING_GO, PULLING, branches
+from notchflex.plotting.style import GREY
 from notchflex.results.quantities import QUANTITIES
 from notchflex.viewer.chart import Line, chart
 from notchflex.viewer.colours import TENDON, css, of_contacts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex.plot.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
 from notchflex.statics import Equilibrium
 
 Colour = tuple[int, int, int]

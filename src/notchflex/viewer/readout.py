@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from notchflex.plot.style import BLUE, VERMILLION
+from notchflex.plotting.style import BLUE, VERMILLION
 from notchflex.results.quantities import CONTACT_STATES, QUANTITIES
 from notchflex.robot import Robot
 from notchflex.viewer.charts import axis

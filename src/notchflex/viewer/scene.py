@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plot.acting import Acting, acting_at
-from notchflex.plot.bent import HELD, Bent, bent_at
+from notchflex.plotting.acting import Acting, acting_at
+from notchflex.plotting.bent import HELD, Bent, bent_at
 from notchflex.robot import Robot
 from notchflex.statics import Path
 from notchflex.viewer.colours import CLOSED, LOAD, METAL, TENDON, of_contacts, of_strain, rgb
@@ -280,7 +280,7 @@ def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _matrix(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    from notchflex.plot.twist import rotation_of
+    from notchflex.plotting.twist import rotation_of
 
     return rotation_of(vector)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plot.bent import Bent, Sections, bent_by_angles
+from notchflex.plotting.bent import Bent, Sections, bent_by_angles
 from notchflex.robot import ArcNotch, Robot
 
 PIECES = 12  # straight pieces that a bent flexure is drawn with, at least

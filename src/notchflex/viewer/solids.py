@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plot.bent import Bent
-from notchflex.plot.outline import body_corners
+from notchflex.plotting.bent import Bent
+from notchflex.plotting.outline import body_corners
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

@@ -1,0 +1,70 @@
+"""From measurements to constants with error bars; honest tests; the friction rig."""
+
+from notchflex.fit.calibration import Calibration
+from notchflex.fit.constancy import Constancy, constancy
+from notchflex.fit.constants import Constant, Unknown
+from notchflex.fit.documents import (
+    calibration_document,
+    left_out_document,
+    next_measurement_document,
+    posterior_document,
+)
+from notchflex.fit.errors_of_parts import PartError, errors_of_parts
+from notchflex.fit.fit import calibrate
+from notchflex.fit.fitted_robots import write_fitted
+from notchflex.fit.folds import Fold, LeftOut, leave_out
+from notchflex.fit.friction_documents import friction_document
+from notchflex.fit.friction_readings import FrictionReadings, read_friction_rig
+from notchflex.fit.friction_rig import FrictionRig, friction_rig
+from notchflex.fit.intervals import Interval
+from notchflex.fit.measurements import Measurements
+from notchflex.fit.measurements_csv import read_measurements
+from notchflex.fit.measurements_writing import write_measurements
+from notchflex.fit.next_measurement import NextMeasurement, next_measurement
+from notchflex.fit.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
+from notchflex.fit.posterior import Posterior, posterior
+from notchflex.fit.repeats import repeats, repeats_of_each
+from notchflex.fit.synthetic import synthetic
+from notchflex.fit.two_weights import coefficient_from_weights, weight_held
+from notchflex.fit.verdict import verdict
+
+__all__ = [
+    "Calibration",
+    "Constancy",
+    "Constant",
+    "Fold",
+    "FrictionReadings",
+    "FrictionRig",
+    "Interval",
+    "LeastSquares",
+    "LeftOut",
+    "Measurements",
+    "NextMeasurement",
+    "PartError",
+    "Posterior",
+    "SumOfDistances",
+    "SumOfRobotErrors",
+    "Unknown",
+    "calibrate",
+    "calibration_document",
+    "coefficient_from_weights",
+    "constancy",
+    "errors_of_parts",
+    "friction_document",
+    "friction_rig",
+    "leave_out",
+    "left_out_document",
+    "next_measurement",
+    "next_measurement_document",
+    "posterior",
+    "posterior_document",
+    "read_friction_rig",
+    "read_measurements",
+    "repeats",
+    "repeats_of_each",
+    "synthetic",
+    "verdict",
+    "weight_held",
+    "write_fitted",
+    "write_measurements",
+]

@@ -1,0 +1,119 @@
+"""Fitted robots as robot files that say where each value came from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from math import isfinite
+from pathlib import Path
+
+from notchflex.fit.calibration import Calibration
+from notchflex.fit.constants import Unknown
+from notchflex.fit.documents import data_of
+from notchflex.fit.rows import SENSOR
+from notchflex.errors import InputError
+from notchflex.results.files import check_folder, write_text
+from notchflex.robot import robot_text
+from notchflex.robot.robot import source_of
+
+# More files than that are told by their number.
+_FILES = 3
+
+
+def write_fitted(
+    found: Calibration, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+) -> tuple[Path, ...]:
+    """Write every fitted robot as a robot file, named after its label.
+
+    Comments of the file that the robot was read from are kept. Beside each value that was fitted
+    stands to which data, and its 95 % interval. What belongs to the measurement (`sensor.`) stands
+    in no robot file.
+
+    Args:
+        found: The fit.
+        folder: Where to; made if it is not there. Files of the same names are replaced.
+        inputs: Files that must not be replaced.
+
+    Returns:
+        The files.
+
+    Raises:
+        InputError: A file cannot be written, is one of `inputs`, or is the very file that the
+            robot was read from.
+
+    Example:
+        >>> write_fitted(found, "fitted")  # doctest: +SKIP
+        (PosixPath('fitted/my-wrist.toml'),)
+    """
+    names = [f"{label}.toml" for label in found.given]
+    files = check_folder(str(folder), names, "the folder of fitted robots", inputs=inputs)
+    targets = dict(zip(found.given, files, strict=True))
+    for label, target in targets.items():
+        if target.exists() and _text(target) == source_of(found.given[label]):
+            raise InputError(
+                f"{target}: this would replace the file that {label} was read from; choose "
+                "another folder."
+            )
+    try:
+        Path(folder).mkdir(exist_ok=True)
+    except OSError as problem:
+        raise InputError(f"the folder {folder} cannot be made: {problem.strerror}.") from None
+    for label, target in targets.items():
+        robot = found.robots[label]
+        write_text(target, robot_text(robot, source_of(robot), fitted_notes(found, label)))
+    return files
+
+
+def fitted_notes(found: Calibration, label: str) -> dict[str, str]:
+    """What a robot file says of every fitted value: the data, and how far to trust it.
+
+    Args:
+        found: The fit.
+        label: Label of the robot.
+
+    Returns:
+        By name of the value, as `Robot.with_value` takes it.
+    """
+    return {
+        path: _note(found, unknown)
+        for unknown in found.problem.unknowns
+        for owner, path in unknown.sets
+        if owner == label and path not in SENSOR
+    }
+
+
+def _note(found: Calibration, unknown: Unknown) -> str:
+    labels = dict.fromkeys(owner for owner, _ in unknown.sets)
+    files = [Path(one).name for label in labels for one in data_of(found, label)]
+    files = list(dict.fromkeys(" ".join(one.split()) for one in files))
+    if len(files) > _FILES:
+        files = [*files[: _FILES - 1], f"{len(files) - _FILES + 1} more files"]
+    trouble = "" if found.converged else "; the search did not settle"
+    return f"{', '.join(files)}: {_trust(found, unknown)}{trouble}"
+
+
+def _trust(found: Calibration, unknown: Unknown) -> str:
+    interval, unit = found.intervals.get(unknown.name), unknown.unit
+    if interval is None:
+        size = found.deviations[unknown.name]
+        return f"standard deviation {size:.2g} {unit}".strip() if isfinite(size) else "no interval"
+    low, high = interval.lower, interval.upper
+    if found.tells_no_noise:
+        return f"no interval: {interval.reason}"
+    if low is None and high is None:
+        return "any value fits"
+    if low is not None and high is not None:
+        ends = f"{low:.5g} to {high:.5g}"
+    else:
+        ends = f"at most {high:.5g}" if low is None else f"at least {low:.5g}"
+    return f"{ends} {unit}".strip() + " (95 %)"
+
+
+def _text(target: Path) -> str | None:
+    try:
+        return target.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError):
+        return None
+
+
+__all__ = ["fitted_notes", "write_fitted"]

@@ -1,0 +1,31 @@
+"""Pictures of results, for paper and for a browser (`pip install 'notchflex[plot]'`)."""
+
+from notchflex.plotting.animation import save_animation
+from notchflex.plotting.batch import batch_picture
+from notchflex.plotting.beside import beside_picture
+from notchflex.plotting.calibration import calibration_figure, calibration_picture
+from notchflex.plotting.comparison import comparison_figure, comparison_picture
+from notchflex.plotting.equilibrium import state_picture
+from notchflex.plotting.friction import friction_figure, friction_picture
+from notchflex.plotting.path import path_figure, path_picture
+from notchflex.plotting.picture import picture
+from notchflex.plotting.sheet import Picture
+from notchflex.plotting.style import save
+
+__all__ = [
+    "Picture",
+    "batch_picture",
+    "beside_picture",
+    "calibration_figure",
+    "calibration_picture",
+    "comparison_figure",
+    "comparison_picture",
+    "friction_figure",
+    "friction_picture",
+    "path_figure",
+    "path_picture",
+    "picture",
+    "save",
+    "save_animation",
+    "state_picture",
+]

@@ -1,0 +1,116 @@
+"""The picture of a path: the robot at several loads, and what the path holds as curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from notchflex.plotting.acting import out_of_plane
+from notchflex.plotting.along import front_panel, has_friction, profile_panel, pulled_tendons
+from notchflex.plotting.bent import bent_at
+from notchflex.plotting.curves import notches_panel, total_panel
+from notchflex.plotting.drive import LETTING_GO, PULLING, way_of
+from notchflex.plotting.outline import bending_plane
+from notchflex.plotting.sheet import Cell, Colour, Panel, Picture
+from notchflex.plotting.space import space_panel
+from notchflex.plotting.wrist import telling_steps, wrist_panel
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from notchflex.statics import Path
+
+MOST_PROFILES = 2
+"""Tendons whose tension is drawn from span to span."""
+
+
+def path_figure(path: Path, *, title: str | None = None) -> Figure:
+    """Draw a solved path with matplotlib; for what it shows see `path_picture`.
+
+    Args:
+        path: Solved path.
+        title: Heading; the name of the robot if None.
+
+    Returns:
+        The figure; `notchflex.plotting.save` writes it.
+
+    Example:
+        >>> import notchflex as nf
+        >>> from notchflex.plotting import path_figure
+        >>> path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 2.0, steps=5).release())
+        >>> len(path_figure(path).axes)
+        6
+    """
+    return path_picture(path, title=title).figure()
+
+
+def path_picture(path: Path, *, title: str | None = None) -> Picture:
+    """Describe the picture of a solved path, for paper and for a browser.
+
+    First the robot to scale at up to five loads: in its plane of bending, or in space where it
+    bends in several planes or a load leaves the plane. Arrows are loads from outside. One state
+    has nothing else. More steps have curves: the total angle, as a loop where the tendons are let
+    go again, and every notch. A path with pulling and letting go shows the shapes of both, the
+    tension along the tendon, and how far the friction has turned.
+
+    Args:
+        path: Solved path.
+        title: Heading; the name of the robot if None.
+
+    Returns:
+        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
+    """
+    ways = way_of(path)
+    view = plane_of(path)
+    # What is drawn in a column of its own, beside the curves two to a column.
+    shapes = [shape_panel(path, steps, view, name) for name, steps in _shapes(path, ways).items()]
+    cells = [Cell(panel, (0, 2), (column, column + 1)) for column, panel in enumerate(shapes)]
+    panels = _panels(path, ways)
+    for index, panel in enumerate(panels):
+        row, column = index % 2, len(shapes) + index // 2
+        cells.append(Cell(panel, (row, row + 1), (column, column + 1)))
+    columns = len(shapes) + -(-len(panels) // 2)
+    heading = path.robot.name if title is None else title
+    return Picture(heading, 1.6 + 4.0 * columns, 6.4, cells)
+
+
+def shape_panel(
+    path: Path,
+    steps: Sequence[int],
+    view: float | None,
+    title: str = "",
+    colours: Sequence[Colour] | None = None,
+) -> Panel:
+    """Return a robot at several steps: across its plane where it has one, otherwise in space."""
+    if view is None and steps:
+        return space_panel(path, steps, title=title, colours=colours)
+    return wrist_panel(path, steps, view or 0.0, title=title, colours=colours)
+
+
+def plane_of(path: Path) -> float | None:
+    """Return the direction across the base [rad] of the plane that holds a path, if one does."""
+    view = bending_plane(path.robot)
+    if view is None:
+        return None
+    steps = telling_steps(path)
+    leaves = [out_of_plane(path, step, bent_at(path, step), view) for step in steps]
+    return None if max(leaves, default=0.0) > 1e-6 else view
+
+
+def _shapes(path: Path, ways: dict[str, list[int]]) -> dict[str, list[int]]:
+    """Return the steps to draw: of pulling and of letting go apart, where there are both."""
+    if len(ways) < 2:
+        return {"": telling_steps(path)}
+    return {way: telling_steps(path, among=ways[way]) for way in (PULLING, LETTING_GO)}
+
+
+def _panels(path: Path, ways: dict[str, list[int]]) -> list[Panel]:
+    """Return the curves."""
+    if len(path) == 1:
+        return []
+    panels = [total_panel(path), notches_panel(path)]
+    if len(ways) > 1 and pulled_tendons(path):
+        panels += [profile_panel(path, tendon) for tendon in pulled_tendons(path)[:MOST_PROFILES]]
+        if has_friction(path):
+            panels.append(front_panel(path))
+    return panels

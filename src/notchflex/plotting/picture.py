@@ -1,0 +1,75 @@
+"""One function for the picture of any result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, cast
+
+from notchflex.errors import InputError
+from notchflex.plotting.sheet import Picture
+
+if TYPE_CHECKING:
+    from notchflex.statics import Path
+
+
+def picture(result: Any, *, title: str | None = None) -> Picture:
+    """Describe the picture of a result, whatever its kind.
+
+    Args:
+        result: A `Path`, an `Equilibrium`, a `Batch`, a `Comparison`, a `Calibration`, a
+            `FrictionRig`, or a dict of label to path for several beside each other.
+        title: Heading; that of its kind if None.
+
+    Returns:
+        The picture: `save` writes it as PNG, SVG, PDF or HTML, `figure` gives that of matplotlib,
+        `interactive` that of plotly.
+
+    Raises:
+        InputError: It is no result.
+
+    Example:
+        >>> import tempfile
+        >>> import notchflex as nf
+        >>> from notchflex.plotting import picture
+        >>> state = nf.solve(nf.load_robot("pacheco2021-a"), nf.Load(tension=1.0))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     picture(state).save(f"{folder}/wrist.svg")
+    """
+    made = _picture(result)
+    return made if title is None else replace(made, title=title)
+
+
+def _picture(result: Any) -> Picture:
+    from notchflex.comparison import Comparison
+    from notchflex.plotting.batch import batch_picture
+    from notchflex.plotting.beside import beside_picture
+    from notchflex.plotting.calibration import calibration_picture
+    from notchflex.plotting.comparison import comparison_picture
+    from notchflex.plotting.equilibrium import state_picture
+    from notchflex.plotting.friction import friction_picture
+    from notchflex.plotting.path import path_picture
+    from notchflex.statics import Batch, Equilibrium, Path
+
+    if isinstance(result, Path):
+        return path_picture(result)
+    if isinstance(result, Equilibrium):
+        return state_picture(result.path, result.step)
+    if isinstance(result, Batch):
+        return batch_picture(result)
+    if isinstance(result, Comparison):
+        return comparison_picture(result)
+    if isinstance(result, Mapping) and all(isinstance(one, Path) for one in result.values()):
+        return beside_picture(cast("Mapping[str, Path]", result))
+
+    # Late: it takes a second to import, and those above do without.
+    from notchflex.fit import Calibration, FrictionRig
+
+    if isinstance(result, Calibration):
+        return calibration_picture(result)
+    if isinstance(result, FrictionRig):
+        return friction_picture(result)
+    raise InputError(
+        "a picture is made of a Path, an Equilibrium, a Batch, a Comparison, a Calibration, a "
+        f"FrictionRig or a dict of paths; got {type(result).__name__}."
+    )

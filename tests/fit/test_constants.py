@@ -1,0 +1,74 @@
+"""Names of constants: shared, of one robot, of every robot, of every notch; limits and starts."""
+
+import math
+
+import pytest
+
+import notchflex as nf
+from notchflex.fit import Constant
+from notchflex.fit.constants import unknowns
+
+TWO = {"A": nf.load_robot("pacheco2021-a"), "B": nf.load_robot("pacheco2021-b")}
+
+
+def names(fit, robots=TWO):
+    return [one.name for one in unknowns(robots, fit)]
+
+
+def test_a_name_alone_is_shared_by_all_robots():
+    (one,) = unknowns(TWO, "friction.coefficient")
+    assert one.sets == (("A", "friction.coefficient"), ("B", "friction.coefficient"))
+
+
+def test_each_robot_and_each_notch_have_their_own():
+    assert names("each:friction.coefficient") == [
+        "A:friction.coefficient",
+        "B:friction.coefficient",
+    ]
+    assert names("A:notch[each].precurvature_deg") == [
+        f"A:notch[{notch}].precurvature_deg" for notch in range(1, 6)
+    ]
+    assert len(names("notch[each].precurvature_deg")) == 10
+
+
+def test_units_limits_and_starts_come_from_the_robot():
+    modulus, friction = unknowns(TWO, ["material.elastic_modulus", "friction.coefficient"])
+    assert (modulus.unit, modulus.lower, modulus.upper) == ("MPa", 0.0, math.inf)
+    assert modulus.first < 10_000.0 < modulus.last
+    assert (friction.unit, friction.lower) == ("", 0.0)
+
+
+def test_limits_of_the_user_hold():
+    (one,) = unknowns(TWO, Constant("friction.coefficient", 0.05, 0.3))
+    assert (one.lower, one.upper, one.first, one.last) == (0.05, 0.3, 0.05, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("fit", "says"),
+    [
+        ((), "names no constant"),
+        (("material.modulus",), "material.modulus"),
+        (("C:friction.coefficient",), "no robot of this fit is called C"),
+        (("friction.coefficient", "A:friction.coefficient"), "fit it once"),
+        (("friction.coefficient",) * 2, "fit it once"),
+        (("material.kind",), "material.kind"),
+        (("tube.base_length",), "give limits"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_in_words(fit, says):
+    with pytest.raises(nf.InputError, match=says.replace("[", r"\[")):
+        unknowns(TWO, fit)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: Constant("x", 2.0, 1.0),
+        lambda: Constant("x", prior=(1.0, 0.0)),
+        lambda: Constant("x", lower=math.nan),
+        lambda: Constant(" "),
+    ],
+)
+def test_limits_and_priors_must_make_sense(made):
+    with pytest.raises(nf.InputError):
+        made()

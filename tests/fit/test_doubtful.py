@@ -1,0 +1,173 @@
+"""Data that a careless user gives: what is said of them, and what is never told of them."""
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from fitted import DEVIATION, NAMES, OBSERVED, ROBOT, fitted, measured
+from notchflex.fit import (
+    Constant,
+    LeastSquares,
+    Measurements,
+    calibrate,
+    leave_out,
+    next_measurement,
+    posterior,
+    read_measurements,
+    synthetic,
+    verdict,
+    write_fitted,
+)
+from notchflex.fit.problem import Problem
+from notchflex.fit.samples import Samples
+
+WRIST = nf.load_robot(ROBOT)
+FRICTION, MODULUS = NAMES
+
+
+def said_of(found):
+    return " ".join(verdict(found))
+
+
+def untold(seen):
+    """The same measurements without standard deviations."""
+    return Measurements("untold", seen.load, seen.pull, seen.from_rest, seen.observed)
+
+
+def test_a_fit_through_every_number_does_not_tell_how_far_to_trust_it(tmp_path):
+    seen = untold(measured())
+    seen.observed["notch_angle"][1:] = seen.observed["notch_angle"][:, 1:] = np.nan
+    seen.observed["total_angle"][:] = np.nan
+    found = calibrate(WRIST, seen, MODULUS, starts=1)
+    assert len(found.residuals) == 1
+    interval = found.intervals[MODULUS]
+    assert interval.lower is interval.upper is None
+    assert found.deviations[MODULUS] == np.inf
+    assert said_of(found).count(".") == 2
+    assert "No more numbers were measured than constants fitted" in said_of(found)
+    assert found.allows(MODULUS, 1.01 * found.values[MODULUS])
+    (file,) = write_fitted(found, tmp_path / "fitted")
+    assert "nothing tells the noise" in file.read_text(encoding="utf-8")
+    for ask in (posterior, lambda fit: next_measurement(fit, nf.pull(0.2, 1.0, steps=2))):
+        with pytest.raises(nf.InputError, match="nothing tells the noise"):
+            ask(found)
+
+
+def test_coordinates_may_be_missing_one_by_one_also_on_a_turned_base(tmp_path):
+    load = nf.pull(0.4, 1.4, steps=3)
+    turned = nf.LoadPath(load.tension, load.stroke, np.array([0.3, -0.2, 0.5]))
+    noise = {"tip_position": 0.05}
+    whole = synthetic(WRIST, turned, observed=("tip_position",), deviation=noise, seed=1)
+    whole.deviation["tip_position"][:, 2] = 5.0  # in the world, where it was measured
+    some = whole.observed["tip_position"].copy()
+    some[:, 2] = np.nan
+    part = Measurements("part", turned, whole.pull, True, {"tip_position": some}, whole.deviation)
+    nf.write_measurements(part, tmp_path / "part.csv")
+    found = calibrate(WRIST, read_measurements(tmp_path / "part.csv", WRIST), FRICTION, starts=1)
+    assert len(found.residuals) == 6
+    # What is hardly known counts as little as what was not measured at all.
+    hardly = calibrate(WRIST, whole, FRICTION, starts=1, intervals=False)
+    assert found.values[FRICTION] == pytest.approx(hardly.values[FRICTION], abs=2e-4)
+    at = synthetic(found.robots[WRIST.name], turned, observed=("tip_position",))
+    left = at.observed["tip_position"][:, :2] - some[:, :2]
+    np.testing.assert_allclose(found.residuals.values, left.ravel(), atol=1e-7)
+
+
+def test_a_robot_of_which_nothing_is_fitted_counts_but_moves_nothing():
+    robots = {"A": WRIST, "B": WRIST}
+    data = {"A": measured(), "B": measured(2)}
+    found = calibrate(robots, data, f"B:{FRICTION}", starts=1, intervals=False)
+    alone = calibrate(WRIST, measured(2), FRICTION, starts=1, intervals=False)
+    assert found.values[f"B:{FRICTION}"] == pytest.approx(alone.values[FRICTION], rel=1e-8)
+    assert not found.residuals.slopes[found.residuals.robot == 0].any()
+
+
+def test_what_nothing_depends_on_was_not_pushed_to_its_limit():
+    found = calibrate(WRIST, measured(), "sensor.stroke_slack", starts=1)
+    assert found.values["sensor.stroke_slack"] == 0.0
+    assert "cannot tell sensor.stroke_slack" in said_of(found)
+    assert "limit" not in said_of(found)
+    beyond = Constant(FRICTION, lower=0.3, upper=0.5)
+    pushed = calibrate(WRIST, measured(), beyond, starts=1, intervals=False)
+    assert "went to its lower limit, 0.3" in said_of(pushed)
+
+
+def test_angles_in_the_wrong_unit_give_a_modulus_that_is_doubted():
+    seen = measured()
+    small = {name: np.radians(one) for name, one in seen.observed.items()}
+    noise = {name: np.radians(one) for name, one in seen.deviation.items()}
+    wrong = Measurements("rad", seen.load, seen.pull, True, small, noise)
+    found = calibrate(WRIST, wrong, MODULUS, starts=1, intervals=False)
+    assert "look at the units" in said_of(found)
+    assert "look at the units" not in said_of(fitted())
+
+
+def test_a_prior_that_the_data_contradict_is_told():
+    off = Constant(FRICTION, prior=(0.5, 0.02))
+    assert "from its prior" in said_of(calibrate(WRIST, measured(), off, starts=1, intervals=False))
+    near = Constant(FRICTION, prior=(0.15, 0.02))
+    found = calibrate(WRIST, measured(), near, starts=1, intervals=False)
+    assert "from its prior" not in said_of(found)
+
+
+def test_angles_about_0_are_not_called_loose_for_being_small():
+    found = calibrate(WRIST, measured(), "notch[1].precurvature_deg", starts=1)
+    interval = found.intervals["notch[1].precurvature_deg"]
+    assert interval.upper - interval.lower > abs(found.values["notch[1].precurvature_deg"])
+    assert not said_of(found)
+
+
+def test_a_way_up_and_down_taken_as_pulls_from_rest_is_asked_about():
+    load = nf.pull(0.4, 1.6, steps=4).release()
+    seen = synthetic(WRIST, load, observed=OBSERVED, deviation=DEVIATION, from_rest=False)
+    wrong = Measurements("loop", load, seen.pull, True, seen.observed, seen.deviation)
+    found = calibrate(WRIST, wrong, MODULUS, starts=1, intervals=False)
+    assert "Pull 1 of loop goes up and down again" in said_of(found)
+    assert "up and down" not in said_of(calibrate(WRIST, untold(measured()), MODULUS, starts=1))
+
+
+def test_whether_a_model_misses_is_judged_by_numbers_of_known_noise_alone():
+    seen = measured().taken([0, 1, 2])  # without the repeats
+    noise = {"total_angle": np.array([0.01, 0.01, np.nan])}
+    mixed = Measurements("mixed", seen.load, seen.pull, True, seen.observed, noise)
+    found = calibrate(WRIST, mixed, FRICTION, starts=1, intervals=False)
+    known = ~found.noise.estimated
+    assert 0 < known.sum() < len(known)
+    share = found.residuals.values[known] / found.noise.deviation[known]
+    found.noise.deviation[known] *= np.sqrt(np.sum(share**2) / (known.sum() - 1) / 1.7)
+    assert found.reduced_chi_squared == pytest.approx(1.7)
+    assert not found.misses  # one number that is 1.3 times its noise off says nothing
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda: calibrate(WRIST, measured(), FRICTION, seed=-1), "seed must be"),
+        (lambda: calibrate(ROBOT, measured(), FRICTION), "needs a Robot"),
+        (lambda: calibrate(WRIST, [measured(), measured()], FRICTION), "the same rows"),
+        (lambda: calibrate({"each": WRIST}, {"each": measured()}, FRICTION), "called each"),
+        (lambda: calibrate(WRIST, measured(), Constant("tube.inner_diameter", 5.0, 9.0)), "1.62"),
+        (lambda: leave_out(fitted(), by="pull", seed=-1), "seed 0 or more"),
+        (lambda: leave_out(fitted(), by="pull", starts=0), "starts must be 1 or more"),
+        (lambda: posterior(fitted(), draws=3), "draws must be 4 or more"),
+        (
+            lambda: next_measurement(fitted(), nf.pull(0.2, 1, steps=2), deviation={"x": 0.0}),
+            "above 0",
+        ),
+        (lambda: Constant(FRICTION, prior=0.1), "a prior is a mean"),
+        (lambda: Constant(FRICTION, prior=("a", "b")), "a prior is a mean"),
+        (lambda: Constant(FRICTION, lower="0"), "limits must be finite"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(ask, words):
+    with pytest.raises(nf.InputError, match=words):
+        ask()
+
+
+def test_why_no_robot_can_be_is_forgotten_with_the_next_try():
+    samples = Samples.of({WRIST.name: WRIST}, {WRIST.name: [measured()]}, fitted().problem.unknowns)
+    problem = Problem(samples, LeastSquares())
+    assert problem(np.array([-1.0, 1e4])) is None
+    assert "friction.coefficient" in samples.refused
+    assert problem(np.array([0.1, 1e4])) is not None
+    assert not samples.refused

@@ -1,0 +1,247 @@
+"""Fits: known constants found again, slopes against differences, intervals, what cannot be told."""
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.fit import (
+    Constant,
+    LeastSquares,
+    Measurements,
+    SumOfDistances,
+    SumOfRobotErrors,
+    calibrate,
+    leave_out,
+    next_measurement,
+    read_measurements,
+    synthetic,
+    verdict,
+)
+from notchflex.fit.constants import unknowns
+from notchflex.fit.problem import Problem
+from notchflex.fit.samples import Samples
+from notchflex.robot.paths import number_at
+from shared_data import measured_path
+
+WRIST = nf.load_robot("pacheco2021-a")
+NOISE = {"notch_angle": 0.01}
+UP = nf.pull(0.2, 1.8, steps=8)
+FOUR = (
+    "material.elastic_modulus",
+    "material.superelastic_modulus",
+    "material.transition_strain",
+    "friction.coefficient",
+)
+TRUE = {name: number_at(WRIST, name) for name in FOUR}
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    return calibrate(WRIST, synthetic(WRIST, UP, deviation=NOISE, seed=1), FOUR, starts=1)
+
+
+def test_constants_are_found_again_without_noise():
+    seen = synthetic(WRIST, UP)
+    softer = WRIST.with_values({name: 0.8 * value for name, value in TRUE.items()})
+    found = calibrate(softer, seen, FOUR, starts=1, intervals=False)
+    assert found.converged
+    for name, value in TRUE.items():
+        assert found.values[name] == pytest.approx(value, rel=1e-5)
+
+
+def test_intervals_hold_the_truth_and_are_as_wide_as_the_noise_makes_them(noisy):
+    for name, interval in noisy.intervals.items():
+        assert interval.lower < TRUE[name] < interval.upper
+        half = 0.5 * (interval.upper - interval.lower)
+        assert half == pytest.approx(1.96 * noisy.deviations[name], rel=0.25)
+    assert noisy.reduced_chi_squared == pytest.approx(1.0, abs=0.5)
+    assert not noisy.misses
+
+
+def test_what_an_interval_holds_is_told_without_its_ends(noisy):
+    for name, interval in noisy.intervals.items():
+        for end in (interval.lower, interval.upper):
+            out = end - noisy.values[name]
+            assert noisy.allows(name, end - 0.02 * out)
+            assert not noisy.allows(name, end + 0.02 * out)
+    with pytest.raises(nf.InputError, match="was not fitted"):
+        noisy.allows("notch[1].depth", 1.0)
+
+
+def test_ends_of_an_interval_are_where_the_misfit_has_risen_by_chi_squared(noisy):
+    name = "friction.coefficient"
+    interval = noisy.intervals[name]
+    for end in (interval.lower, interval.upper):
+        held = WRIST.with_values({**noisy.values, name: end})
+        others = [one for one in FOUR if one != name]
+        seen = synthetic(WRIST, UP, deviation=NOISE, seed=1)
+        again = calibrate(held, seen, others, starts=1, intervals=False)
+        assert 2.0 * (again.cost - noisy.cost) == pytest.approx(3.8415, rel=0.02)
+
+
+@pytest.mark.parametrize("objective", [LeastSquares(), LeastSquares(1.0), SumOfRobotErrors()])
+def test_slope_of_the_misfit_is_that_of_differences(objective):
+    seen = synthetic(WRIST, UP, deviation=NOISE, seed=1)
+    data = {"A": (seen,)}
+    problem = Problem(Samples.of({"A": WRIST}, data, unknowns({"A": WRIST}, FOUR)), objective)
+    at = np.array([1.07 * TRUE[name] for name in FOUR])
+    slope = problem(at).gradient
+    for number, value in enumerate(at):
+        step = np.zeros(4)
+        step[number] = 1e-4 * value
+        ends = [problem(at + share * step).value for share in (-1.0, -0.5, 0.5, 1.0)]
+        wide, near = (ends[3] - ends[0]) / 2.0, ends[2] - ends[1]
+        difference = (4.0 * near - wide) / 3.0 / step[number]
+        assert slope[number] == pytest.approx(difference, rel=1e-6)
+
+
+def test_data_that_cannot_tell_a_constant_say_so():
+    slick = WRIST.with_value("friction.coefficient", 0.0)
+    seen = synthetic(slick, nf.pull(0.2, 0.6, steps=4), deviation=NOISE, seed=1)
+    names = ("friction.coefficient", "material.superelastic_modulus")
+    found = calibrate(WRIST, seen, names, starts=1)
+    friction, modulus = (found.intervals[name] for name in names)
+    assert friction.lower is None
+    assert modulus.lower is modulus.upper is None
+    said = " ".join(verdict(found))
+    assert "cannot tell material.superelastic_modulus" in said
+    assert "friction.coefficient is at most" in said
+
+
+def test_a_path_with_memory_points_poses_tensions_and_the_sensor_itself():
+    load = nf.pull(0.0, 1.5, steps=6).release()
+    noise = {
+        "tip_position": 0.05,
+        "tip_rotation": 0.01,
+        "tip_tension": 0.01,
+        "axis_points": 0.05,
+        "total_angle": 0.01,
+    }
+    exact = synthetic(WRIST, load, observed=tuple(noise), axis_at=[1.0, 5.0, 9.0], from_rest=False)
+    deviation = {name: np.full(one.shape, noise[name]) for name, one in exact.observed.items()}
+    offset = 0.04  # what the gauge shows too much: the robot had that much less
+    truth = synthetic(
+        WRIST,
+        nf.LoadPath(np.maximum(load.tension - offset, 0.0), load.stroke),
+        observed=tuple(noise),
+        axis_at=[1.0, 5.0, 9.0],
+        from_rest=False,
+    )
+    shifted = Measurements(
+        "shifted", load, exact.pull, False, truth.observed, deviation, exact.axis_at
+    )
+    names = ("friction.coefficient", "sensor.force_offset")
+    found = calibrate(WRIST.with_value("friction.coefficient", 0.2), shifted, names, starts=1)
+    assert found.values["sensor.force_offset"] == pytest.approx(offset, abs=1e-6)
+    assert found.values["friction.coefficient"] == pytest.approx(0.13, abs=1e-6)
+
+
+def test_noise_that_nobody_told_is_what_the_fit_leaves():
+    exact = synthetic(WRIST, UP, deviation=NOISE, seed=3)
+    untold = Measurements("untold", UP, exact.pull, True, exact.observed)
+    found = calibrate(WRIST, untold, "friction.coefficient", starts=1)
+    left = np.sqrt(np.sum(found.residuals.values**2) / found.freedom)
+    assert found.noise.deviation == pytest.approx(left, rel=1e-3)
+    assert "Nothing tells the noise" in " ".join(verdict(found))
+
+
+def test_a_total_that_is_the_sum_of_the_notches_counts_once():
+    both = synthetic(WRIST, UP, observed=("notch_angle", "total_angle"), deviation=NOISE, seed=1)
+    sums = {**both.observed, "total_angle": both.observed["notch_angle"].sum(axis=1)}
+    both = Measurements("both", UP, both.pull, True, sums, {"notch_angle": np.full((8, 5), 0.01)})
+    found = calibrate(WRIST, both, "friction.coefficient", starts=1, intervals=False)
+    assert found.freedom == 8 * 5 - 1
+
+
+def test_a_prior_pulls_as_a_measurement_would():
+    seen = synthetic(WRIST, UP, deviation=NOISE, seed=1)
+    name = "friction.coefficient"
+    free = calibrate(WRIST, seen, name, starts=1, intervals=False)
+    other = free.values[name] + free.deviations[name]
+    prior = Constant(name, prior=(other, free.deviations[name]))
+    pulled = calibrate(WRIST, seen, prior, starts=1, intervals=False)
+    half_way = 0.5 * (free.values[name] + other)
+    assert pulled.values[name] == pytest.approx(half_way, rel=2e-3)
+
+
+def test_the_next_measurement_narrows_as_much_as_it_says(noisy):
+    told = next_measurement(noisy, nf.pull(0.3, 1.8, steps=4), narrow=["friction.coefficient"])
+    load = nf.Load(tension=float(told.loads.tension[told.best, 0]))
+    more = synthetic(WRIST, load, deviation=NOISE)
+    exact = synthetic(WRIST.with_values(noisy.values), load)
+    more = Measurements("more", more.load, ("2",), True, exact.observed, more.deviation)
+    first = synthetic(WRIST, UP, deviation=NOISE, seed=1)
+    after = calibrate(WRIST, [first, more], FOUR, starts=1, intervals=False)
+    name = "friction.coefficient"
+    assert after.deviations[name] / noisy.deviations[name] == pytest.approx(
+        told.gain[told.best], rel=1e-3
+    )
+
+
+def test_a_pull_left_out_is_judged_by_constants_that_never_saw_it():
+    rough = WRIST.with_value("friction.coefficient", 0.3)
+    bad = synthetic(rough, UP, deviation=NOISE, seed=2, pull=["bad"] * 8)
+    good = synthetic(WRIST, UP, deviation=NOISE, seed=1, pull=["good"] * 8)
+    whole = calibrate(WRIST, [good, bad], "friction.coefficient", starts=1, intervals=False)
+    tested = leave_out(whole, by="pull")
+    assert [fold.label.rsplit(" ", 1)[1] for fold in tested.folds] == ["good", "bad"]
+    without_bad = tested.folds[1]
+    assert without_bad.found.values["friction.coefficient"] == pytest.approx(0.13, abs=0.02)
+    assert without_bad.errors["notch_angle"] > without_bad.errors_of_all["notch_angle"]
+
+
+def test_a_robot_with_a_constant_of_its_own_cannot_be_left_out():
+    robots = {"a": WRIST, "b": WRIST}
+    seen = dict.fromkeys(robots, synthetic(WRIST, UP, deviation=NOISE, seed=1))
+    own = ("a:friction.coefficient", "material.elastic_modulus")
+    whole = calibrate(robots, seen, own, starts=1, intervals=False)
+    with pytest.raises(nf.InputError, match=r"`a:friction\.coefficient` belongs to a alone"):
+        leave_out(whole, by="robot")
+
+
+def test_distances_of_points_are_made_small():
+    seen = synthetic(WRIST, UP, observed=("axis_points",), axis_at=[4.0, 9.0])
+    stiff = WRIST.with_value("friction.coefficient", 0.2)
+    found = calibrate(stiff, seen, "friction.coefficient", objective=SumOfDistances(), starts=1)
+    assert found.values["friction.coefficient"] == pytest.approx(0.13, abs=1e-6)
+    assert not found.intervals
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"objective": SumOfDistances()}, "distances of points"),
+        ({"measurements": {"X": None}}, "same labels"),
+        ({"fit": Constant("friction.coefficient", prior=(0.1, 0.1))}, "prior needs LeastSquares"),
+    ],
+)
+def test_what_does_not_belong_together_is_refused(change, says):
+    given = {
+        "measurements": synthetic(WRIST, UP),
+        "fit": "friction.coefficient",
+        "objective": SumOfRobotErrors(),
+    } | change
+    fit, measurements = given.pop("fit"), given.pop("measurements")
+    with pytest.raises(nf.InputError, match=says):
+        calibrate(WRIST, measurements, fit, **given)
+
+
+@pytest.mark.slow
+def test_the_identification_of_pacheco_2021():
+    robots = {name: nf.load_robot(f"pacheco2021-{name}-specimen") for name in "abc"}
+    data = {
+        name: read_measurements(
+            measured_path(f"pacheco2021_wrist_{name.upper()}_measured.csv"), robot
+        )
+        for name, robot in robots.items()
+    }
+    fit = (
+        Constant("material.elastic_modulus", 5e3, 20e3),
+        Constant("material.superelastic_modulus", 1e3, 6e3),
+        Constant("material.transition_strain", 0.01, 0.05),
+        Constant("friction.coefficient", 0.0, 0.5),
+    )
+    found = calibrate(robots, data, fit, objective=SumOfRobotErrors(), starts=2)
+    assert found.cost <= 11.5942
+    expected = [10_329.0, 3_063.8, 0.026397, 0.12599]
+    np.testing.assert_allclose(list(found.values.values()), expected, rtol=1e-4)

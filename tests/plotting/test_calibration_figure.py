@@ -1,0 +1,146 @@
+"""The picture of a fit: data, band, residuals, profiles, correlations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import t
+
+from fitted import NAMES, fitted
+from notchflex.fit import Interval
+from notchflex.plotting import calibration_figure, calibration_picture, picture
+from notchflex.plotting.sheet import Area
+from notchflex.plotting.style import VERMILLION
+
+
+def panel(figure, title):
+    """The panel of a title, and its line of the model or profile."""
+    return next(axes for axes in figure.axes if axes.get_title(loc="left") == title)
+
+
+def curve(axes):
+    """The longest line of a panel."""
+    return max(
+        axes.get_lines(), key=lambda line: len(line.get_xdata()) * (line.get_linestyle() == "-")
+    )
+
+
+def test_panels_and_units():
+    figure = calibration_figure(fitted())
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert titles == [
+        *(f"notch {number}" for number in range(1, 6)),
+        "total bending angle",
+        "model less measured",
+        "profile of constant 1, dotted: 95 %",
+        "profile of constant 2, dotted: 95 %",
+        "correlation",
+    ]
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+    assert labels[0] == ("tendon tension $T$ [N]", "angle [deg]")
+    assert labels[6][1] == "residual / its noise"
+    assert labels[8][0].replace("\n", "") == "material.elastic_modulus [MPa]"
+
+
+def test_model_measured_and_band_are_those_of_the_fit():
+    found = fitted()
+    axes = panel(calibration_figure(found), "notch 2")
+    model = curve(axes)
+    measured = found.problem.samples.every[0].measured
+    order = np.argsort(measured.load.tension[:, 0], kind="stable")
+    own = (found.residuals.quantity == 0) & (found.residuals.part == 1)
+    off = found.residuals.values[own]
+    expected = np.degrees(measured.observed["notch_angle"][:, 1] + off)
+    np.testing.assert_allclose(model.get_ydata(), expected[order])
+    np.testing.assert_allclose(model.get_xdata(), measured.load.tension[order, 0])
+    marks = [line for line in axes.get_lines() if line.get_linestyle() == "None"]
+    seen = np.concatenate([line.get_ydata() for line in marks])
+    np.testing.assert_allclose(
+        np.sort(seen), np.sort(np.degrees(measured.observed["notch_angle"][:, 1]))
+    )
+    assert len(marks) == 2  # one kind of marker for each pull
+    slopes = found.residuals.slopes[own][order]
+    spread = np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+    half = np.degrees(t.ppf(0.975, found.freedom) * spread)
+    (band,) = axes.patches
+    heights = band.get_xy()[:, 1]
+    assert heights.max() == pytest.approx(np.max(expected[order] + half))
+    assert heights.min() == pytest.approx(np.min(expected[order] - half))
+
+
+def test_profile_goes_through_the_points_and_shows_the_ends():
+    found = fitted()
+    axes = panel(calibration_figure(found), "profile of constant 1, dotted: 95 %")
+    interval = found.intervals[NAMES[0]]
+    x, y = curve(axes).get_data()
+    assert y.min() == pytest.approx(0.0, abs=0.05)
+    assert np.interp(interval.lower, x, y) == pytest.approx(3.84, rel=0.03)
+    ends = [line.get_xdata()[0] for line in axes.get_lines() if line.get_color() == VERMILLION]
+    assert ends == [interval.lower, interval.upper]
+    assert not axes.texts
+
+
+def test_open_ends_and_unknown_constants_are_drawn():
+    found = fitted()
+    profile = found.intervals[NAMES[0]].profile
+    known = profile[profile[:, 0] <= found.values[NAMES[0]]]
+    opened = replace(found, intervals={NAMES[0]: Interval(None, None, known, "nothing")})
+    # nothing depends on the second constant
+    curvature = np.diag([found.reached.curvature[0, 0], 0.0])
+    opened = replace(opened, reached=found.reached._replace(curvature=curvature))
+    figure = calibration_figure(opened)
+    axes = panel(figure, "profile of constant 1, dotted: 95 %")
+    assert [text.get_text() for text in axes.texts] == ["open below and above"]
+    assert not panel(figure, "notch 1").patches  # no band where the covariance is infinite
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "model" in told
+    assert not [text for text in told if "95 %" in text]
+    numbers = [text.get_text() for text in panel(figure, "correlation").texts]
+    assert (numbers[0], numbers[-1]) == ("1.00", "-")
+
+
+def test_legend_fits_on_the_paper():
+    found = fitted()
+    own = calibration_picture(found)
+    # Least of all are the total angle and its residuals.
+    for made in (own, replace(own, width=6.0, height=3.0, cells=own.cells[:2])):
+        figure = made.figure()
+        figure.draw_without_rendering()
+        (legend,) = figure.legends
+        box = legend.get_window_extent()
+        assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
+        names = [text.get_text() for text in legend.get_texts()]
+        notches = [f"residuals of notch {number}" for number in range(1, 6)]
+        assert names[-6:] == [*notches, "residuals of others"]
+
+
+def test_browser_shows_band_ends_and_correlations():
+    found = fitted()
+    made = calibration_picture(found)
+    shown = made.interactive()
+    (area,) = (item for item in made.cells[1].panel.items if isinstance(item, Area))
+    (band,) = (one for one in shown.data if one.xaxis == "x2" and one.fill == "toself")
+    count = len(area.polygons[0])
+    np.testing.assert_allclose(band.y[:count], area.polygons[0][:, 1], rtol=1e-5)
+    legend = {one.legendgroup: one.name for one in shown.data if one.showlegend}
+    assert legend[band.legendgroup] == "95 % band of the model"
+    upright = [one for one in shown.layout.shapes if one.type == "line" and one.x0 == one.x1]
+    ends = [end for one in found.intervals.values() for end in (one.lower, one.upper)]
+    assert [one.x0 for one in upright] == ends
+    assert {legend[one.legendgroup] for one in upright} == {"end of the 95 % interval"}
+    (square,) = (one for one in shown.data if one.type == "heatmap")
+    np.testing.assert_allclose(np.array(square.z, float), found.correlation, rtol=1e-5)
+    assert square.customdata[0][1] == "friction.coefficient<br>material.elastic_modulus"
+    points = [one for one in shown.data if (one.name or "") == "measured, pull a"]
+    assert len(points) == 6  # five notches and the total
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".html"])
+def test_is_written(tmp_path, suffix):
+    made = picture(fitted(), title="mine")
+    assert made.title == "mine"
+    for name in ("a", "b"):
+        made.save(tmp_path / f"{name}{suffix}")
+    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()

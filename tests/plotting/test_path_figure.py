@@ -1,0 +1,242 @@
+"""The picture of a path: drawn from the table of quantities, to scale, in every format."""
+
+import numpy as np
+import pytest
+
+from fake_path import CLOSING, fake_path
+from notchflex.chain import assemble
+from notchflex.errors import InputError
+from notchflex.plotting import path_figure, save
+from notchflex.plotting.bent import bent, bent_at
+from notchflex.plotting.drive import abscissa, branches, way_of
+from notchflex.plotting.outline import bending_plane, outline
+from notchflex.plotting.wrist import telling_steps
+from notchflex.statics.external import BodyForce, ExternalLoad
+
+
+def outline_at(path, step):
+    return outline(bent_at(path, step), 0.0)
+
+
+def panels(path):
+    """What every panel has on its vertical axis, without units."""
+    return [axes.get_ylabel().partition(" [")[0] for axes in path_figure(path).axes]
+
+
+def part_of(path, steps):
+    """The same path with some of its steps only."""
+    path.columns = {name: values[steps] for name, values in path.columns.items()}
+    return path
+
+
+LOOP = ["along the base, z"] * 2 + [
+    "total bending angle $\\theta$",
+    "notch angle $\\theta_j$",
+    "span tension $T$",
+    "friction front $m + (1 - \\eta)/2$, contact",
+]
+
+
+def test_panels_are_what_the_path_holds():
+    assert panels(fake_path(5)) == LOOP
+    assert panels(part_of(fake_path(5), slice(0, 5))) == [LOOP[0], *LOOP[2:4]]
+    assert panels(part_of(fake_path(5), slice(3, 4))) == LOOP[:1]
+    smooth = fake_path(5)
+    smooth.columns["contact_bound"] = 0.0 * smooth.contact_bound
+    assert panels(smooth) == LOOP[:-1]
+
+
+def test_axes_have_quantities_and_units():
+    figure = path_figure(fake_path(11))
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+    assert labels[2] == ("tendon tension $T$ [N]", "total bending angle $\\theta$ [deg]")
+    assert labels[3][1] == "notch angle $\\theta_j$ [deg]"
+    assert labels[4] == ("span of tendon, 0 at the base", "span tension $T$ [N]")
+    assert all("[mm]" in label for labels_of_one in labels[:2] for label in labels_of_one)
+    assert figure.axes[0].get_aspect() == 1.0
+
+
+def test_loading_and_unloading_are_told_apart():
+    figure = path_figure(fake_path(11))
+    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["pulling", "letting go"]
+    for axes in (figure.axes[2], figure.axes[4]):
+        texts = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert texts == ["pulling", "letting go"]
+        assert {line.get_linestyle() for line in axes.get_lines()} == {"-", "--"}
+
+
+def test_tension_is_drawn_from_span_to_span():
+    path = fake_path(4)
+    first = path_figure(path).axes[4].get_lines()[0]
+    assert list(first.get_xdata()) == list(range(10))
+    np.testing.assert_array_equal(first.get_ydata(), path.span_tension[1, 0])  # step 1 is slack
+
+
+def test_front_goes_from_contact_to_contact_as_eta_falls():
+    path = fake_path(4)
+    path.columns["front_eta"][6] = -0.5
+    path.columns["front_eta"][5] = np.nan
+    _, letting_go = path_figure(path).axes[5].get_lines()
+    # Steps 4 to 8; without tension, in the last, nothing rubs.
+    np.testing.assert_array_equal(letting_go.get_ydata(), [1.0, 2.0, 3.75, np.nan])
+
+
+def test_stroke_is_the_abscissa_where_it_is_commanded():
+    path = fake_path(4)
+    path.columns["commanded_stroke"], path.columns["commanded_tension"] = (
+        path.stroke,
+        path.commanded_stroke,
+    )
+    values, label = abscissa(path)
+    assert label == "tendon stroke $u$ [mm]"
+    np.testing.assert_array_equal(values, path.stroke[:, 0])
+
+
+def test_ways_of_two_tendons_are_told_by_their_sum():
+    path = fake_path(3)
+    path.columns["tension"] = np.repeat(path.tension, 2, axis=1) * [1.0, 0.5]
+    path.columns["commanded_tension"] = path.columns["tension"]
+    path.columns["commanded_stroke"] = np.full((6, 2), np.nan)
+    path.columns["stroke"] = np.repeat(path.stroke, 2, axis=1)
+    assert way_of(path) == {"pulling": [0, 1, 2, 3], "letting go": [3, 4, 5]}
+
+
+def arrows(figure):
+    return [patch for patch in figure.axes[0].patches if hasattr(patch, "get_arrowstyle")]
+
+
+def test_loads_are_arrows_where_they_act():
+    path = part_of(fake_path(3), slice(2, 3))
+    side = BodyForce(2, (0.0, 0.0, 0.1), point=(0.5, 0.0, 0.0), following=True)
+    path.columns["external"] = (
+        ExternalLoad(tip_force=(-0.2, 0.0, 0.0), tip_moment=(0.0, 1.0, 0.0), body_forces=[side]),
+    )
+    figure = path_figure(path)
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert {"force 0.2 N", "moment 1 N mm", "force 0.1 N, following"} <= set(names)
+    shape = bent_at(path, 0)
+    dead = (path.tip_position[0] - path.body_position[0, 0])[[0, 2]]
+    ends = [arrow._posA_posB for arrow in arrows(figure)]
+    np.testing.assert_allclose(ends[0][0], dead, atol=1e-9)
+    np.testing.assert_allclose(np.sign(np.subtract(*ends[0][::-1])), [-1.0, 0.0])
+    np.testing.assert_allclose(ends[2][0], shape.on_body(2, [0.5, 0.0, 0.0])[[0, 2]])
+    along = shape.rotation[2, :, 2][[0, 2]]
+    np.testing.assert_allclose(
+        np.subtract(*ends[2][::-1]) / np.linalg.norm(np.subtract(*ends[2][::-1])), along
+    )
+    # Half the force, half the arrow.
+    longest = np.linalg.norm(np.subtract(*ends[0][::-1]))
+    assert np.linalg.norm(np.subtract(*ends[2][::-1])) == pytest.approx(0.5 * longest)
+
+
+def test_load_out_of_the_plane_is_drawn_in_space():
+    path = part_of(fake_path(3), slice(2, 3))
+    path.columns["external"] = (ExternalLoad(tip_force=(0.0, 0.1, 0.0)),)
+    assert path_figure(path).axes[0].name == "3d"
+    path.columns["external"] = (ExternalLoad(tip_moment=(0.0, 0.1, 0.0)),)
+    assert path_figure(path).axes[0].name == "rectilinear"
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf", ".PNG"])
+def test_every_format_is_written(tmp_path, suffix):
+    file = tmp_path / f"wrist{suffix}"
+    save(path_figure(fake_path(3)), file)
+    start = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix.lower()]
+    assert file.read_bytes().startswith(start)
+    assert [found.name for found in tmp_path.iterdir()] == [file.name]
+
+
+def test_same_picture_is_the_same_file(tmp_path):
+    for name in ("a.svg", "b.svg"):
+        save(path_figure(fake_path(3)), tmp_path / name)
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+
+
+def test_other_formats_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"\.png, \.svg or \.pdf"):
+        save(path_figure(fake_path(3)), tmp_path / "wrist.gif")
+
+
+@pytest.mark.parametrize("failed", [1, 6])
+def test_path_with_failures_is_drawn(failed):
+    figure = path_figure(fake_path(3, failed=failed))
+    assert len(figure.axes) == (3 if failed == 6 else 6)
+
+
+def test_single_step_is_drawn():
+    path = part_of(fake_path(2), slice(1, 2))
+    assert len(path_figure(path).axes) == 1
+    assert len(telling_steps(path)) == 1
+
+
+def test_steps_drawn_are_spread_over_the_shapes():
+    path = fake_path(31)
+    steps = telling_steps(path)
+    assert len(steps) == 5
+    assert np.ptp(np.diff(path.total_angle[steps])) < np.radians(12.0)
+    assert path.total_angle[steps[-1]] == path.total_angle.max()
+
+
+def test_branches_turn_where_the_tension_turns():
+    x = np.array([0.0, 1.0, 1.0, 2.0, 2.0, 1.0, 1.0, 3.0])
+    parts = [(part.start, part.stop, up) for part, up in branches(x)]
+    assert parts == [(0, 5, True), (4, 7, False), (6, 8, True)]
+
+
+def test_abscissa_is_the_step_where_several_tendons_change():
+    path = fake_path(3)
+    for name in ("tension", "stroke", "commanded_tension", "commanded_stroke"):
+        path.columns[name] = np.repeat(path.columns[name], 2, axis=1)
+    assert abscissa(path)[1] == "tension of tendon 1 $T$ [N]"  # both alike
+    path.columns["tension"][1, 1] = 0.2
+    assert abscissa(path)[1] == "step"
+    path.columns["tension"][:, 0] = 0.5
+    assert abscissa(path)[1] == "tension of tendon 2 $T$ [N]"
+
+
+def test_outline_is_to_scale():
+    path = fake_path(3)
+    shape = outline_at(path, 0)
+    tip = shape.bodies[-1]
+    assert np.ptp(tip[:, 0]) == pytest.approx(1.62)
+    assert np.ptp(tip[:, 1]) == pytest.approx(1.2)
+    strip = shape.flexures[0]
+    assert strip[:, 0].min() == pytest.approx(-0.81)  # the spine is away from the bend
+    # inner edge of the sector: r_i cos a, with cos a = (1.40 - 0.81) / 0.81
+    assert strip[:, 0].max() == pytest.approx(-0.70 * 0.59 / 0.81, abs=1e-3)
+    assert shape.centre_line[-1] == pytest.approx([0.0, 10.0])
+
+
+def test_bent_notch_is_an_arc_of_the_right_length():
+    path = fake_path(3)
+    shape = outline_at(path, 2)
+    strip = shape.flexures[0]
+    outer_edge = strip[: len(strip) // 2]
+    length = np.linalg.norm(np.diff(outer_edge, axis=0), axis=1).sum()
+    assert length == pytest.approx(0.8 + (0.81 - 0.6865) * CLOSING, rel=1e-3)
+    # the lips of a closed notch meet
+    first, second = shape.bodies[0][1], shape.bodies[1][0]
+    assert np.linalg.norm(first - second) < 2e-3
+    np.testing.assert_allclose(shape.lips[0], first, atol=2e-3)
+
+
+def test_picture_does_not_turn_with_the_base():
+    path = fake_path(3)
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    modes = path.run.solved.point.unknowns.modes[2]
+    chain = assemble(path.robot, path.chain.level, flat=False)
+    position, rotation = path.body_position[2] @ turn.T, turn @ path.body_rotation[2]
+    turned = outline(bent(path.robot, chain, modes, position, rotation), 0.0)
+    straight = outline_at(path, 2)
+    for one, other in zip(turned.bodies, straight.bodies, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+
+
+def test_robots_that_leave_the_plane_are_drawn_in_space():
+    path = part_of(fake_path(3), slice(0, 3))
+    assert bending_plane(path.robot) == 0.0
+    assert bending_plane(path.robot.with_value("notch[2].direction_deg", 180)) == 0.0
+    path.robot = path.robot.with_value("notch[2].direction_deg", 90)
+    figure = path_figure(path)
+    assert [axes.name for axes in figure.axes] == ["3d", "rectilinear", "rectilinear"]
+    assert figure.axes[0].get_zlabel() == "z, along the base [mm]"
