@@ -9,7 +9,14 @@ from differences import Difference, difference, joined, told
 
 import gao2017
 import notchflex as nf
-from notchflex.plotting.style import BLUE, VERMILLION, house_style, new_figure, save, sequence_colours
+from notchflex.plotting.style import (
+    BLUE,
+    VERMILLION,
+    house_style,
+    new_figure,
+    save,
+    sequence_colours,
+)
 from reference_data import reference
 
 CASES = (

@@ -1,3 +1,5 @@
+from notchflex.errors import InputError as InputError
+from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.fit import Calibration as Calibration
 from notchflex.fit import Constant as Constant
 from notchflex.fit import FrictionReadings as FrictionReadings
@@ -16,8 +18,6 @@ from notchflex.fit import synthetic as synthetic
 from notchflex.fit import verdict as verdict
 from notchflex.fit import write_fitted as write_fitted
 from notchflex.fit import write_measurements as write_measurements
-from notchflex.errors import InputError as InputError
-from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.flexure import Elastica as Elastica
 from notchflex.flexure import elastica as elastica
 from notchflex.flexure import modulus_from_single_notch as modulus_from_single_notch

@@ -11,9 +11,9 @@ import pytest
 import notchflex as nf
 import notchflex.fit as fitting
 from fitted import NAMES, ROBOT, fitted, measured
-from notchflex.fit import Fold, LeftOut, Posterior
 from notchflex.cli import calibrate_tables, run
 from notchflex.cli.calibrate_words import parse_fit, parse_pairs, robots_of
+from notchflex.fit import Fold, LeftOut, Posterior
 
 FIT = ("--fit", ",".join(NAMES), "--starts", "1")
 

@@ -10,13 +10,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
+from notchflex.errors import InputError
 from notchflex.fit.curvature import unit_free
 from notchflex.fit.intervals import Interval, allowed_rise, held
 from notchflex.fit.minimise import Cost, Minimum
 from notchflex.fit.noise import Noise
 from notchflex.fit.problem import Problem
 from notchflex.fit.residuals import Residuals
-from notchflex.errors import InputError
 from notchflex.robot import Robot
 
 # A misfit this unlikely for the noise that was told means that the model misses something.

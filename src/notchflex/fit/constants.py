@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from notchflex.fit.rows import SENSOR
 from notchflex.errors import InputError
+from notchflex.fit.rows import SENSOR
 from notchflex.robot import Robot
 from notchflex.robot.paths import described_at, number_at
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from notchflex.errors import InputError
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.constants import Constant, unknowns
 from notchflex.fit.intervals import Interval, profile_interval
@@ -16,7 +17,6 @@ from notchflex.fit.noise import noise_left
 from notchflex.fit.objective import FitObjective, LeastSquares
 from notchflex.fit.problem import Problem, Progress, search
 from notchflex.fit.samples import Samples
-from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.statics.newton import Settings
 

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from math import isfinite
 from pathlib import Path
 
+from notchflex.errors import InputError
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.constants import Unknown
 from notchflex.fit.documents import data_of
 from notchflex.fit.rows import SENSOR
-from notchflex.errors import InputError
 from notchflex.results.files import check_folder, write_text
 from notchflex.robot import robot_text
 from notchflex.robot.robot import source_of

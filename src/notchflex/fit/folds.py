@@ -8,13 +8,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from notchflex.errors import InputError
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.fit import fitted
 from notchflex.fit.measurements import OBSERVED, Measurements
 from notchflex.fit.problem import Problem, Progress
 from notchflex.fit.residuals import Residuals
 from notchflex.fit.samples import Samples
-from notchflex.errors import InputError
 from notchflex.robot import Robot
 
 

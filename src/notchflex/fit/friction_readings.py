@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex.errors import InputError
 from notchflex.fit.two_weights import (
     coefficient_from_weights,
     impossible,
     slopes_of_coefficient,
 )
-from notchflex.errors import InputError
 from notchflex.results.csv_reading import read_table
 
 COLUMNS = {

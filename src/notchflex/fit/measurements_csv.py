@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex.errors import InputError
 from notchflex.fit.columns import (
     BASE_TURN,
     BODY_FOLLOWING,
@@ -22,7 +23,6 @@ from notchflex.fit.columns import (
     places_on_axis,
 )
 from notchflex.fit.measurements import Measurements
-from notchflex.errors import InputError
 from notchflex.results.csv_reading import Table, no_tendon_column, read_table, tendon_columns
 from notchflex.results.quantities import AXES
 from notchflex.robot import Robot

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex.errors import InputError
 from notchflex.fit.columns import (
     BASE_TURN,
     BODY_FOLLOWING,
@@ -21,7 +22,6 @@ from notchflex.fit.columns import (
     columns,
 )
 from notchflex.fit.measurements import Measurements
-from notchflex.errors import InputError
 from notchflex.results.csv import write_csv
 from notchflex.results.quantities import AXES, QUANTITIES
 from notchflex.statics import BodyForce

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from notchflex.errors import InputError
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.measurements import OBSERVED, Measurements
 from notchflex.fit.samples import Samples
 from notchflex.fit.synthetic import modelled
-from notchflex.errors import InputError
 from notchflex.statics import Load, LoadPath, solve_each
 from notchflex.statics.load import load_path
 

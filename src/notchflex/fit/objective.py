@@ -8,9 +8,9 @@ from typing import ClassVar, Protocol
 import numpy as np
 from jaxtyping import Float, Int
 
+from notchflex.errors import InputError
 from notchflex.fit.minimise import Cost
 from notchflex.fit.residuals import ANGLES, LENGTHS, Residuals
-from notchflex.errors import InputError
 
 
 class FitObjective(Protocol):

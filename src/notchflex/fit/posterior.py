@@ -13,10 +13,10 @@ from jaxtyping import Float
 
 from notchflex._extras import need
 from notchflex._jax import jax, jnp
+from notchflex.errors import InputError
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.intervals import LEVEL
 from notchflex.fit.problem import Progress
-from notchflex.errors import InputError
 
 LEAST_DRAWS = 4
 """Fewer draws of a chain tell nothing of how unlike its halves are."""

@@ -8,13 +8,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
+from notchflex.errors import InputError
 from notchflex.fit.constants import Unknown
 from notchflex.fit.curvature import unit_free
 from notchflex.fit.minimise import Cost, Minimum, minimise
 from notchflex.fit.noise import Noise, first_noise
 from notchflex.fit.objective import FitObjective
 from notchflex.fit.samples import Samples
-from notchflex.errors import InputError
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""

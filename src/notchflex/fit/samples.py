@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from notchflex.errors import InputError
 from notchflex.fit.constants import Unknown
 from notchflex.fit.measurements import OBSERVED, Measurements
 from notchflex.fit.residuals import Residuals, misfit, outputs_for
 from notchflex.fit.rows import Rows
-from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.statics.axis_points import AxisPlaces, axis_places
 from notchflex.statics.newton import DEFAULT, Settings

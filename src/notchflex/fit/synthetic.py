@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from notchflex.fit.measurements import OBSERVED, Measurements
 from notchflex.errors import InputError
+from notchflex.fit.measurements import OBSERVED, Measurements
 from notchflex.results.spans import spans_of
 from notchflex.robot import Robot
 from notchflex.statics import Load, LoadPath, axis_points, simulate, solve_each
