@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax
 from notchflex._native import native
 from notchflex.statics.known import KnownForm
 from notchflex.statics.newton import Settings
 from notchflex.statics.outputs import followed
 from notchflex.statics.packing import Form, lane_sizes
 from notchflex.statics.stepping import advance, at_rest
-from notchflex.statics.sweep import ONE_BY_ONE
-
-# Each is written out, so that longer chains are joined side by side first.
-_ONE_BY_ONE = 32
 
 
 @native(3, lane_sizes)
@@ -43,10 +36,7 @@ def followed_row(
     """
     robot, loads = chain_form.unpack(chain), command_form.unpack(commands)
     start, settings = at_rest(robot), Settings.of(numbers)
-    # A processor's vectors are full of rows: nothing is gained by joining parts of a chain at once.
-    one_by_one = _ONE_BY_ONE if jax.default_backend() == "cpu" else ONE_BY_ONE
-    step = partial(advance, one_by_one=one_by_one)
-    return followed(robot, loads, start, settings, outputs, step)
+    return followed(robot, loads, start, settings, outputs, advance)
 
 
 __all__ = ["followed_row"]

@@ -15,7 +15,7 @@ from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual, stroke
 from notchflex.statics.element import Memory, Unknowns, pressed
 from notchflex.statics.play import played
-from notchflex.statics.sweep import ONE_BY_ONE, Step, linear_step
+from notchflex.statics.sweep import Step, linear_step
 from notchflex.statics.walk import Evaluation, evaluate
 
 
@@ -119,7 +119,6 @@ def newton(
     start: Point,
     settings: Settings,
     enough: Float[Array, ""],
-    one_by_one: int = ONE_BY_ONE,
 ) -> NewtonResult:
     """Find the equilibrium under a command near a starting point.
 
@@ -134,7 +133,6 @@ def newton(
         start: Where to begin.
         settings: How hard to try.
         enough: Imbalance that is small enough, should it be above the tolerance.
-        one_by_one: As for `linear_step`.
 
     Returns:
         The result; a failure is told by `converged`, never raised.
@@ -177,7 +175,7 @@ def newton(
         )
 
         def again() -> tuple[Point, Array]:
-            step = linear_step(chain, command, *here, at, one_by_one)
+            step = linear_step(chain, command, *here, at)
             step = _moderate(chain, point, step)
             # Where strokes are given, contacts that turn round must not be held up on their way.
             stops = command.by_stroke is None

@@ -15,7 +15,6 @@ from notchflex.statics.applied import Applied
 from notchflex.statics.element import Memory, Unknowns
 from notchflex.statics.newton import NewtonResult, Point, Settings, newton
 from notchflex.statics.play import played
-from notchflex.statics.sweep import ONE_BY_ONE
 
 
 class Solved(NamedTuple):
@@ -92,8 +91,6 @@ def advance(
     command: Command,
     last: Solved,
     settings: Settings,
-    *,
-    one_by_one: int = ONE_BY_ONE,
 ) -> Advance:
     """Follow a load from a solved state.
 
@@ -108,7 +105,6 @@ def advance(
         command: The load.
         last: The solved state before.
         settings: How hard to try.
-        one_by_one: As for `sweep.linear_step`.
 
     Returns:
         What came of it.
@@ -123,7 +119,7 @@ def advance(
         before = solved.point.base_tension
         enough = jnp.minimum(_ON_THE_WAY * settings.tolerance, _AT_MOST)
         enough = jnp.where(part < 1.0, enough, 0.0)
-        found = newton(chain, wanted, solved.memory, before, start, settings, enough, one_by_one)
+        found = newton(chain, wanted, solved.memory, before, start, settings, enough)
         return found, wanted
 
     def going(state: tuple[Advance, Array, Array]) -> Bool[Array, ""]:

@@ -9,12 +9,10 @@ All elements eliminate their own unknowns at once. What each then says is
 
     dcarried_out = y + Y1 dcarried + Y2 dbeyond,   dbehind = z + Z1 dcarried + Z2 dbeyond
 
-and two neighbours together say the same of their ends (Redheffer's star product), what passes
-between them being eliminated. So all neighbours are joined at once, then all pairs of them, until
-few are left: a few wide operations instead of many narrow ones. These few are joined from the tip
-on, beyond which is nothing, until at the base only the tensions are left to find. On the way back
-every pair learns what passes between its two. It is the elimination of a block-tridiagonal matrix
-by nested dissection.
+From the tip on, beyond which is nothing, a loop over the elements eliminates what comes back from
+beyond each, until at the base only the tensions are left to find. A second loop goes from the base
+to the tip and finds what passes between neighbours. It is the elimination of a block-tridiagonal
+matrix; the program holds one element's part of it, whatever the length of the chain.
 """
 
 from __future__ import annotations
@@ -34,8 +32,6 @@ from notchflex.statics.linear import blocks
 from notchflex.statics.walk import Evaluation
 
 _HELD, _TIED = 1e-9, 1e-7
-# So many parts of the chain are joined one by one, where a vector holds what is done to several.
-ONE_BY_ONE = 4
 
 
 class Step(NamedTuple):
@@ -57,7 +53,6 @@ def linear_step(
     memory: Memory,
     base_tension: Float[Array, " t"],
     at: Evaluation,
-    one_by_one: int = ONE_BY_ONE,
 ) -> Step:
     """Solve the linearised balance for the step that would meet it.
 
@@ -68,8 +63,6 @@ def linear_step(
         memory: What its contacts remember.
         base_tension: Its base tensions, N.
         at: Its evaluation there.
-        one_by_one: How many parts of the chain are joined one after the other and not side by side:
-            that is less to do, but nothing can be done at once.
 
     Its derivatives are those of the imbalance it meets, not those of the linear system: a step
     from a solved state then changes as the solution does (implicit function theorem).
@@ -90,19 +83,13 @@ def linear_step(
         unasked = jnp.pad(row[..., own:], ((0, 0), (0, 0), (1, 0)))
         return unasked + row[..., :own] @ answer
 
-    ports = Ports(answered(rows.onward), answered(rows.behind))
-    levels: list[Ports] = []
-    while len(ports.onward) > one_by_one:
-        between, ports = _joined(ports, form.carried)
-        levels.append(between)
     leave = _leaving(chain, form)
-    passed, back = _from_tip(ports, leave)
+    passed, back = _from_tip(answered(rows.onward), answered(rows.behind), form)
     tension_step = command.value - base_tension
     if command.by_stroke is not None:
-        tension_step = _drawn(chain, command, base_tension, at, back)
-    known = _from_base(passed, tension_step, leave, form.beyond)
-    for between in reversed(levels):
-        known = _parted(between, known, form.carried)
+        by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ leave], axis=1)
+        tension_step = _drawn(chain, command, base_tension, at, by_tension)
+    known = _from_base(passed, leave @ tension_step)
     steps = jnp.einsum("nuz,nz->nu", answer, known)
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
     return Step(jax.vmap(unknowns_of)(steps), tension_step)
@@ -145,68 +132,34 @@ def _leaving(chain: Chain, form: Layout) -> Float[np.ndarray, "c t"]:
     return leave
 
 
-class Ports(NamedTuple):
-    """What parts of the chain, base to tip, say of their ends: over (1, carried, from beyond).
-
-    Attributes:
-        onward: What is carried out of each part; between two parts, from the one to the other.
-        behind: What is handed back by each; between two parts, from the other to the one.
-    """
-
-    onward: Float[Array, "parts c z"]
-    behind: Float[Array, "parts b z"]
-
-
-def _joined(ports: Ports, carried: int) -> tuple[Ports, Ports]:
-    """Join neighbours: what passes between the two of each pair, and all parts that are left."""
-    whole = len(ports.onward) // 2 * 2
-    (first, first_back), (second, second_back) = (
-        (ports.onward[start:whole:2], ports.behind[start:whole:2]) for start in (0, 1)
-    )
-    own = 1 + carried
-    # What is carried to the second part, put in terms of what comes back to it from beyond.
-    returned = first[..., own:] @ second_back
-    closed = jnp.eye(carried)[None] - returned[..., 1:own]
-    right = [first[..., :1] + returned[..., :1], first[..., 1:own], returned[..., own:]]
-    between = eliminated(closed, jnp.concatenate(right, axis=-1))
-    back = _without(second_back, own) + second_back[..., 1:own] @ between
-    onward = _without(second, own) + second[..., 1:own] @ between
-    own_back = jnp.pad(first_back[..., :own], ((0, 0), (0, 0), (0, back.shape[1])))
-    behind = own_back + first_back[..., own:] @ back
-    left = Ports(
-        jnp.concatenate([onward, ports.onward[whole:]]),
-        jnp.concatenate([behind, ports.behind[whole:]]),
-    )
-    return Ports(between, back), left
-
-
 def _from_tip(
-    ports: Ports, leave: Float[np.ndarray, "c t"]
-) -> tuple[list[tuple[Array, Array]], Float[Array, "b 1+t"]]:
-    """Join the parts that are left one after the other, from the tip on, beyond which is nothing.
+    onward: Float[Array, "n c z"], behind: Float[Array, "n b z"], form: Layout
+) -> tuple[tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]], Float[Array, "b 1+c"]]:
+    """Eliminate what passes between neighbours, one after the other from the tip on.
+
+    Beyond the tip is nothing. Written as a loop: the compiled program does not grow with the chain.
+
+    Args:
+        onward: What each element carries on, as rows over (1, carried, from beyond).
+        behind: What each hands back, likewise.
+        form: What the rows are over.
 
     Returns:
-        For each part but the last, what it carries on and what comes back to it, as rows over 1 and
-        what is carried to it; to the first, the base tensions. And what the first hands back.
+        For each element what it carries on and what comes back to it, as rows over (1, carried to
+        it), and what the first hands back.
     """
-    own, last = 1 + len(leave), len(ports.onward) - 1
+    own = 1 + form.carried
+    one = np.eye(form.carried)
 
-    def split(rows: Array, number: int) -> tuple[Array, Array]:
-        to_it = rows[:, :own]
-        if number == 0:
-            to_it = jnp.concatenate([rows[:, :1], rows[:, 1:own] @ leave], axis=1)
-        return to_it, rows[:, own:]
+    def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
+        onward, behind = item
+        by_back = onward[:, own:]
+        right = _more(onward[:, :own], by_back @ back[:, 0])
+        carried_on = eliminated(one - by_back @ back[:, 1:], right)
+        returned = _more(back[:, 1:] @ carried_on, back[:, 0])
+        return behind[:, :own] + behind[:, own:] @ returned, (carried_on, returned)
 
-    passed: list[tuple[Array, Array]] = []
-    back, _ = split(ports.behind[last], last)
-    for number in reversed(range(last)):
-        onward, by_back = split(ports.onward[number], number)
-        closed = jnp.eye(len(leave)) - by_back @ back[:, 1:]
-        onward = eliminated(closed, _more(onward, by_back @ back[:, 0]))
-        returned = _more(back[:, 1:] @ onward, back[:, 0])
-        passed.insert(0, (onward, returned))
-        back, by_back = split(ports.behind[number], number)
-        back = back + by_back @ returned
+    back, passed = jax.lax.scan(join, jnp.zeros((form.beyond, own)), (onward, behind), reverse=True)
     return passed, back
 
 
@@ -216,38 +169,17 @@ def _more(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Array, "k 
 
 
 def _from_base(
-    passed: list[tuple[Array, Array]],
-    tension_step: Float[Array, " t"],
-    leave: Float[np.ndarray, "c t"],
-    beyond: int,
-) -> Float[Array, "parts z"]:
-    """(1, carried, from beyond) of the parts that were joined one after the other."""
-    one, known = jnp.ones(1), []
-    to_it, carried = tension_step, leave @ tension_step
-    for onward, returned in passed:
-        given = jnp.concatenate([one, to_it])
-        known.append(jnp.concatenate([one, carried, returned @ given]))
-        to_it = carried = onward @ given
-    return jnp.stack([*known, jnp.concatenate([one, carried, jnp.zeros(beyond)])])
+    passed: tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]],
+    carried: Float[Array, " c"],
+) -> Float[Array, "n z"]:
+    """(1, carried, from beyond) of every element, from what is carried to the first."""
 
+    def follow(carried: Array, item: tuple[Array, Array]) -> tuple[Array, Array]:
+        onward, returned = item
+        given = jnp.concatenate([jnp.ones(1), carried])
+        return onward @ given, jnp.concatenate([given, returned @ given])
 
-def _without(rows: Float[Array, "parts k z"], own: int) -> Float[Array, "parts k z"]:
-    """Rows without what they say of what is carried."""
-    return jnp.concatenate(
-        [rows[..., :1], jnp.zeros_like(rows[..., 1:own]), rows[..., own:]], axis=-1
-    )
-
-
-def _parted(between: Ports, known: Float[Array, "parts z"], carried: int) -> Float[Array, "more z"]:
-    """From (1, carried, from beyond) of joined parts to those of the parts they were made of."""
-    pairs = len(between.onward)
-    outer, own = known[:pairs], 1 + carried
-    carried_on = jnp.einsum("pcz,pz->pc", between.onward, outer)
-    back = jnp.einsum("pbz,pz->pb", between.behind, outer)
-    first = jnp.concatenate([outer[:, :own], back], axis=1)
-    second = jnp.concatenate([outer[:, :1], carried_on, outer[:, own:]], axis=1)
-    both = jnp.stack([first, second], axis=1).reshape(2 * pairs, -1)
-    return jnp.concatenate([both, known[pairs:]])
+    return jax.lax.scan(follow, carried, passed)[1]
 
 
 def eliminated(
