@@ -49,11 +49,7 @@ _PIECES = 20_000
 
 @pytest.fixture(autouse=True, scope="module")
 def room_for_compiled_code() -> Iterator[None]:
-    """Keep programs for the other process, and let go of them once there are very many."""
-    kept = sys.modules.get("notchflex._kept")
-    folder = os.environ.get("JAX_COMPILATION_CACHE_DIR")
-    if kept is not None and kept.Kept.folder is None and folder and "://" not in folder:
-        kept.keep_in(Path(folder) / "programs")
+    """Let go of compiled programs once there are very many."""
     yield
     maps = Path("/proc/self/maps")
     jax = sys.modules.get("jax")

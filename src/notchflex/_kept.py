@@ -1,45 +1,42 @@
-"""Compiled programs kept on disk, so that another process need not even trace them.
+"""Programs of XLA kept on disk, so that another process need not even trace them.
 
 JAX's own cache keeps what XLA makes of a program, but to find it there the program is traced and
 lowered first, which takes longer than all else that a short command does. Here the whole program
 is found by what it was made from: the source code, the versions, and the forms of its arguments.
+JAX serialises an executable by pickle only; `_store` takes files of the user alone.
 """
 
 from __future__ import annotations
 
-import hashlib
-import os
 import pickle
 import re
 import threading
 from collections.abc import Callable, Generator
-from contextlib import contextmanager, suppress
-from functools import cache, update_wrapper
-from pathlib import Path
+from contextlib import contextmanager
+from functools import update_wrapper
 from typing import Any, ClassVar
 
 import numpy as np
 from jax.experimental.compilation_cache import compilation_cache
 
+from notchflex import _store
 from notchflex._jax import jax, jit
 
-_DIGEST = 32  # bytes
 _CALLED = re.compile(r'custom_call_target="([^"]+)"')
 making = threading.RLock()
 
 
 class Kept:
-    """A compiled function whose programs are kept in a folder, once one is told.
+    """A function compiled by XLA whose programs are kept on disk.
 
-    Without a folder it is the function that `jit` makes. As all with options for the compiler it
-    is called from plain code only, and no part of another compiled function.
+    As all with options for the compiler it is called from plain code only, and is no part of
+    another compiled function.
 
     Args:
         function: What to compile. Arguments are arrays, or trees of them, given by position.
         static: Positions of arguments that are no arrays; their `repr` must tell them apart.
     """
 
-    folder: ClassVar[Path | None] = None
     loaded: ClassVar[dict[Any, Callable[..., Any]]] = {}
 
     def __init__(self, function: Callable[..., Any], static: tuple[int, ...]) -> None:
@@ -51,7 +48,7 @@ class Kept:
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the program for these arguments, made or loaded where it is not there yet."""
-        if Kept.folder is None or getattr(jax.config, "jax_disable_jit"):  # noqa: B009
+        if getattr(jax.config, "jax_disable_jit") or jax.default_backend() != "cpu":  # noqa: B009
             return self._plain(*arguments)
         arrays = [one for place, one in enumerate(arguments) if place not in self._static]
         leaves, structure = jax.tree.flatten(arrays)
@@ -74,7 +71,7 @@ class Kept:
 
     def _found(self, told: str, arguments: tuple[Any, ...], arrays: list[Any]) -> tuple[Any, Any]:
         """The program of that description, from the folder or made and put there; its result."""
-        program = _loaded(read(told))
+        program = _loaded(_store.read(told))
         if program is not None:
             try:
                 return program, program(*arrays)
@@ -83,20 +80,15 @@ class Kept:
         lowered = self._plain.lower(*arguments)
         with _without_cache():
             program = lowered.compile()
-        write(told, _stored(program))
+        stored = _stored(program)
+        if stored is not None:
+            _store.write(told, stored)
         return program, program(*arrays)
 
 
 def kept(*static: int) -> Callable[[Callable[..., Any]], Kept]:
     """Make a function one whose compiled programs are kept; see `Kept`."""
     return lambda function: Kept(function, static)
-
-
-def keep_in(folder: Path) -> None:
-    """Keep programs in a folder from now on, made if need be; not where they are for a GPU."""
-    with suppress(OSError):  # without a folder every process makes its programs
-        folder.mkdir(parents=True, exist_ok=True)
-    Kept.folder = folder if jax.default_backend() == "cpu" else None
 
 
 @contextmanager
@@ -115,65 +107,14 @@ def _without_cache() -> Generator[None]:
         compilation_cache.reset_cache()
 
 
-@cache
-def _made_from() -> str:
-    """What programs are made from beside their arguments: code, versions, options."""
-    from importlib.metadata import version
-
-    root = Path(__file__).parent
-    code = hashlib.sha256()
-    for file in sorted(root.rglob("*.py")):
-        code.update(str(file.relative_to(root)).encode() + b"\0" + file.read_bytes() + b"\0")
-    versions = [version(name) for name in ("jax", "jaxlib", "numpy")]
-    settings = [os.environ.get("XLA_FLAGS", ""), os.cpu_count()]
-    return repr((code.hexdigest(), versions, settings))
-
-
-def _file(told: str) -> Path | None:
-    """Where a program of some description is kept."""
-    if Kept.folder is None:
-        return None
-    name = hashlib.sha256(f"{_made_from()} {told}".encode()).hexdigest()[:32]
-    return Kept.folder / f"program-{name}"
-
-
-def read(told: str) -> Any:
-    """What is kept of a program of that description; None where there is nothing that is whole."""
-    file = _file(told)
-    try:
-        content = b"" if file is None else file.read_bytes()
-        if hashlib.sha256(content[_DIGEST:]).digest() != content[:_DIGEST]:
-            return None
-        return pickle.loads(content[_DIGEST:])
-    except Exception:  # a file of another version, or no file: the program is made again
-        return None
-
-
-def write(told: str, parts: Any) -> None:
-    """Keep a program, as a whole or not at all."""
-    file = _file(told)
-    if file is None or parts is None:
-        return
-    try:
-        content = pickle.dumps(parts)
-        own = file.with_suffix(f".{os.getpid()}")
-        try:
-            own.write_bytes(hashlib.sha256(content).digest() + content)
-            own.replace(file)
-        finally:
-            own.unlink(missing_ok=True)
-    except Exception:  # no room, or nothing that can be kept: the next process makes it again
-        return
-
-
-def _loaded(kept: Any) -> Any:
+def _loaded(kept: bytes | None) -> Any:
     """The program of XLA that was kept; None where it cannot be run here."""
     from jax.experimental import serialize_executable
 
     if kept is None:
         return None
     try:
-        by_lapack, parts = kept
+        by_lapack, parts = pickle.loads(kept)
         if by_lapack:
             _find_lapack()
         return serialize_executable.deserialize_and_load(*parts)
@@ -181,7 +122,7 @@ def _loaded(kept: Any) -> Any:
         return None
 
 
-def _stored(program: Any) -> Any:
+def _stored(program: Any) -> bytes | None:
     """What to keep of a program of XLA; None where nobody knows what must be ready for it."""
     from jax.experimental import serialize_executable
 
@@ -189,7 +130,7 @@ def _stored(program: Any) -> Any:
         called = set(_CALLED.findall(program.as_text()))
         if not all(target.startswith("lapack_") for target in called):
             return None
-        return bool(called), serialize_executable.serialize(program)
+        return pickle.dumps((bool(called), serialize_executable.serialize(program)))
     except Exception:  # nothing that can be kept
         return None
 
@@ -204,4 +145,4 @@ def _find_lapack() -> None:
     lapack.prepare_lapack_call("getrf", np.dtype(float))
 
 
-__all__ = ["Kept", "keep_in", "kept", "making", "read", "write"]
+__all__ = ["Kept", "kept", "making"]

@@ -20,7 +20,8 @@ from notchflex.chain.chain import Chain
 def structural(chain: Chain) -> Chain:
     """For every number of a chain whether it may be taken for known when a program is made.
 
-    These are how modes strain, turn and move a rod, how they hold each other, and all that counts
+    Which flexures only lengthen the chain is not: chains of other lengths share the program. Known
+    are how modes strain, turn and move a rod, how they hold each other, and all that counts
     or tells kinds apart.
     """
 
@@ -37,7 +38,6 @@ def structural(chain: Chain) -> Chain:
         rods=replace(
             plain.rods,
             basis=_all(rods.basis),
-            idle=_all(rods.idle),
             node_reach=_all(rods.node_reach),
             turn=_of_modes(rods.turn),
             turn_pair=pairs,

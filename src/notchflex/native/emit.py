@@ -106,9 +106,11 @@ class Emitter(Puts):
         self.puts(item.before)
         if item.count == 0:
             return
+        steps = "%count" if item.count is None else str(item.count)
+        count = 0 if item.count is None else item.count - 1
 
         def step(index: str) -> None:
-            at = text.give(f"sub i64 {item.count - 1}, {index}") if item.reverse else index
+            at = text.give(f"sub i64 {count}, {index}") if item.reverse else index
             for own in item.along:
                 whole: Memory = own.number
                 unit = self.unit(whole.rows)
@@ -118,7 +120,7 @@ class Emitter(Puts):
             self.block(item.body)
             self.puts(item.after)
 
-        self.counted(str(item.count), step)
+        self.counted(steps, step)
 
     def _choice(self, item: Choice) -> None:
         text = self.text

@@ -50,11 +50,11 @@ class Loop:
 
 @dataclass(eq=False)
 class Steps:
-    """A loop of a known number of steps, along tables.
+    """A loop along tables.
 
     Attributes:
         before: What is carried into it, and tables that are put in memory first.
-        count: How many steps.
+        count: How many steps; None where the number is known only when the program is called.
         reverse: Whether from the last on.
         along: Memory of the present step, a part of that of its table.
         tables: Entries of tables that lie in memory before the loop.
@@ -63,7 +63,7 @@ class Steps:
     """
 
     before: list[Put]
-    count: int
+    count: int | None
     reverse: bool
     along: list[Memory]
     tables: list[int]

@@ -177,8 +177,7 @@ class Order:
 
     def _needed(self) -> set[int]:
         todo = [*_of(self.program.put), *self.program.written]
-        if self.program.rows:
-            todo += [number for number, item in self._items() if isinstance(item, Rows)]
+        todo += [number for number, item in self._items() if _writes_results(item)]
         found: set[int] = set()
         while todo:
             number = todo.pop()
@@ -313,6 +312,11 @@ class Order:
         for one in _of(self.program.put):
             if self.looped(one):
                 self.kept.add(one)
+
+
+def _writes_results(item: Any) -> bool:
+    """Whether an item writes what the program returns, row by row."""
+    return isinstance(item, Rows) or (isinstance(item, Steps) and item.count is None)
 
 
 def _written(item: Any) -> list[Memory]:

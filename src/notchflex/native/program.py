@@ -89,6 +89,8 @@ def program(
     given: Sequence[Any],
     long: Sequence[int],
     by_row: Sequence[bool] | None = None,
+    *,
+    carries: bool = False,
 ) -> tuple[Program, Any]:
     """Make a program of a function.
 
@@ -97,6 +99,8 @@ def program(
         given: Vectors as it takes them, of which only the sizes matter; those of one row.
         long: Sizes of axes that rows are laid out along, such as the number of flexures.
         by_row: Which of them have a row for every row of a batch; no batch where not given.
+        carries: Whether rows follow one after the other: the first vector is carried from row to
+            row, and the function returns it before its results.
 
     Returns:
         The program, and the tree of what the function returns, with shapes and kinds of numbers.
@@ -106,7 +110,13 @@ def program(
     """
     closed, tree = jax.make_jaxpr(function, return_shape=True)(*given)
     reader = Reader(long)
-    read = reader.single(closed) if by_row is None else reader.batch(closed, by_row)
+    if by_row is None:
+        read = reader.single(closed)
+    elif carries:
+        read = reader.path(closed, by_row)
+        tree = tree[1]
+    else:
+        read = reader.batch(closed, by_row)
     emitter = Emitter(read)
     rows = None if by_row is None else tuple(by_row)
     return Program(compiled(emitter.source), tuple(read.sizes), emitter.arena.size + 64, rows), tree

@@ -75,6 +75,44 @@ class Reader(Arranger):
         self._item(Rows(tables, body, put, [one.memory for one in put]), top)
         return Program(self.graph, [], [], sizes, True)
 
+    def path(self, closed: Any, by_row: Sequence[bool]) -> Program:
+        """A program that runs along tables and carries a vector from row to row.
+
+        The first array is the vector carried into it; the function returns the vector carried on,
+        and then the results of the row.
+        """
+        top = self.graph.top
+        body = top.inner(repeats=True)
+        carried, before = self._new(closed.in_avals[0].shape, "f"), list[Put]()
+        args: list[Table] = []
+        along: list[Memory] = []
+        for number, (aval, own) in enumerate(zip(closed.in_avals, by_row, strict=True)):
+            places = _in_order(aval.shape)
+            memory = Memory("given", places.size, number)
+            if own:
+                memory = Memory("step", places.size, memory, 0)
+                along.append(memory)
+            block = body if own else top
+            with self.inside(block):
+                table = self._seen(memory, places, block)
+            if number == 0:
+                before = [self._put(self.tables.local(table), carried)]
+                with self.inside(body):
+                    table = self._seen(*carried, body)
+            args.append(table)
+        with self.inside(body):
+            carry, *results = self.closed(closed, args)
+            after = [self._put(carry, carried)]
+            sizes: list[int] = []
+            for number, table in enumerate(results):
+                flat = self._as_numbers(table.ravel())
+                own = Memory("step", flat.size, Memory("result", flat.size, number), 0)
+                along.append(own)
+                after.append(Put(flat, own, np.arange(flat.size)))
+                sizes.append(flat.size)
+        self._item(Steps(before, None, False, along, [], body, after), top)
+        return Program(self.graph, [], [], sizes, False)
+
     def _handed(
         self, closed: Any, args: list[Table], where: Callable[[int], tuple[str, Any]]
     ) -> tuple[list[Put], list[int]]:

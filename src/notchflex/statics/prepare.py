@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -12,6 +13,7 @@ from notchflex._jax import constant
 from notchflex.chain import Chain, assemble, padded
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
+from notchflex.statics.capacity import capacity, places_within
 from notchflex.statics.known import KnownForm
 from notchflex.statics.packing import Form
 from notchflex.statics.quantities import Shape
@@ -47,6 +49,28 @@ class Prepared:
     def known_vector(self) -> Float[np.ndarray, " unknown"]:
         """That as one vector."""
         return self.known_form.pack(self.vector)
+
+    @cached_property
+    def long(self) -> Prepared:
+        """The robot with as many flexures as programs are compiled for.
+
+        Its tendons are taken to meet the wall at every edge of every gap; where they do is for the
+        own chain to say (`run.Run`), so that it is no part of a program.
+        """
+        chain = self.chain
+        more = padded(chain, capacity(chain.flexures), chain.contacts.shape[1])
+        edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
+        return Prepared(dataclasses.replace(more, contacts=edges))
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """Where a row of `run.follow` of the long chain has what belongs to the own one."""
+        state, shape = (
+            places_within(self.state, self.long.state),
+            places_within(self.shape, self.long.shape),
+        )
+        sizes = self.long.state.size
+        return np.concatenate([state, sizes + state, 2 * sizes + shape])
 
     @cached_property
     def rest(self) -> Solved:

@@ -150,6 +150,24 @@ class Quantities(NamedTuple):
     stored_energy: Float[Array, "*s"]
 
 
+_BY_FLEXURE = (
+    "chord_angle",
+    "notch_moment",
+    "outer_strain",
+    "peak_strain",
+    "gap",
+    "contact_force",
+)
+_BY_CONTACT = (
+    "span_tension",
+    "contact_log_ratio",
+    "contact_slid",
+    "contact_bound",
+    "contact_turning",
+    "contact_state",
+)
+
+
 def _turning(chain: Chain, at: Evaluation) -> tuple[Array, Array]:
     """Turning angles at both edges of all gaps; 0 where a tendon has no contact."""
     visited = per_tendon(chain, tuple(group.visits for group in chain.groups)) > 0.0
@@ -292,6 +310,26 @@ def _each(chain: Chain, pairs: list[tuple[Array, Array]]) -> tuple[Array, Array]
     """Pairs of values per group, each of the two in the order of the robot's tendons."""
     first, second = zip(*pairs, strict=True)
     return per_tendon(chain, first), per_tendon(chain, second)
+
+
+def of_own(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
+    """Return a quantity of a chain whose contacts are all edges of all gaps as that of its own.
+
+    Args:
+        chain: The own chain.
+        name: Name of the quantity, one of `Quantities`.
+        values: Its values with any leading axes, of a chain that may have more flexures.
+    """
+    if name in _BY_FLEXURE:
+        return values[..., : chain.flexures]
+    if name not in _BY_CONTACT:
+        return values
+    met = np.asarray(chain.contacts)
+    first = int(name == "span_tension")  # the proximal span comes before the first edge
+    tendons = np.arange(len(met))[:, None]
+    beyond = 0 if name == "contact_state" else np.nan
+    found = np.where(met[:, 1:] >= 0, values[..., tendons, met[:, :-1] + first], beyond)
+    return np.concatenate([values[..., :first], found], axis=-1)
 
 
 def _in_space(chain: Chain, poses: Motion) -> Motion:

@@ -1,15 +1,14 @@
 """The compiled programs: a path of loads with memory, or many loads each from rest.
 
-Compiled once for a form (number of flexures, modes and tendons, and which laws); a new load or a
-new robot of the same form runs the same program. The number of loads is rounded up to one of few
-sizes, so that it hardly ever asks for a new program; loads added so are skipped. What is asked of
-the states beyond their shape is another program, run when it is asked for.
+Compiled once for a form (kinds of flexures, modes, tendons and laws); a new load or a new robot of
+the same form runs the same program. The number of loads is known only when a program is called, and
+chains are lengthened to one of few numbers of flexures (`capacity.py`). Derived quantities of the
+states are another program, run when they are asked for.
 """
 
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -18,12 +17,12 @@ from notchflex._jax import jax, jnp
 from notchflex._native import native
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
+from notchflex.statics.capacity import lengthen
 from notchflex.statics.known import KnownForm
 from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form, lane_sizes
 from notchflex.statics.prepare import Prepared
-from notchflex.statics.quantities import Quantities, Shape, notch_lips, quantities, shape
-from notchflex.statics.sizes import padded, size
+from notchflex.statics.quantities import Shape, notch_lips, of_own, quantities, shape
 from notchflex.statics.stability import stability
 from notchflex.statics.stepping import Solved, advance
 from notchflex.statics.walk import evaluate
@@ -96,33 +95,25 @@ class Run:
         return self._prepared.state.unpack(self.states)
 
     @cached_property
-    def _more(self) -> tuple[Quantities, Quantities]:
-        """What is reported of each state, and of the one before the first."""
-        states = self._table[:, : self._prepared.state.size]
-        rows = np.concatenate([self._first[None], states])
-        every = _quantities(
-            self._prepared.known_vector,
-            rows,
-            np.array(1.0 + self._count),
-            self._prepared.known_form,
-            self._prepared.state,
-        )
-        return (
-            jax.tree.map(lambda leaf: leaf[1 : 1 + self._count], every),
-            jax.tree.map(lambda leaf: leaf[0], every),
-        )
+    def _more(self) -> dict[str, np.ndarray]:
+        """What is reported of the state before the first load and of each state, by name."""
+        own, long = self._prepared, self._prepared.long
+        rows = lengthen(np.concatenate([self._first[None], self.states]), own.state, long.state)
+        given = (np.zeros(1), long.known_vector, rows, long.known_form, long.state)
+        every = _quantities.along((False, False, True), *given)
+        return {name: of_own(own.chain, name, values) for name, values in every.items()}
 
     def quantity(self, name: str) -> np.ndarray:
         """What is reported of each state, by its name in `Shape` or `Quantities`."""
         if name not in Shape._fields:
-            return getattr(self._more[0], name)
+            return self._more[name][1:]
         packed = self._table[: self._count, 2 * self._prepared.state.size : -_TOLD]
         return self._prepared.shape.leaf(packed, Shape._fields.index(name))
 
     def before(self, name: str) -> np.ndarray:
         """A quantity of the state before the first load; of the shape only tension and stroke."""
         if name not in ("tension", "stroke"):
-            return np.asarray(getattr(self._more[1], name))
+            return self._more[name][0]
         start: Solved = self._prepared.state.unpack(self._first)
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
@@ -152,15 +143,25 @@ def run(
         One entry per load.
     """
     count = len(commands.value)
-    form = prepared.command_form(commands)
-    packed = form.pack(commands, leading=1)
-    if count != size(count):
-        packed = packed[padded(count)]
-    options = _options(settings, each_from_start, count)
-    forms = (prepared.known_form, form, prepared.state)
+    options = _options(settings, each_from_start)
+    long, forms, packed = _long_commands(prepared, commands)
     first = prepared.rest_vector if start is None else np.asarray(prepared.state.pack(start))
-    table = _follow(prepared.known_vector, packed, first, options, *forms)
-    return Run(prepared, first, table, count)
+    start_row = lengthen(first, prepared.state, long.state)
+    carried = np.append(start_row, 1.0)
+    rows = (False, False, True, False, False)
+    table = _follow.along(rows, carried, long.known_vector, packed, start_row, options, *forms)
+    told = np.arange(table.shape[1] - _TOLD, table.shape[1])
+    return Run(prepared, first, table[:, np.append(prepared.columns, told)], count)
+
+
+def _long_commands(
+    prepared: Prepared, commands: Command
+) -> tuple[Prepared, tuple[KnownForm, Form, Form], Float[np.ndarray, "s command"]]:
+    """The robot as programs take it, its forms, and the loads in the form of that."""
+    long = prepared.long
+    own, form = prepared.command_form(commands), long.command_form(commands)
+    packed = lengthen(own.pack(commands, leading=1), own, form)
+    return long, (long.known_form, form, long.state), packed
 
 
 def lips(
@@ -174,109 +175,92 @@ def lips(
     Returns:
         Contact forces and gaps, loads by notches, and which loads converged.
     """
-    form = prepared.command_form(commands)
-    given = (form.pack(commands, leading=1), np.asarray(prepared.state.pack(start)))
-    forms = (prepared.known_form, form, prepared.state)
-    return _lips(prepared.known_vector, *given, np.array(settings.numbers), *forms)
+    long, forms, packed = _long_commands(prepared, commands)
+    before = lengthen(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
+    given = (np.zeros(1), long.known_vector, packed, before, np.array(settings.numbers))
+    force, gap, converged = _lips.along((False, False, True, False, False), *given, *forms)
+    own = prepared.chain.flexures
+    return force[:, :own], gap[:, :own], converged
 
 
-@native(4, lane_sizes)
+@native(5, lane_sizes)
 def _lips(
+    carried: Float[Array, " one"],
     vector: Float[Array, " chain"],
-    commands: Float[Array, "s command"],
+    load: Float[Array, " command"],
     start: Float[Array, " state"],
     numbers: Float[Array, " settings"],
     chain_form: KnownForm,
     command_form: Form,
     state_form: Form,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Contact forces and gaps of one load, and whether it converged; nothing is carried on."""
     chain, settings = chain_form.unpack(vector), Settings.of(numbers)
-    before = state_form.unpack(start)
-
-    def at_lips(packed: Array) -> tuple[Array, Array, Array]:
-        came = advance(chain, command_form.unpack(packed), before, settings)
-        point = came.solved.point
-        at = evaluate(
-            chain, point.unknowns, came.solved.memory, point.base_tension, came.solved.applied
-        )
-        force, gap = notch_lips(chain, point.unknowns, at)
-        return force, gap, came.converged
-
-    return jax.lax.map(at_lips, commands)
+    came = advance(chain, command_form.unpack(load), state_form.unpack(start), settings)
+    point = came.solved.point
+    at = evaluate(
+        chain, point.unknowns, came.solved.memory, point.base_tension, came.solved.applied
+    )
+    return carried, (*notch_lips(chain, point.unknowns, at), came.converged)
 
 
 @lru_cache(maxsize=64)
-def _options(
-    settings: Settings, each_from_start: bool, count: int
-) -> Float[np.ndarray, " options"]:
-    """What is told to `_follow` beside robot, loads and start, kept for the next time."""
-    return np.array([*settings.numbers, float(each_from_start), float(count)])
+def _options(settings: Settings, each_from_start: bool) -> Float[np.ndarray, " options"]:
+    """The options of `_follow`, kept for the next time."""
+    return np.array([*settings.numbers, float(each_from_start)])
 
 
-@native(4, lane_sizes)
+@native(5, lane_sizes)
 def _follow(
+    carried: Float[Array, " state+1"],
     vector: Float[Array, " chain"],
-    commands: Float[Array, "s command"],
+    load: Float[Array, " command"],
     start: Float[Array, " state"],
     options: Float[Array, " options"],
     chain_form: KnownForm,
     command_form: Form,
     state_form: Form,
-) -> Float[Array, "s told"]:
-    """The two states of every load, their shape, and how it went, a row per load."""
+) -> tuple[Float[Array, " state+1"], Float[Array, " told"]]:
+    """The two states of a load, their shape, and how it went.
+
+    Carried from load to load is the last solved state, and whether all loads so far converged.
+    """
     chain: Chain = chain_form.unpack(vector)
-    settings = Settings.of(options[:-2])
-    each_from_start, count = options[-2] > 0.0, options[-1]
+    settings = Settings.of(options[:-1])
+    each_from_start = options[-1] > 0.0
+    alive = carried[-1] > 0.0
+    before = jnp.where(each_from_start, start, carried[:-1])
 
-    def follow(state: tuple[Array, Array], item: tuple[Array, Array]) -> tuple[Any, Array]:
-        last, alive = state
-        packed, number = item
-        before = jnp.where(each_from_start, start, last)
-        tried = (number < count) & (alive | each_from_start)
+    def try_it() -> tuple[Array, Array, Array]:
+        came = advance(chain, command_form.unpack(load), state_form.unpack(before), settings)
+        told = [came.residual, came.iterations, came.converged, True, came.reached]
+        told += [came.parts, came.part_before]
+        found = shape(chain, came.solved)
+        told = jnp.concatenate(
+            [
+                state_form.pack(came.between),
+                Form.of(found).pack(found),
+                jnp.stack([jnp.asarray(x, float) for x in told]),
+            ]
+        )
+        return state_form.pack(came.solved), told, came.converged
 
-        def try_it() -> tuple[Array, Array, Array]:
-            came = advance(chain, command_form.unpack(packed), state_form.unpack(before), settings)
-            told = [came.residual, came.iterations, came.converged, True, came.reached]
-            told += [came.parts, came.part_before]
-            found = shape(chain, came.solved)
-            told = jnp.concatenate(
-                [
-                    state_form.pack(came.between),
-                    Form.of(found).pack(found),
-                    jnp.stack([jnp.asarray(x, float) for x in told]),
-                ]
-            )
-            return state_form.pack(came.solved), told, came.converged
+    def skip() -> tuple[Array, Array, Array]:
+        told = jnp.zeros(Shape.form(chain.flexures, chain.tendons).size + _TOLD)
+        return before, jnp.concatenate([before, told.at[-_TOLD].set(jnp.nan)]), alive
 
-        def skip() -> tuple[Array, Array, Array]:
-            told = jnp.zeros(Shape.form(chain.flexures, chain.tendons).size + _TOLD)
-            return before, jnp.concatenate([before, told.at[-_TOLD].set(jnp.nan)]), alive
-
-        solved, told, converged = jax.lax.cond(tried, try_it, skip)
-        return (solved, alive & converged), jnp.concatenate([solved, told])
-
-    numbers = jnp.arange(len(commands), dtype=float)
-    return jax.lax.scan(follow, (start, jnp.array(True)), (commands, numbers))[1]
+    solved, told, converged = jax.lax.cond(alive | each_from_start, try_it, skip)
+    goes_on = jnp.where(alive & converged, 1.0, 0.0)
+    return jnp.append(solved, goes_on), jnp.concatenate([solved, told])
 
 
 @native(3, lane_sizes)
 def _quantities(
+    carried: Float[Array, " one"],
     vector: Float[Array, " chain"],
-    states: Float[Array, "s state"],
-    count: Float[Array, ""],
+    state: Float[Array, " state"],
     chain_form: KnownForm,
     state_form: Form,
-) -> Quantities:
-    """What is reported of states beyond their shape; 0 for those that only fill up."""
-    chain = chain_form.unpack(vector)
-
-    def of_row(item: tuple[Array, Array]) -> Quantities:
-        packed, number = item
-
-        def told() -> Quantities:
-            return quantities(chain, state_form.unpack(packed))
-
-        nothing = jax.tree.map(jnp.zeros_like, jax.eval_shape(told))
-        return jax.lax.cond(number < count, told, lambda: nothing)
-
-    return jax.lax.map(of_row, (states, jnp.arange(len(states), dtype=float)))
+) -> tuple[Array, dict[str, Array]]:
+    """What is reported of a state beyond its shape, by name; nothing is carried on."""
+    return carried, quantities(chain_form.unpack(vector), state_form.unpack(state))._asdict()
