@@ -86,7 +86,7 @@ def write(key: str, content: bytes) -> None:
     temporary = f".{_name(key)}.{os.getpid()}"
     with suppress(OSError), _opened(folder) as at:
         try:
-            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
             with os.fdopen(_open(folder, at, temporary, flags), "wb") as file:
                 file.write(hashlib.sha256(content).digest() + content)
             _replace(folder, at, temporary, _name(key))
@@ -174,8 +174,8 @@ def _private(found: os.stat_result, is_kind: object) -> bool:
     return right_kind and found.st_uid == os.geteuid() and not found.st_mode & _OTHERS_WRITE
 
 
-def _open(folder: Path, at: int | None, name: str, flags: int | None = None) -> int:
-    flags = os.O_RDONLY | getattr(os, "O_BINARY", 0) if flags is None else flags
+def _open(folder: Path, at: int | None, name: str, flags: int = os.O_RDONLY) -> int:
+    flags |= getattr(os, "O_BINARY", 0)
     if at is None:
         return os.open(folder / name, flags, 0o600)
     return os.open(name, flags | os.O_NOFOLLOW, 0o600, dir_fd=at)

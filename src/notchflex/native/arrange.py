@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from notchflex.native.graph import LANE, LANE_BITS, Block, Graph, Memory, Table, entry
+from notchflex.native.graph import LANE_BITS, Block, Graph, Memory, Table, entry
 from notchflex.native.items import WIDTH, Put
 from notchflex.native.tables import Tables
 
@@ -68,19 +68,6 @@ class Arranger:
         if not self._is_long(places.shape):
             return table
         return self.tables.rows(self.tables.local(table), self.tables.long_axis(places.shape))
-
-    def _whole(self, table: Table, before: list[Put]) -> tuple[Memory, int]:
-        """Memory that holds a table in order, and where it begins there; put there if need be."""
-        flat = table.ravel()
-        first = int(flat[0])
-        statement = first >> LANE_BITS
-        if self.graph.length[statement] == 0 and (np.diff(flat) == 1).all():
-            return self.graph.args[statement][0], first & LANE
-        flat = self.tables.local(flat)
-        kind = self.graph.kind[int(flat[0]) >> LANE_BITS]
-        memory = Memory("arena", flat.size, rows=self.rows, inside=kind)
-        before.append(Put(flat, memory, np.arange(flat.size)))
-        return memory, 0
 
     def _as_numbers(self, flat: Table) -> Table:
         if not flat.size:

@@ -104,8 +104,6 @@ class Emitter(Puts):
     def _steps(self, item: Steps) -> None:
         text = self.text
         self.puts(item.before)
-        if item.count == 0:
-            return
         steps = "%count" if item.count is None else str(item.count)
         count = 0 if item.count is None else item.count - 1
 
@@ -114,7 +112,7 @@ class Emitter(Puts):
             for own in item.along:
                 whole: Memory = own.number
                 unit = self.unit(whole.rows)
-                size = text.give(f"mul i64 {at}, {own.size * unit}")
+                size = text.give(f"mul i64 {at}, {own.stride * unit}")
                 start = text.place(self.base(whole), self.offset(whole) + own.offset * unit)
                 self.pointer[id(own)] = text.place(start, size)
             self.block(item.body)

@@ -64,6 +64,8 @@ class Memory:
         offset: Where in the arena, when it is known.
         rows: Whether every row of a batch has numbers of its own.
         inside: Numbers of the kind "f", "i" or "b".
+        stride: For "step": how far the memory moves from step to step.
+        steps: For "step": how many steps there are; 0 where that is not known.
     """
 
     place: str
@@ -72,6 +74,8 @@ class Memory:
     offset: int = -1
     rows: bool = False
     inside: str = "f"
+    stride: int = 0
+    steps: int = 0
 
 
 class Graph:

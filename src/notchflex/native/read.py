@@ -16,6 +16,7 @@ from notchflex.native.graph import LANE_BITS, Block, Memory, Table, UnknownHereE
 from notchflex.native.items import Choice, Loop, Program, Put, Rows, Steps
 from notchflex.native.moves import MOVES
 from notchflex.native.operations import INNER, LANES, OTHER, kind_of
+from notchflex.native.step_tables import StepTables
 
 
 class Reader(Arranger):
@@ -90,7 +91,7 @@ class Reader(Arranger):
             places = _in_order(aval.shape)
             memory = Memory("given", places.size, number)
             if own:
-                memory = Memory("step", places.size, memory, 0)
+                memory = Memory("step", places.size, memory, 0, stride=places.size)
                 along.append(memory)
             block = body if own else top
             with self.inside(block):
@@ -106,7 +107,8 @@ class Reader(Arranger):
             sizes: list[int] = []
             for number, table in enumerate(results):
                 flat = self._as_numbers(table.ravel())
-                own = Memory("step", flat.size, Memory("result", flat.size, number), 0)
+                whole = Memory("result", flat.size, number)
+                own = Memory("step", flat.size, whole, 0, stride=flat.size)
                 along.append(own)
                 after.append(Put(flat, own, np.arange(flat.size)))
                 sizes.append(flat.size)
@@ -217,42 +219,38 @@ class Reader(Arranger):
         closed, count = parameters["jaxpr"], parameters["length"]
         start, tables = given[known : known + carried], given[known + carried :]
         avals = closed.out_avals
+        if count == 0:
+            none = [np.zeros((0, *one.shape)) for one in avals[carried:]]
+            return [*start, *map(self.tables.constant, none)]
         memory = [self._new(one.shape, kind_of(one.dtype)) for one in avals[:carried]]
         before = [self._put(*pair) for pair in zip(start, memory, strict=True)]
         body = self.graph.block.inner(repeats=True)
-        along: list[Memory] = []
-        looked: list[int] = []
-        present: list[Table] = []
-        for table, aval in zip(tables, closed.in_avals[known + carried :], strict=True):
-            size = int(np.prod(aval.shape))
-            whole, first = self._whole(table, before)
-            looked.append(int(table.ravel()[0]))
-            own = Memory("step", size, whole, first, rows=whole.rows, inside=whole.inside)
-            along.append(own)
-            present.append(
-                entry(self.graph.memory(own, body)) + np.arange(size).reshape(aval.shape)
-            )
+        seen = StepTables(self.graph, body, count, self.rows)
+        present = [seen.present(table, self.tables.local) for table in tables]
+        before += seen.before
         with self.inside(body):
             present = [self._unpacked(one) for one in present]
-            seen = [self._seen(*one, body) for one in memory]
-            came = self.closed(closed, [*given[:known], *seen, *present])
+            seen_carry = [self._seen(*one, body) for one in memory]
+            came = self.closed(closed, [*given[:known], *seen_carry, *present])
             after = [self._put(*pair) for pair in zip(came[:carried], memory, strict=True)]
-            results: list[Memory] = []
-            for table, aval in zip(came[carried:], avals[carried:], strict=True):
-                size = int(np.prod(aval.shape))
+            results: list[tuple[Memory, np.ndarray]] = []
+            for number, aval in enumerate(avals[carried:]):
+                size, places = self._arranged(aval.shape)
                 inside = kind_of(aval.dtype)
                 whole = Memory("arena", size * count, rows=self.rows, inside=inside)
-                own = Memory("step", size, whole, 0, rows=self.rows, inside=inside)
-                results.append(whole)
-                along.append(own)
-                after.append(Put(table.ravel(), own, np.arange(size)))
-        item = Steps(before, count, parameters["reverse"], along, looked, body, after)
+                results.append((whole, places))
+                own = Memory("step", size, whole, 0, self.rows, inside, size, count)
+                seen.along.append(own)
+                after.append(self._put(came[carried + number], (own, places)))
+        reverse = parameters["reverse"]
+        item = Steps(before, count, reverse, seen.along, seen.looked, body, after)
         self._item(item, self.graph.block)
         carry = [self._seen(*one, self.graph.block) for one in memory]
         made: list[Table] = []
-        for whole, aval in zip(results, avals[carried:], strict=True):
-            places = np.arange(whole.size).reshape(count, *aval.shape)
-            made.append(entry(self.graph.memory(whole, self.graph.block)) + places)
+        for whole, places in results:
+            stride = whole.size // count
+            steps = np.arange(count).reshape(-1, *(1,) * places.ndim) * stride
+            made.append(entry(self.graph.memory(whole, self.graph.block)) + steps + places)
         return [*carry, *made]
 
     def choice(self, given: list[Table], parameters: dict[str, Any]) -> list[Table]:

@@ -128,9 +128,13 @@ class Storage:
     def _has_room(self, memory: Memory, args: tuple[int, ...]) -> bool:
         """Whether the last vector of a row may be read whole."""
         _, first, _, length = args
-        if memory.place == "given":
-            return first + -(-length // WIDTH) * WIDTH <= memory.size
-        return memory.place == "arena"
+        last = first + -(-length // WIDTH) * WIDTH
+        while memory.place == "step":
+            if not memory.steps:
+                return False
+            last += memory.offset + (memory.steps - 1) * memory.stride
+            memory = memory.number
+        return memory.place == "arena" or (memory.place == "given" and last <= memory.size)
 
     def _lies(self, number: int) -> bool:
         """Whether lanes are in memory, and no value."""

@@ -23,7 +23,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import constant, jax, jnp
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual
 from notchflex.statics.element import Memory, Unknowns
@@ -89,7 +89,7 @@ def linear_step(
     if command.by_stroke is not None:
         by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ leave], axis=1)
         tension_step = _drawn(chain, command, base_tension, at, by_tension)
-    known = _from_base(passed, leave @ tension_step)
+    known = _from_base(passed, jnp.asarray(leave) @ tension_step)
     steps = jnp.einsum("nuz,nz->nu", answer, known)
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
     return Step(jax.vmap(unknowns_of)(steps), tension_step)
@@ -149,7 +149,7 @@ def _from_tip(
         it), and what the first hands back.
     """
     own = 1 + form.carried
-    one = np.eye(form.carried)
+    one = constant(np.eye(form.carried))
 
     def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
         onward, behind = item
