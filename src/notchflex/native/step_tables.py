@@ -80,17 +80,13 @@ class StepTables:
         return entry(self.graph.memory(own, self.body)) + lanes - start
 
     def _copied(self, table: Table) -> Table:
-        """Entries of a table that is put in memory first, lanes of one statement side by side."""
-        kind = self.graph.kind[int(table[0, 0]) >> LANE_BITS]
-        order = np.argsort(table[0], kind="stable")
-        size = table.shape[1]
+        """Entries of a table that is put in memory before the loop."""
+        kind, size = self.graph.kind[int(table[0, 0]) >> LANE_BITS], table.shape[1]
         whole = Memory("arena", table.size, rows=self.rows, inside=kind)
-        self.before.append(Put(table[:, order].ravel(), whole, np.arange(table.size)))
+        self.before.append(Put(table.ravel(), whole, np.arange(table.size)))
         own = Memory("step", size, whole, 0, self.rows, kind, size, self.count)
         self.along.append(own)
-        places = np.empty(size, np.int64)
-        places[order] = np.arange(size)
-        return entry(self.graph.memory(own, self.body)) + places
+        return entry(self.graph.memory(own, self.body)) + np.arange(size)
 
 
 def _in_memory(graph: Graph, table: Table) -> Table:

@@ -64,13 +64,11 @@ class Prepared:
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Where a row of `run.follow` of the long chain has what belongs to the own one."""
-        state, shape = (
-            places_within(self.state, self.long.state),
-            places_within(self.shape, self.long.shape),
-        )
-        sizes = self.long.state.size
-        return np.concatenate([state, sizes + state, 2 * sizes + shape])
+        """Where two states and their shape are in a row of those of the long chain."""
+        state = places_within(self.state, self.long.state)
+        shape = places_within(self.shape, self.long.shape)
+        size = self.long.state.size
+        return np.concatenate([state, size + state, 2 * size + shape])
 
     @cached_property
     def rest(self) -> Solved:
@@ -81,6 +79,11 @@ class Prepared:
     def rest_vector(self) -> np.ndarray:
         """The same as a vector."""
         return np.asarray(self.state.pack(self.rest))
+
+    @cached_property
+    def rest_carried(self) -> np.ndarray:
+        """The same, and that nothing has failed yet: what a path begins with."""
+        return np.append(self.rest_vector, 1.0)
 
     @cached_property
     def state(self) -> Form:

@@ -37,11 +37,12 @@ class Run:
     def __init__(
         self, prepared: Prepared, start: np.ndarray, table: np.ndarray, count: int
     ) -> None:
-        """Take what the program returned, of which the first rows count."""
-        self._prepared, self._first, self._table, self._count = prepared, start, table, count
+        """Take what the program returned for the long chain."""
+        self._prepared, self._first, self._count = prepared, start, count
+        self._table, self._long = table[:, prepared.columns], table
 
     def _told(self, number: int) -> np.ndarray:
-        return self._table[: self._count, number - _TOLD]
+        return self._long[:, number - _TOLD]
 
     @cached_property
     def residual(self) -> Float[np.ndarray, " s"]:
@@ -81,13 +82,13 @@ class Run:
     @property
     def states(self) -> Float[np.ndarray, "s state"]:
         """The last solved state at each load, packed: its own, or as far as it was followed."""
-        return self._table[: self._count, : self._prepared.state.size]
+        return self._table[:, : self._prepared.state.size]
 
     @property
     def between(self) -> Float[np.ndarray, "s state"]:
         """The state before the last part of the way to each load, packed."""
         size = self._prepared.state.size
-        return self._table[: self._count, size : 2 * size]
+        return self._table[:, size : 2 * size]
 
     @cached_property
     def solved(self) -> Solved:
@@ -107,7 +108,7 @@ class Run:
         """What is reported of each state, by its name in `Shape` or `Quantities`."""
         if name not in Shape._fields:
             return self._more[name][1:]
-        packed = self._table[: self._count, 2 * self._prepared.state.size : -_TOLD]
+        packed = self._table[:, 2 * self._prepared.state.size :]
         return self._prepared.shape.leaf(packed, Shape._fields.index(name))
 
     def before(self, name: str) -> np.ndarray:
@@ -145,13 +146,14 @@ def run(
     count = len(commands.value)
     options = _options(settings, each_from_start)
     long, forms, packed = _long_commands(prepared, commands)
-    first = prepared.rest_vector if start is None else np.asarray(prepared.state.pack(start))
-    start_row = lengthen(first, prepared.state, long.state)
-    carried = np.append(start_row, 1.0)
+    first, start_row, carried = prepared.rest_vector, long.rest_vector, long.rest_carried
+    if start is not None:
+        first = np.asarray(prepared.state.pack(start))
+        start_row = lengthen(first, prepared.state, long.state)
+        carried = np.append(start_row, 1.0)
     rows = (False, False, True, False, False)
     table = _follow.along(rows, carried, long.known_vector, packed, start_row, options, *forms)
-    told = np.arange(table.shape[1] - _TOLD, table.shape[1])
-    return Run(prepared, first, table[:, np.append(prepared.columns, told)], count)
+    return Run(prepared, first, table, count)
 
 
 def _long_commands(
