@@ -40,6 +40,7 @@ _HOME = {
             "Batch",
             "BodyForce",
             "Closing",
+            "ClosingStatus",
             "ConvergenceError",
             "Differentiable",
             "Equilibrium",

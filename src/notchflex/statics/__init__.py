@@ -3,6 +3,7 @@
 from notchflex.statics.axis_points import AxisPlaces, axis_places, axis_points, points_on_axis
 from notchflex.statics.batch import Batch, simulate_batch, solve_batch
 from notchflex.statics.closing import Closing, closing
+from notchflex.statics.closing_search import ClosingStatus
 from notchflex.statics.differentiable import Differentiable, differentiable
 from notchflex.statics.equilibrium import ConvergenceError, Equilibrium
 from notchflex.statics.external import BodyForce, ExternalLoad
@@ -29,6 +30,7 @@ __all__ = [
     "Batch",
     "BodyForce",
     "Closing",
+    "ClosingStatus",
     "ConvergenceError",
     "Differentiable",
     "Equilibrium",
