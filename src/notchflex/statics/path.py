@@ -331,10 +331,10 @@ class Path:
         """Sign of the determinant of that stiffness, (s,)."""
         return self._stability[1]
 
-    @property
+    @cached_property
     def stable(self) -> np.ndarray:
         """Whether the state is a stable equilibrium, (s,)."""
-        return (self.smallest_eigenvalue > 0.0) & (self.determinant_sign > 0.0)
+        return self.run.stable(command(self.load, self.robot, self.chain))
 
     def state_at(self, step: int) -> State:
         """State after a step (or the last good one before it), to save or continue from."""

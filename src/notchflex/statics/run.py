@@ -24,7 +24,7 @@ from notchflex.statics.packing import Form, lane_sizes
 from notchflex.statics.prepare import Prepared
 from notchflex.statics.quantities import Quantities, Shape, notch_lips, quantities, shape
 from notchflex.statics.sizes import padded, size
-from notchflex.statics.stability import stability
+from notchflex.statics.stability import stability, stable
 from notchflex.statics.stepping import Solved, advance
 from notchflex.statics.walk import evaluate
 
@@ -129,6 +129,10 @@ class Run:
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
         """Smallest real part of the stiffness's eigenvalues and sign of the determinant."""
         return stability(self._prepared, commands, self.solved)
+
+    def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:
+        """Whether each state is stable: what the two say, found at less cost."""
+        return stable(self._prepared, commands, self.solved)
 
 
 def run(
