@@ -142,8 +142,8 @@ def _whole(
         wide[:, :, number * own : (number + 1) * own] = part
         return wide
 
-    def split(number: int, of: np.ndarray) -> list[np.ndarray]:
-        return np.split(of[:, number], cut, axis=-1)
+    def split(number: int, of: Array) -> list[np.ndarray]:
+        return np.split(np.asarray(of)[:, number], cut, axis=-1)
 
     # What is carried to every flexure, over all unknowns: to the first only base tensions.
     carried = [np.zeros((states, form.carried, size))]
