@@ -1,6 +1,7 @@
 """Corner friction that turns with chords, on notches that have none."""
 
 import numpy as np
+
 import notchflex as nf
 
 ARC = nf.ArcNotch("on-axis", depth=1.40, height=0.8, uncut_length=1.2, repeat=2)
