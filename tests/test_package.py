@@ -21,7 +21,7 @@ NAMES = [
     "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError", "draw",
     "solve_each", "Batch", "solve_batch", "simulate_batch",
     "Differentiable", "differentiable", "TipResponse", "tip_response",
-    "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus",
+    "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus", "Kink",
     "ConvergenceError", "Settings",
     "BodyForce", "save_path", "read_path", "read_table",
     "StripNotch", "ULink", "Corner",

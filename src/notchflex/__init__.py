@@ -44,6 +44,7 @@ _HOME = {
             "ConvergenceError",
             "Differentiable",
             "Equilibrium",
+            "Kink",
             "Load",
             "LoadPath",
             "Path",

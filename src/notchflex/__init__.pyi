@@ -49,6 +49,7 @@ from notchflex.statics import ClosingStatus as ClosingStatus
 from notchflex.statics import ConvergenceError as ConvergenceError
 from notchflex.statics import Differentiable as Differentiable
 from notchflex.statics import Equilibrium as Equilibrium
+from notchflex.statics import Kink as Kink
 from notchflex.statics import Load as Load
 from notchflex.statics import LoadPath as LoadPath
 from notchflex.statics import Path as Path

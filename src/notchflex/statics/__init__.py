@@ -13,6 +13,7 @@ from notchflex.statics.kinematics import (
     equal_stroke,
     tip_from_angles,
 )
+from notchflex.statics.kinks import Kink
 from notchflex.statics.load import Load, LoadPath
 from notchflex.statics.newton import Settings
 from notchflex.statics.path import Path
@@ -35,6 +36,7 @@ __all__ = [
     "Differentiable",
     "Equilibrium",
     "ExternalLoad",
+    "Kink",
     "Load",
     "LoadPath",
     "Path",
