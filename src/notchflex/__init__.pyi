@@ -45,9 +45,11 @@ from notchflex.section import annular_segment as annular_segment
 from notchflex.statics import Batch as Batch
 from notchflex.statics import BodyForce as BodyForce
 from notchflex.statics import Closing as Closing
+from notchflex.statics import ClosingStatus as ClosingStatus
 from notchflex.statics import ConvergenceError as ConvergenceError
 from notchflex.statics import Differentiable as Differentiable
 from notchflex.statics import Equilibrium as Equilibrium
+from notchflex.statics import Kink as Kink
 from notchflex.statics import Load as Load
 from notchflex.statics import LoadPath as LoadPath
 from notchflex.statics import Path as Path

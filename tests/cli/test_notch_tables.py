@@ -60,6 +60,7 @@ ROW = {
     "closing_angle_deg": float("nan"),
     "closing_tendon": 2,
     "closing_tension_N": float("nan"),
+    "closing_status": "never",
     "closing_outer_strain": float("nan"),
     "closing_peak_strain": float("nan"),
 }

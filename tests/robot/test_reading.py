@@ -95,7 +95,7 @@ OUTSIDE = [
     (("uncut_length = 1.2", "uncut_length = -1"), ["`notch[1].uncut_length`", "at least 0 mm"]),
     (("repeat = 3", "repeat = 0"), ["`notch[1].repeat`", "at least 1"]),
     (("repeat = 3", "repeat = 2.5"), ["`notch[1].repeat`", "a whole number"]),
-    (("repeat = 3", "precurvature_deg = 60"), ["`notch[1].precurvature_deg`", "closed before"]),
+    (("repeat = 3", "precurvature_deg = 60"), ["`notch[1].precurvature_deg`", "closes at"]),
     (("= 10000", "= -10000"), ["`material.elastic_modulus`", "-10000 MPa", "greater than 0"]),
     (("= 10000", "= nan"), ["`material.elastic_modulus`", "nan", "finite number"]),
     (("= 10000", "= inf"), ["`material.elastic_modulus`", "inf", "finite number"]),

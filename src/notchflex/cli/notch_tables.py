@@ -67,7 +67,9 @@ def closing_table(notches: list[dict[str, Any]]) -> Table:
         "arm\nmm": [f"{row['moment_arm_mm'][row['closing_tendon'] - 1]:.4f}" for row in notches],
         "closing\ndeg": _numbers(notches, "closing_angle_deg", ".2f"),
         "tension\nN": [
-            f"{row['closing_tension_N']:.3f}" if np.isfinite(row["closing_tension_N"]) else "never"
+            f"{row['closing_tension_N']:.3f}"
+            if row["closing_status"] == "closes"
+            else row["closing_status"]
             for row in notches
         ],
         "strain\n%": _numbers(notches, "closing_outer_strain", ".2f", 100.0),

@@ -16,15 +16,12 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from notchflex._jax import constant, jax
-from notchflex.errors import InputError
 from notchflex.flexure.places import Places
 from notchflex.flexure.registry import rod
 from notchflex.flexure.rod import Rod
 from notchflex.material import FibreSection
 from notchflex.robot import ArcNotch, Tube
-from notchflex.section import annular_sector, annular_segment
-
-SECTION_OF_CUT = {"on-axis": annular_sector, "off-axis": annular_segment}
+from notchflex.section import SECTION_OF_CUT
 
 
 @rod.register
@@ -32,12 +29,6 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0) -> Rod:
     left = SECTION_OF_CUT[notch.cut](
         0.5 * tube.outer_diameter, 0.5 * tube.inner_diameter, notch.depth
     )
-    closing = notch.height / (0.5 * tube.outer_diameter + left.centroid)
-    if np.radians(notch.precurvature_deg) >= closing:
-        raise InputError(
-            f"a notch is precurved by {notch.precurvature_deg:g} deg, but it closes at "
-            f"{np.degrees(closing):.2f} deg; give a precurvature_deg below that"
-        )
     section = FibreSection(
         area=left.area,
         second_moment_weak=left.second_moment_weak,

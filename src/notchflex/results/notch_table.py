@@ -29,7 +29,8 @@ def notch_table(robot: Robot) -> list[dict[str, Any]]:
         * `moment_arm_mm`, t numbers: how far each tendon runs from the neutral axis, positive
           where it bends the notch toward its direction, 0 where it does not go,
         * `closing_angle_deg`, `closing_tendon` (from 1: the one with the longest arm),
-          `closing_tension_N` (of that tendon, pulled from rest; NaN if the notch never closes),
+          `closing_tension_N` (of that tendon, pulled from rest; NaN if none was found),
+          `closing_status` ("closes", "never", or "not found" where the solver failed),
           `closing_outer_strain` (Pacheco 2021, eq. 16) and `closing_peak_strain` (farthest fibre),
           both NaN without a spine.
 
@@ -50,6 +51,7 @@ def notch_table(robot: Robot) -> list[dict[str, Any]]:
             "closing_angle_deg": float(table.angle[index]) * DEGREES,
             "closing_tendon": int(table.tendon[index]),
             "closing_tension_N": float(table.tension[index]),
+            "closing_status": str(table.status[index]),
             "closing_outer_strain": float(table.outer_strain[index]),
             "closing_peak_strain": float(table.peak_strain[index]),
         }

@@ -191,6 +191,8 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
         return "it must be a finite number"
     if kind in bounds and record["input"] != record["input"]:  # only NaN differs from itself
         return "it must be a number"
+    if kind == "greater_than_equal" and record["input"] <= 0.0 < ctx["ge"] < 1.0:
+        return f"it must be greater than 0{unit}"  # a negative length is no small length
     if kind in bounds:
         word, key = bounds[kind]
         return f"it must be {word} {ctx[key]:g}{unit}"

@@ -89,6 +89,12 @@ Int = Annotated[int, BeforeValidator(_as_int)]
 """A whole number."""
 
 
+# What a number of a unit may be at most, and at least where it must be greater than 0: far beyond
+# every robot, and near enough that nothing computed from it overflows.
+_SMALLEST = {"mm": 1e-6, "MPa": 1e-6, "N": 1e-6, "kg/m3": 1e-6, "": 1e-9}
+_LARGEST = {"mm": 1e6, "MPa": 1e9, "kg/m3": 1e6, "deg": 3600.0, "": 1e3}
+
+
 def quantity(
     unit: str,
     text: str,
@@ -107,7 +113,16 @@ def quantity(
         below: Exclusive upper bound.
         at_least: Inclusive lower bound.
         at_most: Inclusive upper bound.
+
+    Where a bound is not given, the limits of the unit apply: 1e-6 to 1e6 mm, 1e-6 to 1e9 MPa, 3600
+    deg and so on.
     """
+    if above == 0.0 and at_least is None:
+        at_least = _SMALLEST[unit]
+    if at_most is None and below is None:
+        at_most = _LARGEST.get(unit)
+    if above is None and at_least is None and unit in _LARGEST:
+        at_least = -_LARGEST[unit]
     return Field(
         gt=above,
         lt=below,

@@ -21,7 +21,8 @@ class Corner(Friction):
         coefficient: Coefficient of friction mu.
         turning: Which rotation of the next body counts where a tendon enters it behind a strip:
             "slope" is the body's own, that of the strip's end; "chord" is the angle of the strip's
-            chord (Liu 2022, whose bending angles are chord angles).
+            chord (Liu 2022, whose bending angles are chord angles). Behind other notches both are
+            the body's own.
 
     Raises:
         InputError: A value is negative, not finite, of a wrong type or not known.

@@ -42,9 +42,9 @@ class Notch:
         Float, quantity("mm", "uncut length behind the notch, toward the tip", at_least=0)
     ]
     direction_deg: Annotated[Float, quantity("deg", "side toward which the notch bends")] = 0.0
-    precurvature_deg: Annotated[Float, quantity("deg", "angle of the notch when nothing pulls")] = (
-        0.0
-    )
+    precurvature_deg: Annotated[
+        Float, quantity("deg", "angle of the notch when nothing pulls", above=-180, below=180)
+    ] = 0.0
     repeat: Annotated[
         Int,
         Field(ge=1, le=10_000, description="how many equal notches follow"),

@@ -57,12 +57,30 @@ class ArcNotch(Notch):
                 f"is {self.depth} mm; it must be greater than 0 and less than the outer diameter, "
                 f"{tube.outer_diameter} mm.",
             )
-        # The neutral axis lies between the tube axis and the spine, so that no notch closes later
-        # than h / r_o (Pacheco 2021: h / (r_o + centroid)).
-        most = math.degrees(self.height / tube.outer_radius)
-        if self.precurvature_deg >= most:
+            return
+        if not self._open(tube):
+            closing = math.degrees(self.closing_angle(tube))
             yield (
                 "precurvature_deg",
-                f"is {self.precurvature_deg} deg; a notch {self.height} mm high in this tube is "
-                f"closed before {most:.4g} deg.",
+                f"is {self.precurvature_deg} deg; a notch {self.height} mm high in this tube "
+                f"closes at {closing:.4g} deg; it must be less than that.",
             )
+
+    def _open(self, tube: Tube) -> bool:
+        """Whether the lips are apart when nothing pulls."""
+        free = math.radians(self.precurvature_deg)
+        # The neutral axis lies between the tube axis and the spine: for most notches this tells,
+        # and no section need be worked out to make a robot.
+        if free < 0.5 * self.height / tube.outer_radius:
+            return True
+        return free < self.closing_angle(tube)
+
+    def closing_angle(self, tube: Tube) -> float:
+        """Return the angle at which the lips meet, from the straight notch [rad].
+
+        Pacheco 2021: h / (r_o + centroid).
+        """
+        from notchflex.section import SECTION_OF_CUT  # it loads JAX
+
+        left = SECTION_OF_CUT[self.cut](tube.outer_radius, tube.inner_radius, self.depth)
+        return self.height / (tube.outer_radius + float(left.centroid))

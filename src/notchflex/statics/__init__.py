@@ -3,6 +3,7 @@
 from notchflex.statics.axis_points import AxisPlaces, axis_places, axis_points, points_on_axis
 from notchflex.statics.batch import Batch, simulate_batch, solve_batch
 from notchflex.statics.closing import Closing, closing
+from notchflex.statics.closing_search import ClosingStatus
 from notchflex.statics.differentiable import Differentiable, differentiable
 from notchflex.statics.equilibrium import ConvergenceError, Equilibrium
 from notchflex.statics.external import BodyForce, ExternalLoad
@@ -12,6 +13,7 @@ from notchflex.statics.kinematics import (
     equal_stroke,
     tip_from_angles,
 )
+from notchflex.statics.kinks import Kink
 from notchflex.statics.load import Load, LoadPath
 from notchflex.statics.newton import Settings
 from notchflex.statics.path import Path
@@ -29,10 +31,12 @@ __all__ = [
     "Batch",
     "BodyForce",
     "Closing",
+    "ClosingStatus",
     "ConvergenceError",
     "Differentiable",
     "Equilibrium",
     "ExternalLoad",
+    "Kink",
     "Load",
     "LoadPath",
     "Path",

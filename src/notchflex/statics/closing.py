@@ -11,15 +11,11 @@ from notchflex.chain import Chain, assemble
 from notchflex.contact import closing_travel, free_angle
 from notchflex.robot import Robot
 from notchflex.statics.actuation import tensions_alone
+from notchflex.statics.closing_search import ClosingStatus, closing_tensions
 from notchflex.statics.edge_closing import edge_closing
 from notchflex.statics.newton import Settings
 from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import lips
-
-# Where a tension of this many times the one that would close a linear notch does not close it,
-# it is said not to close.
-_BEYOND_LINEAR = 64.0
-_PRECISION = 1e-11  # relative, of the tension
 
 
 @dataclass(frozen=True)
@@ -28,7 +24,10 @@ class Closing:
 
     Attributes:
         angle: Notch angle at which its lips meet, precurvature included, rad.
-        tension: Base tension that closes it, N, loading from rest; NaN where none does.
+        tension: Base tension that closes it, N, loading from rest; NaN where none was found.
+        status: A `ClosingStatus`: "closes"; "never", no tension up to 64 times the one that
+            would close a linear notch alone (twice that of the softest for slots); or "not found",
+            the solver did not converge at the tensions in question.
         tendon: The tendon pulled for it, counted from 1: the one with the longest lever.
         outer_strain: Strain of the outer fibre on the spine when closed (Pacheco 2021, eq. 16).
         peak_strain: Largest strain of any fibre when closed.
@@ -36,6 +35,7 @@ class Closing:
 
     angle: Float[np.ndarray, " n"]
     tension: Float[np.ndarray, " n"]
+    status: np.ndarray
     tendon: np.ndarray
     outer_strain: Float[np.ndarray, " n"]
     peak_strain: Float[np.ndarray, " n"]
@@ -69,14 +69,16 @@ def closing(robot: Robot) -> Closing:
     tendon = np.argmax(arm, axis=1)
     longest = arm[np.arange(len(arm)), tendon]
     if np.isfinite(travel).all():
-        tension, met = _tensions(prepared(robot), tendon, longest, travel), travel
+        tension, status = _tensions(prepared(robot), tendon, longest, travel)
+        met = travel
     else:
-        tension, met = edge_closing(prepared(robot), tendon, longest)
+        tension, met, status = edge_closing(prepared(robot), tendon, longest)
     has_spine = np.isfinite(travel)
     elastic = np.where(has_spine, travel / height, np.nan)
     return Closing(
         angle=np.where(has_spine, travel + free, met),
         tension=tension,
+        status=status,
         tendon=tendon + 1,
         outer_strain=elastic * spine,
         peak_strain=np.abs(elastic) * np.maximum(spine, near),
@@ -104,39 +106,25 @@ def _tensions(
     tendon: np.ndarray,
     arm: Float[np.ndarray, " n"],
     travel: Float[np.ndarray, " n"],
-) -> Float[np.ndarray, " n"]:
-    """Base tension that closes every notch against its spine, pulling its own tendon."""
+) -> tuple[Float[np.ndarray, " n"], np.ndarray]:
+    """Base tension that closes every notch against its spine, pulling its own tendon; status."""
     chain = ready.chain
     found = np.full(chain.flexures, np.nan)
+    status = np.full(chain.flexures, ClosingStatus.NEVER, dtype=object)
     notches = np.flatnonzero((arm > 0.0) & (travel > 0.0))
     if len(notches) == 0:
-        return found
+        return found, status
     stiffness = np.asarray(chain.lip_stiffness)
+    # Always as many rows as notches, whichever are searched: one compiled program.
+    which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 
-    def pressed(tension: Float[np.ndarray, " m"], notch: Float[np.ndarray, " m"]) -> np.ndarray:
-        # Always as many rows as notches, whichever are still searched: one compiled program.
-        which = np.resize(notch.astype(int), chain.flexures)
-        rows = np.arange(chain.flexures)
+    def overlap(tension: Float[np.ndarray, " m"]) -> np.ndarray:
         value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[which]] = np.resize(tension, chain.flexures)
         force, gap, converged = lips(ready, tensions_alone(value), ready.rest, Settings())
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
-        return np.where(converged, overlap, np.nan)[: len(notch)]
-
-    from scipy.optimize import elementwise  # takes half a second, and few ask for closing
+        return np.where(converged, overlap, np.nan)[: len(notches)]
 
     linear = np.asarray(chain.stiffness)[notches, 0] * travel[notches] / arm[notches]
-    high = linear.copy()
-    for _ in range(int(np.log2(_BEYOND_LINEAR)) + 1):
-        short = ~(pressed(high, notches.astype(float)) > 0.0)
-        if not short.any():
-            break
-        high = np.where(short, 2.0 * high, high)
-    root = elementwise.find_root(
-        pressed,
-        (np.zeros_like(high), high),
-        args=(notches.astype(float),),
-        tolerances={"xatol": 0.0, "xrtol": _PRECISION, "fatol": 0.0, "frtol": 0.0},
-    )
-    found[notches] = np.where(root.success, root.x, np.nan)
-    return found
+    found[notches], status[notches] = closing_tensions(overlap, linear)
+    return found, status

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -18,18 +19,23 @@ from notchflex.robot.paths import number_at
 from notchflex.statics.actuation import Command
 from notchflex.statics.command import command
 from notchflex.statics.given import robot_given, shown
+from notchflex.statics.kinks import Kink, kinks
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.numbers import with_slopes
 from notchflex.statics.outputs import followed, known_outputs
 from notchflex.statics.packing import Form
+from notchflex.statics.path import Path
 from notchflex.statics.prepare import Prepared, prepared
+from notchflex.statics.run import run
 from notchflex.statics.sensitivity import answered, solved_path
 from notchflex.statics.solve import check_refinement, prepared_for
 from notchflex.statics.stepping import at_rest
 
 _TENDONS = ("tension", "stroke")
 _TIP = ("tip_force", "tip_moment")
+# Largest change of a parameter in one-sided differences.
+_ASIDE = 1e-5
 
 
 def differentiable(
@@ -47,7 +53,8 @@ def differentiable(
     `jax.grad`, `jax.vmap` and `jax.jit` compose with it. Loads are followed one after the other
     with friction that remembers, and so are the derivatives. Where a contact changes between
     sticking and sliding, lips meet or the material's law has a kink, so has the function, and the
-    derivative is that of one side. With friction it is NaN from a load on that was so hard that it
+    derivative is that of one side: `kinks` lists such contacts and notches, `one_sided` gives the
+    derivatives of both sides. With friction it is NaN from a load on that was so hard that it
     was solved in three parts or more: what contacts remember of the parts is not followed. Smaller
     steps help.
 
@@ -131,14 +138,104 @@ class Differentiable:
             InputError: Values of another name or shape, or, where nothing is traced, a robot that
                 cannot be.
         """
+        taken = self._taken(values)
+        if not any(isinstance(value, Tracer) for value in taken.values()):
+            self._check(taken)
+        arrays = self.traced(jnp.array([taken[name] for name in self.numbers], float))
+        loads = {name: value for name, value in taken.items() if name in (*_TENDONS, *_TIP)}
+        given = {name: getattr(self.load, name) for name in _TENDONS}
+        return _followed(self._program, arrays, loads, given, np.array(self.settings.numbers))
+
+    def kinks(self, values: Mapping[str, Any] | None = None, *, within: float = 1e-6) -> list[Kink]:
+        """List the contacts and notches at a switch, where derivatives are those of one side.
+
+        Args:
+            values: As for a call.
+            within: Distance from the switch up to which they count; see `Kink.distance`.
+
+        Raises:
+            InputError: Values of another name or shape, or a robot that cannot be.
+        """
+        return kinks(self._path(self._taken(values)), within)
+
+    def one_sided(
+        self, direction: Mapping[str, Any], values: Mapping[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Find the derivatives along a direction from its two sides, by differences.
+
+        Away from kinks both are the directional derivative that JAX gives; at a kink that one is
+        one of the two.
+
+        Args:
+            direction: Change of the parameters by name, in the shape of `start`; those not given
+                stay.
+            values: Where; as for a call.
+
+        Returns:
+            The derivatives of every output that is no truth value, against the direction and along
+            it, right to about 1e-7 of the output per unit of the direction.
+
+        Raises:
+            InputError: Values of another name or shape, a robot that cannot be, or a load that does
+                not converge.
+        """
+        at, along = self._taken(values), self._taken(direction)
+        along = {name: along[name] if name in direction else 0.0 * along[name] for name in along}
+        size = max(float(jnp.max(jnp.abs(step))) for step in along.values())
+        if size == 0.0:
+            raise InputError("the direction changes nothing; give a change of some parameter")
+
+        def outputs(part: float) -> dict[str, np.ndarray]:
+            moved = {name: at[name] + part * along[name] for name in at}
+            path = self._path(moved).raise_if_failed()
+            every = {name: np.asarray(getattr(path, name)) for name in self.outputs}
+            return {name: one for name, one in every.items() if one.dtype != bool}
+
+        middle = outputs(0.0)
+        sides: list[dict[str, np.ndarray]] = []
+        for sign in (-1.0, 1.0):
+            step = sign * _ASIDE / size
+            near, far = outputs(step), outputs(2.0 * step)
+            sides.append(
+                {
+                    name: (4.0 * near[name] - 3.0 * middle[name] - far[name]) / (2.0 * step)
+                    for name in middle
+                }
+            )
+        return sides[0], sides[1]
+
+    def _path(self, values: dict[str, Array]) -> Path:
+        """Solve the path at some values."""
+        numbers = {name: float(values[name]) for name in self.numbers}
+        robot = self.robot.with_values(numbers) if numbers else self.robot
+        load = self.load
+        for name in _TENDONS:
+            if name in values:
+                given = getattr(load, name)
+                value = np.where(np.isnan(given), np.nan, np.asarray(values[name]))
+                load = dataclasses.replace(load, **{name: value})
+        if self._tip:
+            external = tuple(
+                dataclasses.replace(
+                    one,
+                    **{name: tuple(np.asarray(values[name])[step].tolist()) for name in self._tip},
+                )
+                for step, one in enumerate(load.external)
+            )
+            load = dataclasses.replace(load, external=external)
+        ready = self._prepared(robot)
+        came = run(
+            ready, command(load, robot, ready.chain), None, self.settings, each_from_start=False
+        )
+        return Path(robot, load, ready, came, settings=self.settings)
+
+    def _taken(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
+        """Values of all parameters, in their shapes."""
         given = dict(values or {})
         wrong = [name for name in given if name not in self.start]
         if wrong:
             raise InputError(f"`{wrong[0]}` is none of the parameters {', '.join(self.start)}")
-        taken = {name: self._value(name, given.get(name, at)) for name, at in self.start.items()}
-        if not any(isinstance(value, Tracer) for value in taken.values()):
-            self._check(taken)
-        return _followed(self, taken)
+        return {name: self._value(name, given.get(name, at)) for name, at in self.start.items()}
 
     def _check(self, values: dict[str, Array]) -> None:
         """Refuse what no robot or load can have; what is traced is told by `converged` alone."""
@@ -204,13 +301,32 @@ class Differentiable:
         ]
         return np.concatenate([ready.chain_form.pack(ready.chain), *packed])
 
-    def commands(self, packed: Float[Array, " loads"], values: dict[str, Array]) -> Command:
+    @cached_property
+    def _program(self) -> _Program:
+        return _Program(self.ready.chain_form, self.command_form, self._tip, self.outputs)
+
+
+@dataclass(frozen=True)
+class _Program:
+    """What a compiled program is made for: robots and loads of one form share it."""
+
+    chain_form: Form
+    command_form: Form
+    tip: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def commands(
+        self,
+        packed: Float[Array, " loads"],
+        values: dict[str, Array],
+        given: dict[str, Float[Array, "s t"]],
+    ) -> Command:
         """The loads, with the values of parameters in them."""
-        form, steps = self.command_form, len(self.load)
-        every = packed.reshape(-1, steps, form.size)
+        form = self.command_form
+        every = packed.reshape(1 + 3 * len(self.tip), -1, form.size)
         bare: Command = form.unpack(every[0])
         applied = bare.applied
-        for number, name in enumerate(self._tip):
+        for number, name in enumerate(self.tip):
             for axis in range(3):
                 unit: Command = form.unpack(every[1 + 3 * number + axis])
                 along = values[name][:, axis]
@@ -218,9 +334,9 @@ class Differentiable:
         value = bare.value
         if "tension" in values:
             pulled = jnp.where(values["tension"] < 0.0, jnp.nan, values["tension"])
-            value = jnp.where(~np.isnan(self.load.tension), pulled, value)
+            value = jnp.where(~jnp.isnan(given["tension"]), pulled, value)
         if "stroke" in values:
-            value = jnp.where(~np.isnan(self.load.stroke), values["stroke"], value)
+            value = jnp.where(~jnp.isnan(given["stroke"]), values["stroke"], value)
         return bare._replace(value=value, applied=applied)
 
 
@@ -230,16 +346,20 @@ def _added(along: Array, total: Array, none: Array, unit: Array) -> Array:
 
 # Without options of the compiler: JAX takes them only where nothing else is traced around.
 @partial(jax.jit, static_argnums=0)
-def _followed(function: Differentiable, values: dict[str, Array]) -> dict[str, Array]:
-    arrays = function.traced(jnp.array([values[name] for name in function.numbers], float))
-    chain_form = function.ready.chain_form
-    chain = chain_form.unpack(arrays[: chain_form.size])
-    commands = function.commands(arrays[chain_form.size :], values)
-    start = at_rest(chain)
-    settings = function.settings
+def _followed(
+    program: _Program,
+    arrays: Float[Array, " all"],
+    values: dict[str, Array],
+    given: dict[str, Float[Array, "s t"]],
+    numbers: Float[Array, " settings"],
+) -> dict[str, Array]:
+    size = program.chain_form.size
+    chain = program.chain_form.unpack(arrays[:size])
+    commands = program.commands(arrays[size:], values, given)
+    start, settings = at_rest(chain), Settings.of(numbers)
     # Solved once, and looked at again for the slopes: nothing that iterates is differentiated.
     items: Any = (commands, solved_path(chain, commands, start, settings))
-    return followed(chain, items, start, settings, function.outputs, answered)
+    return followed(chain, items, start, settings, program.outputs, answered)
 
 
 __all__ = ["Differentiable", "differentiable"]

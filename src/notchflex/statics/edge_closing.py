@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.statics.actuation import tensions_alone
+from notchflex.statics.closing_search import ClosingStatus, statuses
 from notchflex.statics.newton import Settings
 from notchflex.statics.prepare import Prepared
 from notchflex.statics.run import run
@@ -17,14 +18,17 @@ from notchflex.statics.run import run
 # Steps of the first pull, up to so many times the tension that would close the softest notch if it
 # were linear and alone; what does not close by then is said not to close.
 _STEPS, _BEYOND_LINEAR = 40, 2.0
-# Rounds of false position; each gains one to two digits.
-_ROUNDS = 4
+# Rounds of false position that a notch needs; each gains one to two digits. More are run where the
+# solver fails in some.
+_ROUNDS, _MOST_ROUNDS = 4, 12
 
 
 def edge_closing(
     ready: Prepared, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Tension (N) that closes every notch, and its angle then (rad); NaN where none does.
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
+    """Tension (N) that closes every notch, its angle then (rad), and a `ClosingStatus`.
+
+    Tension and angle are NaN where none was found.
 
     Args:
         ready: The robot.
@@ -32,16 +36,17 @@ def edge_closing(
         arm: Its lever about the notch, mm.
     """
     tension, angle = (np.full(ready.chain.flexures, np.nan) for _ in range(2))
+    status = np.full(ready.chain.flexures, ClosingStatus.NEVER, dtype=object)
     for number in np.unique(tendon):
         own = np.flatnonzero((tendon == number) & (arm > 0.0))
         if len(own):
-            tension[own], angle[own] = _by_one_tendon(ready, int(number), own)
-    return tension, angle
+            tension[own], angle[own], status[own] = _by_one_tendon(ready, int(number), own)
+    return tension, angle, status
 
 
 def _by_one_tendon(
     ready: Prepared, tendon: int, own: np.ndarray
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], np.ndarray]:
     # Two steps where one would do: one alone is another program to compile.
     free, _ = _pull(ready, tendon, np.zeros(2))
     reach = -free[0, own]  # the gap at rest: an edge so far from closing
@@ -56,16 +61,26 @@ def _by_one_tendon(
     low, high = steps[after - 1], steps[after]
     at_low, at_high = (overlap[:, own][step, column] for step in (after - 1, after))
     guess, found_angle = high, angle[:, own][after, column]
-    for _ in range(_ROUNDS if closes.any() else 0):
-        guess = np.where(closes, high - at_high * (high - low) / (at_high - at_low), steps[-1])
+    rounds, missed = np.zeros(len(own), int), np.zeros(len(own), bool)
+    for _ in range(_MOST_ROUNDS if closes.any() else 0):
+        if (rounds[closes] >= _ROUNDS).all():
+            break
+        across = high - at_high * (high - low) / (at_high - at_low)
+        # Where the solver failed, the next trial lies closer to the tension that it bore.
+        guess = np.where(closes, np.where(missed, 0.5 * (low + guess), across), steps[-1])
         order = np.argsort(guess)
         pressed, angle = _pull(ready, tendon, guess[order])
-        here = pressed[np.argsort(order), own]
-        found_angle = angle[np.argsort(order), own]
-        over = here > 0.0
-        low, at_low = np.where(over, low, guess), np.where(over, at_low, here)
+        here, there = (found[np.argsort(order), own] for found in (pressed, angle))
+        missed = ~np.isfinite(here)
+        rounds = rounds + ~missed
+        found_angle = np.where(missed, found_angle, there)
+        over, under = here > 0.0, here <= 0.0
+        low, at_low = np.where(under, guess, low), np.where(under, here, at_low)
         high, at_high = np.where(over, guess, high), np.where(over, here, at_high)
-    return np.where(closes, guess, np.nan), np.where(closes, found_angle, np.nan)
+    found = closes & (rounds >= _ROUNDS) & ~missed
+    failed = ~np.isfinite(overlap[:, own]).all(axis=0)
+    status = statuses(found, np.asarray(~closes & ~failed))
+    return np.where(found, guess, np.nan), np.where(found, found_angle, np.nan), status
 
 
 def _pull(

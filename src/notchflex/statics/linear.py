@@ -68,6 +68,7 @@ def blocks(
         elastic = jax.vmap(held_by_strains, in_axes=(0, None, 0, 0))(
             chain.rods, chain.law, chain.memory, unknowns.modes
         )
+        elastic = _never_singular(chain, elastic)
     behind: list[Array] = []
 
     def by_modes(rows: Array) -> Array:
@@ -107,6 +108,25 @@ def blocks(
     behind += [strand.drawn for strand in strands]
     behind += [strand.stretch for strand in strands if strand.stretch is not None]
     return Blocks(*(_stacked(chain, rows, form) for rows in (residual, onward, behind)))
+
+
+# A mode that resists by less than this part of its stiffness at rest is taken to resist so much:
+# the root of the rounding error, so that neither the change nor what it cancels with is felt.
+_LEAST_SLOPE = 1e-8
+
+
+def _never_singular(chain: Chain, elastic: Float[Array, "n m m"]) -> Float[Array, "n m m"]:
+    """Keep a plateau of the material's law from leaving a mode without a pivot.
+
+    Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is flat to
+    the last digit. The modes are eliminated first, so their pivots must not vanish there, though
+    friction makes the whole system regular; without friction the step becomes long but finite, and
+    the limits of a step apply to it.
+    """
+    own = jnp.diagonal(elastic, axis1=1, axis2=2)
+    least = _LEAST_SLOPE * chain.stiffness
+    missing = jnp.where(jnp.abs(own) < least, least, 0.0)
+    return elastic + jax.vmap(jnp.diag)(missing)
 
 
 def _stacked(chain: Chain, rows: list[Array], form: Layout) -> Float[Array, "n k z"]:

@@ -13,7 +13,7 @@ from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command, command_residual, stroke
-from notchflex.statics.element import Memory, Unknowns, pressed
+from notchflex.statics.element import Memory, Unknowns, heights, pressed
 from notchflex.statics.play import played
 from notchflex.statics.sweep import Step, linear_step
 from notchflex.statics.walk import Evaluation, evaluate
@@ -107,8 +107,10 @@ _PLAYED_ABOVE = 1e-4
 # rounding allows.
 _ROUNDING = 100.0
 _LARGEST_GROWTH = 1e4
-# Lips are brought together by a little more than their gap, so that they count as closed.
-_BEYOND = 1.0 + 1e-6
+# Lips are brought together by a little more than their gap, so that they count as closed: by this
+# part of the gap, and of the notch's height. Without the latter a gap that is a rounding error
+# would hold every step up at itself, and the lips would neither close nor open.
+_BEYOND, _OVERLAP = 1e-6, 1e-12
 
 
 def newton(
@@ -265,8 +267,9 @@ def _stopped_by_lips(
         closing = -part * jnp.einsum("nlm,nm->nl", touch.slope, modes)
         is_open = ~pressed(chain.lip_stiffness, group.closes, force, touch.gap)
         stops = is_open & (closing > touch.gap) & (touch.gap > 0.0) & (group.closes > 0.0)
-        allowed = jnp.where(stops, _BEYOND * touch.gap / jnp.where(stops, closing, 1.0), 1.0)
-        modes = modes * jnp.min(allowed, axis=-1, keepdims=True)
+        reach = (1.0 + _BEYOND) * touch.gap + _OVERLAP * heights(chain)[:, None]
+        allowed = jnp.where(stops, reach / jnp.where(stops, closing, 1.0), 1.0)
+        modes = modes * jnp.minimum(jnp.min(allowed, axis=-1, keepdims=True), 1.0)
     return step._replace(unknowns=step.unknowns._replace(modes=modes))
 
 

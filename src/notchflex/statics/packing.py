@@ -31,6 +31,7 @@ class Form:
         sizes = [int(np.prod(shape)) for shape in shapes]
         self.ends = np.cumsum(sizes)[:-1].tolist()
         self.size = sum(sizes)
+        self._parts = tuple(map(slice, [0, *self.ends], [*self.ends, self.size]))
 
     @cached_property
     def places(self) -> list[np.ndarray]:
@@ -76,8 +77,7 @@ class Form:
 
     def leaf(self, vector: Any, number: int) -> Any:
         """One leaf of the tree of a vector alone, by its number."""
-        starts = [0, *self.ends]
-        part = vector[..., starts[number] : [*self.ends, self.size][number]]
+        part = vector[..., self._parts[number]]
         shape = (*vector.shape[:-1], *self.shapes[number])
         return as_kind(part.reshape(shape), self.kinds[number])
 

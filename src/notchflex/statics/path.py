@@ -127,23 +127,31 @@ class Path:
         return self._of("total_angle")
 
     @cached_property
-    def _base(self) -> np.ndarray:
-        return np.asarray(rotation_about(constant(self.load.base_rotation)))
+    def _base(self) -> np.ndarray | None:
+        """Rotation of the base in the world; None for a base that is not turned."""
+        turn = self.load.base_rotation
+        return np.asarray(rotation_about(constant(turn))) if any(turn.tolist()) else None
 
-    @cached_property
+    def _in_world(self, name: str) -> np.ndarray:
+        """Vectors, as last axis, turned from the frame of the base to the world."""
+        base, vectors = self._base, self._of(name)
+        return vectors if base is None else vectors @ base.T
+
+    @property
     def body_position(self) -> np.ndarray:
         """Origin of every body, base first, in the world, mm, (s, n + 1, 3)."""
-        return self._of("body_position") @ self._base.T
+        return self._in_world("body_position")
 
-    @cached_property
+    @property
     def body_rotation(self) -> np.ndarray:
         """Rotation of every body in the world, (s, n + 1, 3, 3)."""
-        return self._base @ self._of("body_rotation")
+        base, rotation = self._base, self._of("body_rotation")
+        return rotation if base is None else base @ rotation
 
-    @cached_property
+    @property
     def tip_position(self) -> np.ndarray:
         """Tip on the tube axis in the world, the proximal end being the origin, mm, (s, 3)."""
-        return self._of("tip_position") @ self._base.T
+        return self._in_world("tip_position")
 
     @property
     def tip_rotation(self) -> np.ndarray:
@@ -241,12 +249,12 @@ class Path:
 
         It balances all loads and the pull of the drives, along the tube, on the tendons.
         """
-        return self._of("base_force") @ self._base.T
+        return self._in_world("base_force")
 
     @property
     def base_moment(self) -> np.ndarray:
         """Moment of the holder about the proximal end in the world, N mm, (s, 3)."""
-        return self._of("base_moment") @ self._base.T
+        return self._in_world("base_moment")
 
     @property
     def moment_error(self) -> np.ndarray:
@@ -331,10 +339,10 @@ class Path:
         """Sign of the determinant of that stiffness, (s,)."""
         return self._stability[1]
 
-    @property
+    @cached_property
     def stable(self) -> np.ndarray:
         """Whether the state is a stable equilibrium, (s,)."""
-        return (self.smallest_eigenvalue > 0.0) & (self.determinant_sign > 0.0)
+        return self.run.stable(command(self.load, self.robot, self.chain))
 
     def state_at(self, step: int) -> State:
         """State after a step (or the last good one before it), to save or continue from."""

@@ -13,7 +13,7 @@ from notchflex._jax import constant
 from notchflex.chain import Chain, assemble, padded
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
-from notchflex.statics.capacity import capacity, places_within
+from notchflex.statics.capacity import capacity, lengthen, places_within
 from notchflex.statics.known import KnownForm
 from notchflex.statics.packing import Form
 from notchflex.statics.quantities import Shape
@@ -61,6 +61,11 @@ class Prepared:
         more = padded(chain, capacity(chain.flexures), chain.contacts.shape[1])
         edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
         return Prepared(dataclasses.replace(more, contacts=edges))
+
+    def long_commands(self, commands: Command) -> tuple[Float[np.ndarray, "s command"], Form]:
+        """Loads packed for the long chain, and the form of one of them."""
+        own, form = self.command_form(commands), self.long.command_form(commands)
+        return lengthen(own.pack(commands, leading=1), own, form), form
 
     @cached_property
     def columns(self) -> np.ndarray:

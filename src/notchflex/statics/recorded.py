@@ -58,5 +58,10 @@ class Recorded:
         del commands  # they were counted when it was computed
         return self.held
 
+    def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:
+        """Whether each state is stable."""
+        del commands
+        return (self.held[0] > 0.0) & (self.held[1] > 0.0)
+
 
 __all__ = ["BEFORE", "TOLD", "Recorded"]

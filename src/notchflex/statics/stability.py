@@ -1,122 +1,59 @@
-"""Is an equilibrium stable? The stiffness of the whole robot with its tendons held."""
+"""Is an equilibrium stable? It is where every eigenvalue of its stiffness has a positive real part.
+
+Friction makes the stiffness unsymmetric. Where its symmetric part is positive definite the
+eigenvalues have positive real parts; that is told at a fraction of their cost. The converse does
+not hold (a stuck contact adds the product of two different vectors), so elsewhere the eigenvalues
+themselves are found.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Float
+from jaxtyping import Bool, Float
 
-from notchflex._jax import jax, jnp
-from notchflex._kept import kept
-from notchflex.chain import Chain
-from notchflex.statics.actuation import Command, command_residual
-from notchflex.statics.element import Memory, at_bound
-from notchflex.statics.newton import Point
-from notchflex.statics.packing import Form
+from notchflex.statics.actuation import Command
+from notchflex.statics.held_stiffness import held_stiffness
 from notchflex.statics.prepare import Prepared
-from notchflex.statics.sizes import pad
 from notchflex.statics.stepping import Solved
-from notchflex.statics.walk import evaluate
-
-# Closed lips and tendons drawn by stroke are held by springs this much stiffer than the notches:
-# they only stiffen; without it their forces would be multipliers and the stiffness not defined.
-_HOLDING_STIFFNESS = 1e3
-# A contact on its bound goes on sliding: it is taken as having slid by so much (mm).
-_SLIP = 1e-3
 
 
-def held_stiffness(
-    chain: Chain, command: Command, solved: Solved
-) -> tuple[Float[Array, "modes modes"], Float[Array, ""]]:
-    """Stiffness of the whole robot against its modes, and the sign of a determinant.
-
-    Tension ratios, contact forces and base tensions are eliminated first: a contact that sticks
-    holds its tendon, one that slides keeps its tension ratio at the bound, which moves with the
-    shape. The stiffness is not symmetric then, so it is its eigenvalues that tell stability: its
-    symmetric part has negative ones in states that nothing makes snap (a stuck contact adds the
-    product of two different vectors).
-
-    Args:
-        chain: The chain.
-        command: What is demanded of the tendons: by stroke a tendon is held, by tension it
-            gives way.
-        solved: The equilibrium.
-
-    Returns:
-        The stiffness, N mm per unit of mode squared (N mm/rad for arc notches), and the sign of
-        the determinant of the whole system.
-    """
-    point = solved.point
-    modes = point.unknowns.modes.size
-    flat, point_of = ravel_pytree(point)
-    here = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
-    slid = tuple(
-        span.slid - _SLIP * at_bound(ratio, span.bound)
-        for span, ratio in zip(here.spans, point.unknowns.log_ratio, strict=True)
-    )
-    memory = Memory(point.unknowns.log_ratio, slid, tuple(span.bound for span in here.spans))
-
-    def imbalance(flat: Array) -> Array:
-        varied: Point = point_of(flat)
-        at = evaluate(chain, varied.unknowns, memory, varied.base_tension, solved.applied)
-        demand = command_residual(chain, command, varied.base_tension, at.base)
-        residual = at.residual
-        residual = residual._replace(modes=residual.modes * chain.stiffness)
-        return ravel_pytree((residual, demand))[0]
-
-    matrix = jax.jacfwd(imbalance)(flat)
-    natural_gap = chain.rods.length.sum(-1)
-    give = 1.0 / (_HOLDING_STIFFNESS * chain.lip_stiffness * natural_gap)
-    softened = [jnp.zeros(modes)]
-    softened += [
-        jnp.broadcast_to(give[:, None], group.closes.shape).ravel() for group in chain.lips
-    ]
-    on_diagonal = jnp.concatenate(softened)
-    rows = jnp.arange(len(on_diagonal))
-    matrix = matrix.at[rows, rows].add(on_diagonal)
-    drawn = len(flat) - chain.tendons + jnp.arange(chain.tendons)
-    if command.by_stroke is not None:
-        soft = command.by_stroke / (_HOLDING_STIFFNESS * chain.drawn_stiffness)
-        matrix = matrix.at[drawn, drawn].add(soft)
-    others = matrix[modes:, modes:]
-    stiffness = matrix[:modes, :modes] - matrix[:modes, modes:] @ jnp.linalg.solve(
-        others, matrix[modes:, :modes]
-    )
-    sign, _ = jnp.linalg.slogdet(matrix)
-    return stiffness, sign
+def stable(prepared: Prepared, commands: Command, solved: Solved) -> Bool[np.ndarray, " s"]:
+    """Whether every state is stable, contacts that stick held."""
+    told: list[bool] = []
+    for stiffness, signs in held_stiffness(prepared, commands, solved):
+        told += [
+            sign > 0.0 and bool(_positive_definite(one) or _smallest(one) > 0.0)
+            for one, sign in zip(stiffness, signs, strict=True)
+        ]
+    return np.array(told, bool)
 
 
 def stability(
     prepared: Prepared, commands: Command, solved: Solved
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
     """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
-    count = len(commands.value)
-    items = (pad(commands), pad(solved), np.array(count))
-    stiffness, sign = _stability(prepared.vector, *items, prepared.chain_form)
-    # Modes that only fill up the arrays are none of the robot's.
-    own = np.flatnonzero(np.asarray(prepared.chain.rods.idle).ravel() == 0.0)
-    held = np.asarray(stiffness)[:count][:, own[:, None], own]
-    whole = np.isfinite(held).all(axis=(1, 2))
-    eigenvalue = np.full(count, np.nan)
-    eigenvalue[whole] = np.real(np.linalg.eigvals(held[whole])).min(axis=-1)
-    return eigenvalue, np.asarray(sign)[:count]
+    smallest: list[float] = []
+    signs: list[float] = []
+    for stiffness, sign in held_stiffness(prepared, commands, solved):
+        smallest += [_smallest(one) for one in stiffness]
+        signs += sign.tolist()
+    return np.array(smallest), np.array(signs)
 
 
-@kept(4)
-def _stability(
-    vector: Float[Array, " chain"],
-    commands: Command,
-    solved: Solved,
-    count: Array,
-    chain_form: Form,
-) -> tuple[Array, Array]:
-    chain = chain_form.unpack(vector)
-    modes = chain.stiffness.size
+def _positive_definite(stiffness: Float[np.ndarray, "m m"]) -> bool:
+    """Whether the symmetric part is positive definite."""
+    try:
+        np.linalg.cholesky(stiffness + stiffness.T)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
-    def one(item: tuple[Command, Solved, Array]) -> tuple[Array, Array]:
-        command, state, number = item
-        nothing = (jnp.full((modes, modes), jnp.nan), jnp.array(jnp.nan))
-        wanted = number < count
-        return jax.lax.cond(wanted, lambda: held_stiffness(chain, command, state), lambda: nothing)
 
-    return jax.lax.map(one, (commands, solved, jnp.arange(len(commands.value))))
+def _smallest(stiffness: Float[np.ndarray, "m m"]) -> float:
+    """Smallest real part of the eigenvalues; NaN where the state is none."""
+    if not np.isfinite(stiffness).all():
+        return float("nan")
+    return float(np.real(np.linalg.eigvals(stiffness)).min())
+
+
+__all__ = ["stability", "stable"]

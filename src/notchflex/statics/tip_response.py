@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -16,6 +16,7 @@ from notchflex.statics.actuation import Command
 from notchflex.statics.applied import Applied
 from notchflex.statics.command import command
 from notchflex.statics.given import robot_given
+from notchflex.statics.kinks import Kink, kinks
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.packing import Form
@@ -47,6 +48,11 @@ class TipResponse:
     jacobian: Float[np.ndarray, "s 6 t"]
     compliance: Float[np.ndarray, "s 6 6"]
 
+    @cached_property
+    def kinks(self) -> list[Kink]:
+        """Contacts and notches at a switch: there the slopes are those of one side only."""
+        return kinks(self.path)
+
 
 def tip_response(
     robot: Robot,
@@ -58,7 +64,8 @@ def tip_response(
     """Follow loads, and find at every state how the tip answers its drives and what pushes at it.
 
     With friction the answer depends on the way: it is that of going on as the load went. A contact
-    that slid in the last step goes on sliding, one that stuck goes on sticking.
+    that slid in the last step goes on sliding, one that stuck goes on sticking. Where a contact is
+    about to slip or a notch to close, the slopes are those of one side; `kinks` lists these.
 
     Args:
         robot: The robot.

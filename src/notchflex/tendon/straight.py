@@ -30,7 +30,8 @@ class Straight(TendonGroup):
         pulls: Along what it pulls: the "gap", or the channel of the body before ("dead") or
             behind ("follower").
         turns_with_chord: Whether it turns at the distal body by the turn of the flexure's chord
-            rather than that of the body (the reading of Liu 2022).
+            rather than that of the body (the reading of Liu 2022), behind a strip; other notches
+            have no chord.
     """
 
     acts_on_bodies = True
@@ -48,15 +49,17 @@ class Straight(TendonGroup):
 
     def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
         """Straight span from the anchor to the entry of the distal body."""
-        del rod
         assert anchors is not None  # acts_on_bodies asks for it
+        chord = rod.chord if self.turns_with_chord else None
 
         def one(anchor: Motion, leaves: Array, enters: Array, channel: Array) -> tuple[Array, ...]:
             span = enters - anchor.point_inside(leaves)
             length = guarded_norm(span)
             gap = span / jnp.where(length == 0.0, 1.0, length)
             before = channel @ anchor.rotation
-            onward = self._onward(flexure, before) if self.turns_with_chord else channel
+            onward = channel
+            if chord is not None:
+                onward = jnp.where(chord > 0.0, self._onward(flexure, before), channel)
             pulled = {"gap": gap, "dead": before, "follower": channel}[self.pulls]
             return length, turning(before, gap), turning(gap, onward), wrench_at(enters, pulled)
 

@@ -1,0 +1,126 @@
+"""The tension at which a notch closes, on a solver that may fail at some tensions.
+
+The overlap, contact force / stiffness - gap, rises with the tension and goes through zero where
+the notch closes. Many notches are searched at once; a solve that does not converge gives NaN, and
+costs a notch one trial, not its result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+Overlap = Callable[[Float[np.ndarray, " m"]], Float[np.ndarray, " m"]]
+"""From one tension per notch to its overlap (mm); NaN where the solve did not converge."""
+
+
+class ClosingStatus(StrEnum):
+    """Whether a notch closes under its tendon, pulled alone from rest.
+
+    Attributes:
+        CLOSES: "closes": the tension is known.
+        NEVER: "never": the largest tension tried leaves it open.
+        NOT_FOUND: "not found": the solver did not converge at the tensions in question.
+    """
+
+    CLOSES = "closes"
+    NEVER = "never"
+    NOT_FOUND = "not found"
+
+
+# A tension of this many times the first guess that leaves a notch open is taken as "never".
+_DOUBLINGS = 6
+# Trials between a tension that leaves a notch open and one where the solver fails.
+_TRIALS = 12
+_PRECISION = 1e-11  # relative, of the tension
+_ROUNDS = 100
+
+
+def closing_tensions(
+    overlap: Overlap, guess: Float[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, " m"], np.ndarray]:
+    """Find the tension that closes each notch, and a status for each.
+
+    Args:
+        overlap: The overlap of all notches, each at its own tension.
+        guess: Tensions to begin from, N; 2 ** 6 times that is the largest one tried.
+
+    Returns:
+        Tensions (N), NaN where none was found, and statuses (`ClosingStatus`).
+    """
+    low, high, failed = _bracket(overlap, guess)
+    found = np.isfinite(high)
+    tension, precise = _root(overlap, low, np.where(found, high, low))
+    closes = found & precise
+    return np.where(closes, tension, np.nan), statuses(closes, ~found & ~failed)
+
+
+def statuses(closes: Bool[np.ndarray, " m"], never: Bool[np.ndarray, " m"]) -> np.ndarray:
+    """Return a `ClosingStatus` for every notch: where neither holds, it was not found."""
+    status = np.full(len(closes), ClosingStatus.NOT_FOUND, dtype=object)
+    status[closes], status[never] = ClosingStatus.CLOSES, ClosingStatus.NEVER
+    return status
+
+
+def _bracket(
+    overlap: Overlap, guess: Float[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+    """A tension that leaves each notch open, one that closes it (NaN: none), and failures met."""
+    low, high = np.zeros_like(guess), np.full_like(guess, np.nan)
+    failing = np.full_like(guess, np.nan)  # smallest tension above `low` that failed
+    trial = guess
+    for number in range(1 + _DOUBLINGS + _TRIALS):
+        doubling = number <= _DOUBLINGS
+        searched = np.isnan(high) & (doubling | np.isfinite(failing))
+        if not searched.any():
+            break
+        value = overlap(trial)
+        high = np.where(searched & (value > 0.0), trial, high)
+        low = np.where(searched & (value <= 0.0), trial, low)
+        failing = np.where(searched & np.isnan(value), np.fmin(failing, trial), failing)
+        failing = np.where(failing > low, failing, np.nan)
+        # Beyond the largest tension there is nothing to try, but before the first that failed.
+        trial = 2.0 * trial if number < _DOUBLINGS else 0.5 * (low + np.fmax(low, failing))
+    return low, high, np.isfinite(failing)
+
+
+def _root(
+    overlap: Overlap, low: Float[np.ndarray, " m"], high: Float[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+    """Roots between two tensions, by false position (Illinois), halving where that stalls.
+
+    After a failed solve the next trials go elsewhere between the two, ever closer to the lower.
+
+    Returns:
+        The roots, and whether each is known to the precision asked for.
+    """
+    at_low, at_high = overlap(low), overlap(high)
+    width, misses = high - low, np.zeros(low.shape, int)
+    side, slow = np.zeros(low.shape, int), np.zeros(low.shape, int)
+    for _ in range(_ROUNDS):
+        open_still = (high - low > _PRECISION * high) & (misses < _TRIALS)
+        if not open_still.any():
+            break
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = at_low / (at_low - at_high)
+        part = np.where((slow > 1) | ~((part > 0.0) & (part < 1.0)), 0.5, part)
+        part = np.where(misses > 0, 0.6 ** np.maximum(misses, 1), part)
+        trial = low + part * (high - low)
+        value = np.where(open_still, overlap(trial), np.nan)
+        up, down = value > 0.0, value <= 0.0
+        high, at_high = np.where(up, trial, high), np.where(up, value, at_high)
+        low, at_low = np.where(down, trial, low), np.where(down, value, at_low)
+        # The end that stays a second time counts half, so that the other side is reached.
+        at_low = np.where(up & (side > 0), 0.5 * at_low, at_low)
+        at_high = np.where(down & (side < 0), 0.5 * at_high, at_high)
+        side = np.where(up, 1, np.where(down, -1, side))
+        misses = np.where(up | down, 0, misses + open_still)
+        slow = np.where(high - low > 0.5 * width, slow + 1, 0)
+        width = high - low
+    return 0.5 * (low + high), high - low <= _PRECISION * high
+
+
+__all__ = ["ClosingStatus", "closing_tensions", "statuses"]
