@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float
 
-from notchflex._jax import constant, jax, jit, jnp
+from notchflex._jax import constant, jax, jnp
+from notchflex._native import native
+from notchflex.chain import Chain
 from notchflex.motion import rotation_about, unskew
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
 from notchflex.statics.applied import Applied
+from notchflex.statics.capacity import lengthen
 from notchflex.statics.command import command
 from notchflex.statics.given import robot_given
 from notchflex.statics.kinks import Kink, kinks
+from notchflex.statics.known import KnownForm
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
-from notchflex.statics.packing import Form
+from notchflex.statics.packing import Form, lane_sizes
 from notchflex.statics.path import Path
 from notchflex.statics.prepare import prepared
 from notchflex.statics.quantities import shape
@@ -91,56 +95,61 @@ def tip_response(
     commands = command(path, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=False)
     found = Path(robot, path, ready, came)
-    states = came.states
-    before = np.concatenate([ready.rest_vector[None], states[:-1]])
-    form = ready.command_form(commands)
-    way = (came.between, came.part_before, came.parts, found.converged)
-    items = (before, states, form.pack(commands, leading=1), *way)
-    slopes = np.asarray(_slopes(ready.vector, *items, ready.chain_form, form, ready.state))
+    long = ready.long
+    loads, form = ready.long_commands(commands)
+    states, between = (
+        lengthen(one, ready.state, long.state) for one in (came.states, came.between)
+    )
+    how = np.stack([came.part_before, came.parts, found.converged], axis=1)
+    rows = (False, False, True, True, True, True)
+    given = (long.rest_vector, long.known_vector, states, loads, between, how)
+    slopes = _slopes.along(rows, *given, long.known_form, form, long.state)
+    slopes = np.swapaxes(slopes, -1, -2)
     base = np.asarray(rotation_about(constant(path.base_rotation)))
     turn = np.kron(np.eye(2), base)
     tendons = ready.chain.tendons
     return TipResponse(found, turn @ slopes[..., :tendons], turn @ slopes[..., tendons:] @ turn.T)
 
 
-@partial(jit, static_argnums=(8, 9, 10))
+@native(6, lane_sizes)
 def _slopes(
+    before: Float[Array, " state"],
     vector: Float[Array, " chain"],
-    before: Float[Array, "s state"],
-    states: Float[Array, "s state"],
-    commands: Float[Array, "s command"],
-    between: Float[Array, "s state"],
-    part_before: Float[Array, " s"],
-    parts: Int[Array, " s"],
-    converged: Bool[Array, " s"],
-    chain_form: Form,
+    state: Float[Array, " state"],
+    load: Float[Array, " command"],
+    between: Float[Array, " state"],
+    how: Float[Array, " 3"],
+    chain_form: KnownForm,
     command_form: Form,
     state_form: Form,
-) -> Float[Array, "s 6 changes"]:
-    chain = chain_form.unpack(vector)
+) -> tuple[Float[Array, " state"], Float[Array, "changes 6"]]:
+    """Change of the pose of the tip per change of every drive and of the wrench at the tip.
 
-    def pose(change: Array, item: tuple[Array, ...]) -> tuple[Array, Array]:
-        last, state, packed, halfway, *way = item
-        load: Command = command_form.unpack(packed)
-        assert load.applied is not None  # the chain is assembled for loads
+    Carried from state to state is the state, the one before the next.
+    """
+    chain: Chain = chain_form.unpack(vector)
+    last, solved, halfway = (state_form.unpack(one) for one in (before, state, between))
+    command: Command = command_form.unpack(load)
+    assert command.applied is not None  # the chain is assembled for loads
+    applied = command.applied
+    way = Way(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+
+    def pose(change: Array) -> tuple[Array, Array]:
         drives, wrench = change[: chain.tendons], change[chain.tendons :]
-        varied = load._replace(
-            value=load.value + drives,
-            applied=_with_tip(load.applied, wrench, chain.body_length[-1]),
+        varied = command._replace(
+            value=command.value + drives,
+            applied=_with_tip(applied, wrench, chain.body_length[-1]),
         )
-        last, state, halfway = (state_form.unpack(one) for one in (last, state, halfway))
-        answer = answering(chain, varied, last, state, Way(halfway, *way))
-        own = shape(chain, answer)
+        own = shape(chain, answering(chain, varied, last, solved, way))
         return own.body_rotation[-1], own.tip_position
 
-    def one(item: tuple[Array, ...]) -> Array:
-        still = jnp.zeros(chain.tendons + 6)
-        turned, moved = jax.jacfwd(pose)(still, item)
-        rotation, _ = pose(still, item)
-        turn = jax.vmap(lambda slope: unskew(slope @ rotation.T), in_axes=-1, out_axes=-1)
-        return jnp.concatenate([turn(turned), moved])
+    def along(direction: Array) -> Array:
+        still = jnp.zeros_like(direction)
+        (rotation, _), (turned, moved) = jax.jvp(pose, (still,), (direction,))
+        return jnp.concatenate([unskew(turned @ rotation.T), moved])
 
-    return jax.lax.map(one, (before, states, commands, between, part_before, parts, converged))
+    # A loop over the changes: their derivatives are compiled once.
+    return state, jax.lax.map(along, jnp.eye(chain.tendons + 6))
 
 
 def _with_tip(applied: Applied, wrench: Float[Array, " 6"], length: Float[Array, ""]) -> Applied:
