@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/chain.md and docs/choosing.md into docs/images, from solved states.
+"""Draws the pictures of the explanations into docs/images, from solved states and real robots.
 
 `python docs/make/figures.py`.
 """
@@ -8,9 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from free_body import free_body
 from matplotlib.axes import Axes
 
 import notchflex as nf
+from notchflex.plotting import dimensioned_figure
 from notchflex.plotting.style import (
     BLUE,
     GREEN,
@@ -170,11 +172,25 @@ def cuts() -> None:
     save(figure, IMAGES / "cuts.svg")
 
 
+def dimensions() -> None:
+    """The dimensioned drawings of one robot for each kind of notch."""
+    robots = {
+        "arc_on_axis": nf.load_robot("pacheco2021-a").with_value("tube.base_length", 1.0),
+        "arc_off_axis": nf.load_robot("york2015").with_value("tube.base_length", 0.5),
+        "strip": nf.load_robot("liu2022"),
+        "u_link": nf.load_robot("gao2017"),
+    }
+    for name, robot in robots.items():
+        save(dimensioned_figure(robot), IMAGES / f"dimensions_{name}.svg")
+
+
 def main() -> None:
     """Draw all of them."""
+    dimensions()
     with house_style():
         for draw in (chain, memory, closing, cuts):
             draw()
+        free_body(IMAGES)
 
 
 if __name__ == "__main__":
