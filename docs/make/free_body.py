@@ -120,6 +120,6 @@ def contact(axes: Axes) -> None:
     axes.plot(2.0 * np.cos(angles), 2.0 * np.sin(angles), color="black", lw=0.7)
     axes.text(0.25, 2.15, "$\\beta$", ha="center", va="center", fontsize=12)
     axes.text(-1.75, 0.0, "body", ha="center", va="center")
-    axes.set_title("The tendon at a contact, while it is pulled", loc="left")
+    axes.set_title("The tendon at a contact, during loading", loc="left")
     axes.set_xlim(-2.7, 2.9)
     axes.set_ylim(-3.3, 3.2)
