@@ -83,7 +83,9 @@ def pictures(folder: Path) -> None:
         chosen = (half - 1, half + 2, half + 4, half + 6, half + 8, half + 10)
         for step, colour in zip(chosen, sequence_colours(len(chosen)), strict=True):
             right.plot(path.span_tension[step, 0], color=colour)
-            label = f"{path.tension[step, 0]:.0f} N" + (", loading" if step < half else ", unloading")
+            label = f"{path.tension[step, 0]:.0f} N" + (
+                ", loading" if step < half else ", unloading"
+            )
             right.plot(profile[step, 2:], "o", ms=3.0, mfc="none", color=colour)
             right.plot([], [], "o-", ms=3.0, mfc="none", color=colour, label=label)
         right.set_xlabel("span of the tendon, 0 at the base")

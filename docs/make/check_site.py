@@ -1,6 +1,7 @@
 """Checks the built pages (site/): nothing is fetched from elsewhere, every local file is there.
 
 Every formula must have become MathML: no `$...$` is left in the text, no placeholder in a formula.
+The reference describes functions and classes, never a module of the same name.
 
 `zensical build --strict && python docs/make/check_site.py`.
 """
@@ -27,6 +28,7 @@ class Fetched(HTMLParser):
         self.links: list[str] = []
         self.words: list[str] = []
         self.formulas: list[str] = []
+        self.modules = 0
         self._inside: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -34,6 +36,7 @@ class Fetched(HTMLParser):
         values = dict(attrs)
         if tag in ("code", "pre", "script", "style", "math"):
             self._inside.append(tag)
+        self.modules += "doc-module" in (values.get("class") or "").split()
         if tag in FETCHING:
             self.fetched.append(values.get(FETCHING[tag]) or "")
         elif tag == "a":
@@ -64,6 +67,8 @@ def problems(site: Path) -> list[str]:
         found += [f"{name} fetches {one}" for one in reader.fetched if urlsplit(one).netloc]
         left = re.findall(r"\$[^$\n]+\$", " ".join(reader.words))
         found += [f"{name} has a formula that was not read: {one}" for one in left]
+        if reader.modules:
+            found.append(f"{name} describes a module instead of what is in it")
         # Markdown puts such letters where it took a backslash for its own.
         if "klzz" in "".join(reader.formulas):
             found.append(f"{name} has a formula with an escaped character; write it as a block")

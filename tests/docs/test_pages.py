@@ -155,6 +155,7 @@ def test_checked_site_fetches_nothing(tmp_path: Path, make: Any):
     (tmp_path / "3.html").write_text('<script src="//cdn.net/x.js"></script><a href="gone.html">')
     (tmp_path / "4.html").write_text("<p>a $x_j$</p><pre>$ notchflex robots</pre><p>2 $</p>")
     (tmp_path / "5.html").write_text("<math><mi>k</mi><mi>l</mi><mi>z</mi><mi>z</mi></math>")
+    (tmp_path / "6.html").write_text('<div class="doc doc-object doc-module">solve</div>')
     wrong = check.problems(tmp_path)
-    assert len(wrong) == 4
+    assert len(wrong) == 5
     assert "$x_j$" in wrong[2]
