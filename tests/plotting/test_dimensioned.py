@@ -169,3 +169,11 @@ def test_drawing_is_written(tmp_path, suffix):
     file = tmp_path / f"drawing.{suffix}"
     save_dimensioned(nf.load_robot("gao2017"), file)
     assert file.stat().st_size > 5000
+
+
+def test_depth_from_a_calliper_on_radial_edges():
+    """The formula of docs/your_own_wrist.md: the jaws touch the inner corners."""
+    view = view_of(nf.load_robot("pacheco2021-a"))
+    thickness = 0.81 + view.cuts[0].edge[1, 1]
+    assert thickness == pytest.approx(0.300, abs=5e-4)
+    assert 0.81 + (0.81 - thickness) * 0.81 / 0.70 == pytest.approx(1.40)
