@@ -1,4 +1,4 @@
-"""I have cut a tube and measured it with a calliper: how does it bend, and what may it bear?"""
+"""I measured my cut tube with a calliper: how does it bend, and what tension is allowed?"""
 
 from math import degrees
 

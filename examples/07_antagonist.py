@@ -1,4 +1,4 @@
-"""Two tendons against each other: what does the second one take from the bend of the first?"""
+"""Two tendons against each other: how much bend does the second one take from the first?"""
 
 from math import degrees
 

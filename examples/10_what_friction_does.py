@@ -1,4 +1,4 @@
-"""What does the coefficient of friction do to the bend, and to the loop?"""
+"""How does the coefficient of friction change the bend and the hysteresis loop?"""
 
 import numpy as np
 
@@ -17,5 +17,5 @@ for mu in coefficients:
     arrives = path.span_tension[30, 0, -1] / path.tension[30, 0]
     print(
         f"mu {mu:.1f}: {bends[-1]:.1f} deg at 1.5 N, loop {loops[-1]:.1f} deg wide, "
-        f"{100.0 * arrives:.0f} % of the pull arrives at the tip"
+        f"{100.0 * arrives:.0f} % of the tension reaches the tip"
     )

@@ -33,7 +33,7 @@ def differences(refinement: int) -> list[Difference]:
     path, rows = gao2017.pulled_and_let_go(refinement), reference("gao_free_bending.csv")
     profile = reference("gao_tension_profiles.csv")
     found = [
-        difference("tip, pulled to 13 N and let go", gao2017.tip(path), rows[:, 2:4], "mm"),
+        difference("tip, loading to 13 N and unloading", gao2017.tip(path), rows[:, 2:4], "mm"),
         difference("rotation of the tip", path.total_angle, rows[:, 4], "rad"),
         difference("tension of every span", path.span_tension[:, 0], profile[:, 2:], "N"),
     ]
@@ -69,7 +69,7 @@ def pictures(folder: Path) -> None:
         left, right = figure.subplots(1, 2)
         for steps, colour, way in (
             (slice(0, half), BLUE, "pulling"),
-            (slice(half, None), VERMILLION, "letting go"),
+            (slice(half, None), VERMILLION, "unloading"),
         ):
             tension, angle = path.tension[steps, 0], np.degrees(path.total_angle[steps])
             left.plot(tension, angle, color=colour)
@@ -83,7 +83,9 @@ def pictures(folder: Path) -> None:
         chosen = (half - 1, half + 2, half + 4, half + 6, half + 8, half + 10)
         for step, colour in zip(chosen, sequence_colours(len(chosen)), strict=True):
             right.plot(path.span_tension[step, 0], color=colour)
-            label = f"{path.tension[step, 0]:.0f} N" + (", pulled" if step < half else ", let go")
+            label = f"{path.tension[step, 0]:.0f} N" + (
+                ", loading" if step < half else ", unloading"
+            )
             right.plot(profile[step, 2:], "o", ms=3.0, mfc="none", color=colour)
             right.plot([], [], "o-", ms=3.0, mfc="none", color=colour, label=label)
         right.set_xlabel("span of the tendon, 0 at the base")

@@ -13,8 +13,8 @@ PAGE = ROOT / "docs" / "examples.md"
 HEAD = """\
 # Examples
 
-Each answers one question and runs by itself: `python examples/01_first_bend.py`. The tests run
-them all and hold every number against an independent calculation
+Each script answers one question and runs on its own: `python examples/01_first_bend.py`. The tests
+run all of them and compare every number with an independent calculation
 (`tests/examples/test_examples.py`). `python docs/make/examples.py` writes this page.
 """
 

@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/chain.md and docs/choosing.md into docs/images, from solved states.
+"""Draws the pictures of the explanations into docs/images, from solved states and real robots.
 
 `python docs/make/figures.py`.
 """
@@ -8,9 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from free_body import free_body
 from matplotlib.axes import Axes
 
 import notchflex as nf
+from notchflex.plotting import dimensioned_figure
 from notchflex.plotting.style import (
     BLUE,
     GREEN,
@@ -57,7 +59,7 @@ def chain() -> None:
     frame(axes, np.zeros(2), np.eye(2), "base")
     end = state.tip_position[[0, 2]]
     frame(axes, end, state.tip_rotation[np.ix_([0, 2], [0, 2])], "tip")
-    axes.annotate("pulled, T", (lever, -0.9), (lever + 0.4, -0.9), va="center")
+    axes.annotate("tension T", (lever, -0.9), (lever + 0.4, -0.9), va="center")
     axes.fill([], [], color=SKY, alpha=0.6, label="rigid body")
     axes.set_aspect("equal")
     axes.set_xlim(-2.4, 8.6)
@@ -93,7 +95,7 @@ def frame(axes: Axes, at: np.ndarray, turn: np.ndarray, name: str) -> None:
 
 
 def memory() -> None:
-    """Ratio of tensions at every contact, over its bound, while pulled and let go."""
+    """Ratio of tensions at every contact, over its bound, during loading and unloading."""
     wrist = nf.load_robot("pacheco2021-a").with_value("friction.wrap", "geometric")
     path = nf.simulate(wrist, nf.pull(0.0, 1.4, steps=57).release()).raise_if_failed()
     figure = new_figure(8.4, 3.4)
@@ -106,13 +108,13 @@ def memory() -> None:
         label = f"contact {contact + 1}"
         left.plot(np.arange(len(path)), part[:, contact], color=colour, label=label)
     left.axvline(len(path) / 2 - 0.5, color=GREY, lw=0.8)
-    left.set_xlabel("step: pulled to 1.4 N, then let go")
+    left.set_xlabel("step: loading to 1.4 N, then unloading")
     left.set_ylabel("ln of tension ratio over its bound")
     left.legend(loc="lower left")
     angle = np.degrees(path.total_angle)
     half = len(path) // 2
-    right.plot(path.tension[:half, 0], angle[:half], color=BLUE, label="pulling")
-    right.plot(path.tension[half:, 0], angle[half:], color=ORANGE, label="letting go")
+    right.plot(path.tension[:half, 0], angle[:half], color=BLUE, label="loading")
+    right.plot(path.tension[half:, 0], angle[half:], color=ORANGE, label="unloading")
     right.set_xlabel("tendon tension [N]")
     right.set_ylabel("total bending angle [deg]")
     right.legend()
@@ -131,7 +133,7 @@ def closing() -> None:
         left.plot(pull, np.degrees(path.notch_angle[:, notch]), color=colour, label=label)
         right.plot(pull, path.contact_force[:, notch], color=colour)
     left.set_ylabel("notch angle [deg]")
-    right.set_ylabel("force between the lips [N]")
+    right.set_ylabel("contact force [N]")
     for axes in (left, right):
         axes.set_xlabel("tendon tension [N]")
     left.legend()
@@ -164,17 +166,31 @@ def cuts() -> None:
         moment = float(section.second_moment_weak)
         axes.set_title(f'"{cut}": I = {1e4 * moment:.2f} · 10⁻⁴ mm⁴', loc="left")
         axes.set_aspect("equal")
-        axes.set_xlabel("mm; dashed: neutral line")
+        axes.set_xlabel("mm; dashed: neutral axis")
         axes.plot(inner, 0.0, "ko", ms=4)
         axes.annotate("tendon", (inner, 0.0), (inner - 0.1, 0.0), ha="right", va="center")
     save(figure, IMAGES / "cuts.svg")
 
 
+def dimensions() -> None:
+    """The dimensioned drawings of one robot for each kind of notch."""
+    robots = {
+        "arc_on_axis": nf.load_robot("pacheco2021-a").with_value("tube.base_length", 1.0),
+        "arc_off_axis": nf.load_robot("york2015").with_value("tube.base_length", 0.5),
+        "strip": nf.load_robot("liu2022"),
+        "u_link": nf.load_robot("gao2017"),
+    }
+    for name, robot in robots.items():
+        save(dimensioned_figure(robot), IMAGES / f"dimensions_{name}.svg")
+
+
 def main() -> None:
     """Draw all of them."""
+    dimensions()
     with house_style():
         for draw in (chain, memory, closing, cuts):
             draw()
+        free_body(IMAGES)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """How griffe, which reads the sources for the Python reference, is to take what is ours.
 
 A class under `@part` (notchflex.robot) is a dataclass whose annotations carry units and limits; the
-reference shows its plain types. A section `Example:` of a docstring is one that is executed.
+reference shows its plain types. A section `Example:` of a docstring is one that is executed. A
+public function may have the name of the module that it stands in; the reference shows the function.
 """
 
 from __future__ import annotations
@@ -16,6 +17,16 @@ _DATACLASS = griffe.ExprName("dataclasses.dataclass", None)
 
 class House(griffe.Extension):
     """Take `@part` as a dataclass, `Annotated` as its plain type, `Example:` as code."""
+
+    def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
+        """Let `notchflex.solve` be the function of `statics/solve.py`, not that module."""
+        for name, member in list(pkg.members.items()):
+            if not isinstance(member, griffe.Alias) or not member.target_path.startswith(pkg.path):
+                continue
+            folder = pkg[member.target_path.split(".")[1:-1]]
+            function = f"{member.target_path}.{name}"
+            if folder.imports.get(name) == function and folder.members[name].is_module:
+                pkg.set_member(name, griffe.Alias(name, function, parent=pkg))
 
     def on_class_instance(self, *, cls: griffe.Class, **_: Any) -> None:
         """Take `@part` and `@part(kw_only=True)` as `@dataclass`."""

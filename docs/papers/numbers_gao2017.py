@@ -42,7 +42,7 @@ def pulled(path: nf.Path) -> dict[str, str]:
     rows = []
     for step in down:
         all_turned = np.isnan(eta[step, 0])
-        part = "all let go" if all_turned else f"{eta[step, 0]:.3f}"
+        part = "all reversed" if all_turned else f"{eta[step, 0]:.3f}"
         front = "beyond the last" if all_turned else str(m[step, 0])
         rows.append(
             (
@@ -60,7 +60,7 @@ def pulled(path: nf.Path) -> dict[str, str]:
         "ratio": f"{tension[0] / tension[-1]:.2f}",
         "first_joint": f"{angle[0]:.2f}",
         "last_joint": f"{angle[-1]:.2f}",
-        "front": table(("N, let go", "tip angle, deg", "front at contact m", "η"), rows),
+        "front": table(("N, unloading", "tip angle, deg", "front at contact m", "η"), rows),
         "loop": f"{loop.max():.1f}",
         "loop_at": f"{path.tension[int(np.argmax(loop)), 0]:.0f}",
         "left": f"{abs(total[-1]):.1f}",

@@ -27,3 +27,23 @@ def test_json(capsys):
     assert first["closing_outer_strain"] == pytest.approx(0.08250181552, rel=1e-9)
     assert last["depth_mm"] == 1.45
     assert last["area_mm2"] < first["area_mm2"]
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_dimensioned_drawing(tmp_path, capsys, suffix):
+    file = tmp_path / f"drawing.{suffix}"
+    arguments = ["show", "pacheco2021-a", "--set", "notch.depth=1.38", "--plot", str(file)]
+    assert run([*arguments, "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+    assert file.stat().st_size > 5000
+    if suffix == "svg":
+        assert "1.38" in file.read_text(encoding="utf-8")
+
+
+def test_drawing_that_cannot_be_written(tmp_path, capsys):
+    file = tmp_path / "drawing.html"
+    assert run(["show", "pacheco2021-a", "--plot", str(file)]) == 2
+    assert ".png, .svg or .pdf" in capsys.readouterr().err
+    same = str(tmp_path / "both.png")
+    assert run(["show", "pacheco2021-a", "--plot", same, "--json", same]) == 2
+    assert not any(tmp_path.iterdir())

@@ -48,7 +48,8 @@ VERBS = {
     "show": (
         "Show every notch of a robot: section, closing angle and force, strain at closing.",
         "notchflex show pacheco2021-c\n"
-        "    notchflex show my-wrist.toml --set notch.depth=1.38 --json -",
+        "    notchflex show my-wrist.toml --set notch.depth=1.38 --json -\n"
+        "    notchflex show my-wrist.toml --plot drawing.svg",
     ),
     "schema": (
         "Print the JSON Schema of robot files, for editors that check and complete them.",

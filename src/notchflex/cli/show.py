@@ -3,16 +3,41 @@
 from __future__ import annotations
 
 import textwrap
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 
 from notchflex.cli import terminal
 from notchflex.cli.notch_tables import closing_legend, closing_table, description_tables
-from notchflex.cli.options import JsonFile, Quiet, RobotName, Settings, chosen_robot, robot_files
-from notchflex.results.files import STANDARD_OUTPUT, check_output
+from notchflex.cli.options import (
+    OUTPUT,
+    JsonFile,
+    Quiet,
+    RobotName,
+    Settings,
+    chosen_robot,
+    robot_files,
+)
+from notchflex.results.files import (
+    PAPER,
+    STANDARD_OUTPUT,
+    check_distinct,
+    check_output,
+    check_picture,
+)
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
+
+DrawingFile = Annotated[
+    str | None,
+    Parameter(
+        name="--plot",
+        group=OUTPUT,
+        allow_leading_hyphen=True,
+        help="Draw the tube and its notches with their dimensions to this .png, .svg or .pdf file.",
+    ),
+]
 
 
 def show(
@@ -21,6 +46,7 @@ def show(
     *,
     settings: Settings = (),
     json: JsonFile = None,
+    plot: DrawingFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Show every notch of a robot: section, closing angle and force, strain at closing.
@@ -31,6 +57,9 @@ def show(
     terminal.be_quiet(quiet)
     if json is not None:
         check_output(json, "--json", inputs=robot_files(robot))
+    if plot is not None:
+        check_picture(plot, "--plot", inputs=robot_files(robot), kinds=PAPER)
+    check_distinct({"--json": json, "--plot": plot})
     chosen = chosen_robot(robot, settings)
     with terminal.working(f"solving {chosen.name}"):
         from notchflex.cli.compile_cache import use_compile_cache
@@ -46,6 +75,10 @@ def show(
         from notchflex.results.json import document_head, write_json
 
         write_json(json, {**document_head(chosen), "notches": notches})
+    if plot is not None:
+        from notchflex.plotting.dimensioned import save_dimensioned
+
+        save_dimensioned(chosen, plot)
     if json != STANDARD_OUTPUT and not quiet:
         _print(chosen, length, notches)
 

@@ -5,6 +5,7 @@ from notchflex.plotting.batch import batch_picture
 from notchflex.plotting.beside import beside_picture
 from notchflex.plotting.calibration import calibration_figure, calibration_picture
 from notchflex.plotting.comparison import comparison_figure, comparison_picture
+from notchflex.plotting.dimensioned import dimensioned_figure
 from notchflex.plotting.equilibrium import state_picture
 from notchflex.plotting.friction import friction_figure, friction_picture
 from notchflex.plotting.path import path_figure, path_picture
@@ -20,6 +21,7 @@ __all__ = [
     "calibration_picture",
     "comparison_figure",
     "comparison_picture",
+    "dimensioned_figure",
     "friction_figure",
     "friction_picture",
     "path_figure",
