@@ -98,16 +98,21 @@ class Bent:
         """Return the line of a tendon (from 0) through its true points, from below the base."""
         return np.concatenate([points for points, _ in self._along(number)])
 
-    def contacts(self, number: int) -> Points:
+    def contacts(self, number: int, radius: float | None = None) -> Points:
         """Return the points of a tendon (from 0) where it rubs, base to tip, (contacts, 3).
 
         Those are the edges of the bodies that it runs through, but for the one behind which it is
         fixed.
+
+        Args:
+            number: The tendon.
+            radius: Distance [mm] from the tube axis to which the points are moved outward; None
+                leaves them on the tendon.
         """
-        edges = [points for points, on_body in self._along(number) if on_body]
+        edges = [points for points, on_body in self._along(number, radius) if on_body]
         return np.concatenate(edges)[1:-2]  # neither the foot, nor both edges of the last body
 
-    def _along(self, number: int) -> Iterator[tuple[Points, bool]]:
+    def _along(self, number: int, radius: float | None = None) -> Iterator[tuple[Points, bool]]:
         """Pieces of a tendon, and whether each lies on a body or crosses a notch."""
         from notchflex.tendon.wall_arc import WallArc
 
@@ -118,6 +123,9 @@ class Bent:
         )
         walls = self.walls(self.robot.tendon[number].direction_deg)
         place = np.asarray(self.chain.tendon_place)[number]
+        if radius is not None:
+            angle = np.radians(self.robot.tendon[number].direction_deg)
+            place = radius * np.array([np.cos(angle), np.sin(angle), 0.0])
         for body in range(len(self.position)):
             if body and not present[body - 1]:
                 break

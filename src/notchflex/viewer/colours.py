@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from notchflex.plotting.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+)
 from notchflex.statics import Equilibrium
 
 Colour = tuple[int, int, int]
@@ -22,7 +31,9 @@ def rgb(code: str) -> Colour:
 
 METAL: Colour = (176, 182, 190)
 TENDON = rgb(ORANGE)
-CLOSED = rgb(VERMILLION)
+CLOSED = rgb(BLACK)
+BEYOND: Colour = (214, 0, 147)
+"""A strain beyond the allowed one, outside the scale of the others."""
 LOAD = {"force": rgb(PURPLE), "moment": rgb(SKY)}
 CONTACT = {0: GREEN, 1: BLUE, -1: VERMILLION}
 """Colour of a friction contact by its state: sticks, slips toward the base, toward the tip."""
@@ -38,6 +49,11 @@ STEPS = 64
 """How many colours of strain there are; a notch is painted anew only when its colour changes."""
 
 
+def is_beyond(part: float) -> bool:
+    """Whether a strain, as a part of the allowed one, is larger than that."""
+    return abs(part) > 1.0
+
+
 def of_strain(part: float | None) -> Colour:
     """Return the colour of a strain.
 
@@ -46,6 +62,8 @@ def of_strain(part: float | None) -> Colour:
     """
     if part is None or not np.isfinite(part):
         return METAL
+    if is_beyond(part):
+        return BEYOND
     place = round(min(abs(part), 1.0) * STEPS) / STEPS * (len(_SCALE) - 1)
     columns = [np.interp(place, np.arange(len(_SCALE)), column) for column in _SCALE.T]
     red, green, blue = (round(float(value)) for value in columns)
@@ -73,6 +91,7 @@ def css(colour: Colour) -> str:
 
 
 __all__ = [
+    "BEYOND",
     "CLOSED",
     "CONTACT",
     "LOAD",
@@ -80,6 +99,7 @@ __all__ = [
     "TENDON",
     "UNKNOWN",
     "css",
+    "is_beyond",
     "of_contacts",
     "of_strain",
     "rgb",

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from notchflex.plotting.acting import Acting, acting_at
 from notchflex.plotting.bent import HELD, Bent, bent_at
+from notchflex.plotting.twist import rotation_of
 from notchflex.robot import Robot
 from notchflex.statics import Path
+from notchflex.viewer.camera import Eye, first_eye, framed, quaternions
 from notchflex.viewer.colours import CLOSED, LOAD, METAL, TENDON, of_contacts, of_strain, rgb
 from notchflex.viewer.controls import POINTING, Controls
 from notchflex.viewer.reach import GRAVITY, Reach, round_up
@@ -26,7 +28,8 @@ if TYPE_CHECKING:
     import viser
 
 # As parts of the outer radius of the tube.
-_TENDON, _CONTACT, _LIPS, _FRAME = 0.09, 0.22, 0.15, 2.2
+_TENDON, _CONTACT, _LIPS, _FRAME = 0.09, 0.28, 0.24, 2.2
+_OUTSIDE = 1.15
 # As parts of the length of the robot.
 _ARROW, _SHORTEST = 0.35, 0.06
 _SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
@@ -166,6 +169,8 @@ class Scene:
             The robot in that state.
         """
         shape = bent_at(path, 0, PIECES)
+        held = shape.position[:1] - [0.0, 0.0, HELD * self.robot.tube.outer_radius]
+        self._seen = np.concatenate([held, shape.position, shape.tip[None]])
         with self.server.atomic():
             self._turn(controls.pointing)
             self._dress(path, shape)
@@ -177,8 +182,8 @@ class Scene:
         return shape
 
     def _turn(self, pointing: str) -> None:
-        turn = _matrix(np.array(POINTING[pointing]))
-        self._root.wxyz = _quaternions(turn[None])[0]
+        self._pose = rotation_of(np.array(POINTING[pointing]))
+        self._root.wxyz = quaternions(self._pose[None])[0]
         outer = self.robot.tube.outer_radius
         lowest = {"up": HELD * outer, "sideways": 0.35 * self.length, "down": 1.1 * self.length}
         self._grid.position = (0.0, 0.0, -lowest[pointing])
@@ -202,7 +207,7 @@ class Scene:
                 node.vertices = corners
 
     def _move(self, shape: Bent) -> None:
-        turned = _quaternions(shape.rotation)
+        turned = quaternions(shape.rotation)
         for node, place, turn in zip(self._bodies, shape.position, turned, strict=True):
             node.position, node.wxyz = place, turn
         if self._see_through != self.shown.see_through:
@@ -226,7 +231,8 @@ class Scene:
             if self.shown.tendons:
                 line.points = _segments(shape.tendon(number)).astype(np.float32)
             if self.shown.contacts:
-                points = shape.contacts(number)
+                # Outside, because the wall would hide them where they are.
+                points = shape.contacts(number, _OUTSIDE * self.robot.tube.outer_radius)
                 dots.points = points.astype(np.float32)
                 codes = of_contacts(path[0], number)
                 dots.colors = np.array([rgb(code) for code in codes], np.uint8)
@@ -253,11 +259,30 @@ class Scene:
         size = max(one.size / most, _SHORTEST / _ARROW) * _ARROW * self.length
         return size * one.vector / one.size
 
-    def look(self, pointing: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return where a camera should stand, and where it should look to, mm in the world."""
-        turn = _matrix(np.array(POINTING[pointing]))
-        middle = self.length * (turn @ np.array([0.2, 0.0, 0.42]))
-        return middle + self.length * np.array([0.45, -1.5, 0.5]), middle
+    def eye(self, pointing: str, side: bool = False, aspect: float = 1.0) -> Eye:
+        """Return where a camera should stand, with room for the robot to bend.
+
+        Args:
+            pointing: Where the tube points, a key of `POINTING`.
+            side: Look at right angles on the plane in which the robot bends; else a little from
+                above.
+            aspect: Width of the picture by its height.
+        """
+        turn = rotation_of(np.array(POINTING[pointing]))
+        return first_eye(self.robot.notches[0].direction_deg, self.length, turn, side, aspect)
+
+    def picture_eye(self, toward: NDArray[np.float64], fov: float, aspect: float) -> Eye:
+        """Return where a camera must stand to see the robot as it is bent now, and all of it.
+
+        Args:
+            toward: Direction from the robot to the camera.
+            fov: Angle of view from the lower to the upper edge, rad.
+            aspect: Width of the picture by its height.
+        """
+        outer = 1.3 * self.robot.tube.outer_radius
+        box = outer * np.array(list(np.ndindex(2, 2, 2))) * 2.0 - outer
+        points = (self._seen[:, None] + box).reshape(-1, 3)
+        return framed(points @ self._pose.T, toward, aspect, fov, room=1.1)
 
     def remove(self) -> None:
         """Take everything away again."""
@@ -277,19 +302,6 @@ def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
 def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points in a row as the straight pieces between them, (pieces, 2, 3)."""
     return np.stack([points[:-1], points[1:]], axis=1)
-
-
-def _matrix(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    from notchflex.plotting.twist import rotation_of
-
-    return rotation_of(vector)
-
-
-def _quaternions(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations as (w, x, y, z)."""
-    import viser.transforms as transforms
-
-    return np.asarray(transforms.SO3.from_matrix(rotation).wxyz, np.float64)
 
 
 __all__ = ["Scene", "Shown"]
