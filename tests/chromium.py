@@ -18,7 +18,7 @@ FLAGS = [
     "--ignore-gpu-blocklist",
     "--no-sandbox",
 ]
-PATIENCE = 120_000  # ms: without a graphics card, on a busy machine
+PATIENCE = 30_000
 
 
 @pytest.fixture(scope="module")

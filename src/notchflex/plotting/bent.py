@@ -136,9 +136,14 @@ class Bent:
             if ends is not None and (body == 0 or visits[body - 1]):
                 yield self.on_body(body, [place + at * UP for at in ends]), True
 
-    def lips(self, notch: int) -> Points:
-        """Return the point between the lips of a notch (from 0), where it closes."""
-        outer = self.robot.tube.outer_radius
+    def lips(self, notch: int, radius: float | None = None) -> Points:
+        """Return the point between the lips of a notch (from 0), where it closes.
+
+        Args:
+            notch: The notch.
+            radius: Distance [mm] of the point from the tube axis; None is that of the lips.
+        """
+        outer = self.robot.tube.outer_radius if radius is None else radius
         found: list[tuple[float, Points]] = []
         for turn in (0.0, 180.0):
             side = self.robot.notches[notch].direction_deg + turn

@@ -79,7 +79,7 @@ def first_eye(direction_deg: float, length: float, turn: Vector, side: bool, asp
         toward = np.array([0.0, -1.0, 0.0])
     if not side:
         toward = toward + 0.3 * np.cross(along, toward) + 0.35 * along
-    return framed(length * np.stack(corners) @ turn.T, toward, aspect)
+    return framed(length * np.stack(corners) @ turn.T, toward, aspect, room=1.15)
 
 
 def quaternions(rotation: Vector) -> Vector:

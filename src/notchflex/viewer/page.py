@@ -20,7 +20,7 @@ CHARTS_WIDTH, CONTROLS_WIDTH = 280, 290
 # closes them. There they are small, at the lower edge and let the mouse through.
 STYLE = """<style>
 .mantine-Notifications-root { top: auto !important; bottom: 0.5em !important; max-width: 16em; }
-.mantine-Notification-root { padding: 2px 6px; }
+.mantine-Notification-root { padding: 2px 6px 2px 16px; }
 .mantine-Notification-title { font-size: 11px; margin: 0; }
 .mantine-Notification-root:not(:hover) .mantine-Notification-description { display: none; }
 </style>"""

@@ -94,7 +94,7 @@ def _strain_scale(axes: Axes, allowed: float) -> None:
     """Draw the colours of strain up to the allowed one, %."""
     from matplotlib.colors import ListedColormap
 
-    scale = axes.inset_axes((0.28, 0.44, 0.3, 0.035))
+    scale = axes.inset_axes((0.24, 0.44, 0.34, 0.035))
     colours = ListedColormap(strain_scale(64))
     scale.imshow(np.linspace(0.0, 1.0, 64)[None], aspect="auto", cmap=colours)
     scale.set_axis_off()

@@ -13,7 +13,9 @@ from notchflex.viewer.charts import axis
 from notchflex.viewer.colours import BEYOND, css, is_beyond
 from notchflex.viewer.session import Session
 
-_CELL = 'style="padding:1px 4px;text-align:right;font-variant-numeric:tabular-nums"'
+_CELL = (
+    'style="padding:1px 4px;text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"'
+)
 _WARNING = f' data-warning="true" style="background:{css(BEYOND)};color:white"'
 
 
@@ -58,7 +60,7 @@ def readout(session: Session) -> str:
     """Return the numbers of a session's state as an HTML table; `data-name` names each."""
     cells = "".join(
         f"<tr{_WARNING if row.warns else ''}>"
-        f'<td style="padding:1px 4px">{escape(row.label)}</td>'
+        f'<td style="padding:1px 4px;white-space:nowrap">{escape(row.label)}</td>'
         f'<td {_CELL} data-name="{row.name}">{escape(row.value)}</td></tr>'
         for row in rows(session)
     )
@@ -73,18 +75,18 @@ def _strain(session: Session) -> tuple[str, bool]:
     if allowed is None:
         return f"{text}, no limit set", False
     if is_beyond(largest / allowed):
-        return f"{text}, beyond the {100.0 * allowed:g} % allowed", True
+        return f"{text} > {100.0 * allowed:g} % allowed", True
     return f"{text} of {100.0 * allowed:g} % allowed", False
 
 
 def notice(text: str, waiting: bool = False) -> str:
     """Return a sentence as a framed note; nothing where there is none to tell."""
     if not text:
-        return '<div role="status"></div>'
+        return '<div data-name="notice" role="status"></div>'
     colour, role = (BLUE, "status") if waiting else (VERMILLION, "alert")
     return (
-        f'<div role="{role}" style="border-left:4px solid {colour};padding:4px 8px;margin:4px;'
-        f'font-size:13px;white-space:pre-wrap;overflow-wrap:anywhere">{escape(text)}</div>'
+        f'<div data-name="notice" role="{role}" style="border-left:4px solid {colour};'
+        f'padding:4px 8px;margin:4px;font-size:13px;white-space:pre-wrap;overflow-wrap:anywhere">{escape(text)}</div>'
     )
 
 

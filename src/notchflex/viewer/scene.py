@@ -18,8 +18,9 @@ from notchflex.plotting.twist import rotation_of
 from notchflex.robot import Robot
 from notchflex.statics import Path
 from notchflex.viewer.camera import Eye, first_eye, framed, quaternions
-from notchflex.viewer.colours import CLOSED, LOAD, METAL, TENDON, of_contacts, of_strain, rgb
+from notchflex.viewer.colours import LOAD, METAL, of_strain
 from notchflex.viewer.controls import POINTING, Controls
+from notchflex.viewer.marks import Marks
 from notchflex.viewer.reach import GRAVITY, Reach, round_up
 from notchflex.viewer.skins import PIECES, Skin, at_rest, skins
 from notchflex.viewer.solids import body_solids
@@ -27,9 +28,8 @@ from notchflex.viewer.solids import body_solids
 if TYPE_CHECKING:
     import viser
 
-# As parts of the outer radius of the tube.
-_TENDON, _CONTACT, _LIPS, _FRAME = 0.09, 0.28, 0.24, 2.2
-_OUTSIDE = 1.15
+# As a part of the outer radius of the tube.
+_FRAME = 2.2
 # As parts of the length of the robot.
 _ARROW, _SHORTEST = 0.35, 0.06
 _SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
@@ -103,30 +103,7 @@ class Scene:
         ]
         self._see_through = False
         self._colours: list[Any] = [METAL] * len(self._flexures)
-        self._closed = [
-            scene.add_icosphere(f"{ROOT}/closed_{number + 1}", _LIPS * outer, color=CLOSED)
-            for number in range(len(self._flexures))
-        ]
-        self._tendons = [
-            scene.add_line_segments(
-                f"{ROOT}/tendon_{number + 1}",
-                _segments(rest.tendon(number)),
-                TENDON,
-                thickness=_TENDON * outer,
-            )
-            for number in range(self.robot.number_of_tendons)
-        ]
-        self._contacts = [
-            scene.add_point_cloud(
-                f"{ROOT}/contacts_{number + 1}",
-                rest.contacts(number).astype(np.float32),
-                TENDON,
-                point_size=_CONTACT * outer,
-                point_shape="circle",
-                precision="float32",
-            )
-            for number in range(self.robot.number_of_tendons)
-        ]
+        self._marks = Marks(scene, ROOT, rest)
         long, thin = _FRAME * outer, 0.05 * outer
         self._base_frame = scene.add_frame(f"{ROOT}/base", axes_length=long, axes_radius=thin)
         self._tip_frame = scene.add_frame(f"{ROOT}/tip", axes_length=long, axes_radius=thin)
@@ -176,7 +153,7 @@ class Scene:
             self._dress(path, shape)
             self._move(shape)
             self._paint(path)
-            self._move_tendons(path, shape)
+            self._marks.move(path, shape, self.shown)
             self._move_loads(path, shape)
             self._base_frame.visible = self._tip_frame.visible = self.shown.frames
         return shape
@@ -224,22 +201,6 @@ class Scene:
             colour = of_strain(None if allowed is None else float(strain) / allowed)
             if colour != self._colours[number]:
                 self._flexures[number].color = self._colours[number] = colour
-
-    def _move_tendons(self, path: Path, shape: Bent) -> None:
-        for number, (line, dots) in enumerate(zip(self._tendons, self._contacts, strict=True)):
-            line.visible, dots.visible = self.shown.tendons, self.shown.contacts
-            if self.shown.tendons:
-                line.points = _segments(shape.tendon(number)).astype(np.float32)
-            if self.shown.contacts:
-                # Outside, because the wall would hide them where they are.
-                points = shape.contacts(number, _OUTSIDE * self.robot.tube.outer_radius)
-                dots.points = points.astype(np.float32)
-                codes = of_contacts(path[0], number)
-                dots.colors = np.array([rgb(code) for code in codes], np.uint8)
-        for number, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
-            ball.visible = bool(closed)
-            if closed:
-                ball.position = shape.lips(number)
 
     def _move_loads(self, path: Path, shape: Bent) -> None:
         loads = acting_at(path, 0, shape) if self.shown.loads else []
@@ -297,11 +258,6 @@ def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
     whole = trimesh.Trimesh(vertices, faces, process=False)
     shaded = trimesh.graph.smooth_shade(whole, angle=_SMOOTH)
     return scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
-
-
-def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points in a row as the straight pieces between them, (pieces, 2, 3)."""
-    return np.stack([points[:-1], points[1:]], axis=1)
 
 
 __all__ = ["Scene", "Shown"]

@@ -49,9 +49,11 @@ class Slider:
             if event.client is None:
                 return
             value = float(self._handle.value)
-            span = float(self._handle.max - self._handle.min)
-            jump = abs(value - self._heard) > _JUMP * span
-            self._heard = value
+            low, high = float(self._handle.min), float(self._handle.max)
+            before, self._heard = self._heard, value
+            if value == min(max(before, low), high) != before:
+                return  # the page itself puts back, when it is left, what was typed beyond an end
+            jump = abs(value - before) > _JUMP * (high - low)
             if jump:  # at once, though the new value may still be typed
                 viewer.way.hold(number)
             viewer.tasks.add(lambda: moved(value), self._key, PAUSE if jump else 0.0)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from threading import Condition
 
-PAUSE = 0.4
+PAUSE = 0.5
 """Typing pauses after this long, s."""
 
 
