@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from notchflex.plotting.style import (
     BLACK,
@@ -34,7 +37,7 @@ TENDON = rgb(ORANGE)
 CLOSED = rgb(BLACK)
 BEYOND: Colour = (214, 0, 147)
 """A strain beyond the allowed one, outside the scale of the others."""
-LOAD = {"force": rgb(PURPLE), "moment": rgb(SKY)}
+LOAD = {"force": PURPLE, "moment": SKY}
 CONTACT = {0: GREEN, 1: BLUE, -1: VERMILLION}
 """Colour of a friction contact by its state: sticks, slips toward the base, toward the tip."""
 UNKNOWN = GREY
@@ -85,6 +88,20 @@ def of_contacts(state: Equilibrium, tendon: int) -> list[str]:
     ]
 
 
+def linear(codes: Sequence[str]) -> NDArray[np.uint8]:
+    """Return colour codes as linear light from 0 to 255, (count, 3).
+
+    viser takes the colours of many like things at once for linear light, and all others as sRGB.
+
+    Example:
+        >>> linear(["#0072B2", "#FFFFFF"]).tolist()
+        [[0, 43, 114], [255, 255, 255]]
+    """
+    part = np.array([rgb(code) for code in codes], float).reshape(-1, 3) / 255.0
+    light = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * light).astype(np.uint8)
+
+
 def css(colour: Colour) -> str:
     """Return a colour as a page writes it."""
     return "#" + "".join(f"{part:02x}" for part in colour)
@@ -100,6 +117,7 @@ __all__ = [
     "UNKNOWN",
     "css",
     "is_beyond",
+    "linear",
     "of_contacts",
     "of_strain",
     "rgb",

@@ -8,10 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from notchflex.plotting.curves import COLOUR
-from notchflex.plotting.style import PURPLE, SKY
 from notchflex.results.quantities import CONTACT_STATES
 from notchflex.robot import Robot
-from notchflex.viewer.colours import BEYOND, CLOSED, CONTACT, METAL, TENDON, UNKNOWN, css, of_strain
+from notchflex.viewer.colours import (
+    BEYOND,
+    CLOSED,
+    CONTACT,
+    LOAD,
+    METAL,
+    TENDON,
+    UNKNOWN,
+    css,
+    of_strain,
+)
 
 BALL, LINE = "ball", "line"
 
@@ -44,8 +53,8 @@ def entries(robot: Robot) -> list[Entry]:
         Entry(UNKNOWN, BALL, "contact without friction, or slack"),
         Entry(css(TENDON), LINE, "tendon"),
         *(Entry(colour, LINE, f"loop: {way}") for way, colour in COLOUR.items()),
-        Entry(PURPLE, LINE, "force at the tip"),
-        Entry(SKY, LINE, "moment at the tip"),
+        Entry(LOAD["force"], LINE, "force at the tip"),
+        Entry(LOAD["moment"], LINE, "moment at the tip"),
     ]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from notchflex.plotting.bent import Bent
 from notchflex.statics import Path
-from notchflex.viewer.colours import CLOSED, TENDON, of_contacts, rgb
+from notchflex.viewer.colours import CLOSED, TENDON, UNKNOWN, linear, of_contacts
 
 if TYPE_CHECKING:
     from notchflex.viewer.scene import Shown
@@ -56,7 +56,7 @@ class Marks:
                 ball.faces,
                 batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1)),
                 batched_positions=place,
-                batched_colors=np.tile(np.array(TENDON, np.uint8), (len(place), 1)),
+                batched_colors=linear([UNKNOWN] * len(place)),
                 lod="off",
             )
             for number, place in enumerate(places)
@@ -85,7 +85,7 @@ class Marks:
             if shown.contacts:
                 balls.batched_positions = self._beside(shape, number)
                 codes = of_contacts(path[0], number)
-                balls.batched_colors = np.array([rgb(code) for code in codes], np.uint8)
+                balls.batched_colors = linear(codes)
         for number, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
             ball.visible = bool(closed)
             if closed:

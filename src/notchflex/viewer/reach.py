@@ -23,6 +23,8 @@ FORCE_PART = 0.05
 GRAVITY = 9.81e-3  # N/g
 STRIDES = 60
 """Steps from one end of a slider to the other."""
+STRETCH = 10.0
+"""A slider can be made to go as many times as far as at first, or as many times less far."""
 
 
 @dataclass(frozen=True)
@@ -136,4 +138,4 @@ def _closed(closed: np.ndarray, gap: np.ndarray) -> bool:
     return bool(can.any() and closed[can].all())
 
 
-__all__ = ["STRIDES", "Reach", "reach_of", "round_down", "round_up"]
+__all__ = ["STRETCH", "STRIDES", "Reach", "reach_of", "round_down", "round_up"]

@@ -86,7 +86,8 @@ def notice(text: str, waiting: bool = False) -> str:
     colour, role = (BLUE, "status") if waiting else (VERMILLION, "alert")
     return (
         f'<div data-name="notice" role="{role}" style="border-left:4px solid {colour};'
-        f'padding:4px 8px;margin:4px;font-size:13px;white-space:pre-wrap;overflow-wrap:anywhere">{escape(text)}</div>'
+        'padding:4px 8px;margin:4px;font-size:13px;white-space:pre-wrap;overflow-wrap:anywhere">'
+        f"{escape(text)}</div>"
     )
 
 

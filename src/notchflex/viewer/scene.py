@@ -18,7 +18,7 @@ from notchflex.plotting.twist import rotation_of
 from notchflex.robot import Robot
 from notchflex.statics import Path
 from notchflex.viewer.camera import Eye, first_eye, framed, quaternions
-from notchflex.viewer.colours import LOAD, METAL, of_strain
+from notchflex.viewer.colours import LOAD, METAL, linear, of_strain
 from notchflex.viewer.controls import POINTING, Controls
 from notchflex.viewer.marks import Marks
 from notchflex.viewer.reach import GRAVITY, Reach, round_up
@@ -110,7 +110,7 @@ class Scene:
         self._arrows = scene.add_arrows(
             f"{ROOT}/loads",
             np.zeros((1, 2, 3)),
-            np.array([LOAD["force"]]),
+            linear([LOAD["force"]]),
             shaft_radius=0.12 * outer,
             head_radius=0.32 * outer,
             head_length=0.8 * outer,
@@ -210,7 +210,7 @@ class Scene:
         if not loads:
             return
         ends = np.stack([np.stack([one.point, one.point + self._arrow(one)]) for one in loads])
-        self._arrows.colors = np.array([LOAD[one.name] for one in loads], np.uint8)
+        self._arrows.colors = linear([LOAD[one.name] for one in loads])
         self._arrows.points = ends.astype(np.float32)
         for label, one, (_, end) in zip(self._labels, loads, ends, strict=False):
             label.text, label.position, label.visible = one.label, end, True

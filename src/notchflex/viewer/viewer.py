@@ -14,8 +14,9 @@ from notchflex.viewer import parts
 from notchflex.viewer.address import HOST, PORT, check_host, check_installed
 from notchflex.viewer.controls import STROKE, Controls
 from notchflex.viewer.origin import bracketed
+from notchflex.viewer.notes import beyond, kept_between
 from notchflex.viewer.page import Page
-from notchflex.viewer.reach import Reach, reach_of
+from notchflex.viewer.reach import STRETCH, Reach, reach_of
 from notchflex.viewer.scene import Scene, Shown
 from notchflex.viewer.serving import serve
 from notchflex.viewer.session import Session, Step
@@ -27,8 +28,6 @@ from notchflex.viewer.way import Way
 MOST_STEPS = 60.0
 # Charts and numbers are renewed more seldom than shapes, s; and files are looked at, s.
 _TEXT, _LOOK = 0.1, 0.5
-STRETCH = 10.0
-"""A slider goes at most this many times as far as it did first."""
 
 
 class Viewer:
@@ -116,12 +115,10 @@ class Viewer:
             self._looked = started
             if self._file is not None and self._file.changed():
                 self.reload()
-        while (task := self.tasks.take()) is not None:
+        while (task := self.tasks.take(0.0 if len(self.way) else _LOOK)) is not None:
             task()
         controls = self.way.next()
         if controls is None:
-            if (task := self.tasks.take(_LOOK)) is not None:
-                task()
             return
         self.advance(controls)
         rest = 1.0 / MOST_STEPS - (time.monotonic() - started)
@@ -136,10 +133,7 @@ class Viewer:
         if step.reason:
             self.way.clear(self.session.controls)
             self.message = f"Not reached: {step.reason}"
-        done = not len(self.way)
-        now = time.monotonic()
-        told = done or now - self._told > _TEXT
-        self._draw(told)
+        self._draw(told=not len(self.way) or time.monotonic() - self._told > _TEXT)
         return step
 
     def _draw(self, told: bool) -> None:
@@ -162,12 +156,7 @@ class Viewer:
         self._playing = False
         self.message = self.note = ""
         if kept != value:
-            name, _, unit = label.removesuffix("]").partition(" [")
-            further = "; 'slider to' lets it go further" if number < len(self.way.end.by) else ""
-            self.note = (
-                f"{name}: {value:g} {unit} is beyond its slider, which goes from {low:g} to "
-                f"{high:g} {unit}. It is set to {kept:g} {unit}{further if value > high else ''}."
-            )
+            self.note = beyond(label, value, (low, high), number < len(self.session.controls.by))
         self.way.turn(number, kept)
         self.page.follow()
 
@@ -289,19 +278,13 @@ class Viewer:
         self.change(robot)
 
     def stretch(self, tendon: int, by: str, end: float) -> None:
-        """Let the slider of a tendon (from 0) go to another end, within sensible limits.
-
-        Args:
-            tendon: The tendon.
-            by: Which of its sliders, `TENSION` or `STROKE`.
-            end: The new end, N or mm.
-        """
+        """Let a slider of a tendon (from 0) go to another end (N or mm), within sensible limits."""
         first = self._first_reach.ends(tendon, by)[1]
         now = abs(self.way.end.value[tendon]) if self._by(tendon) == by else 0.0
-        low, high = max(now, first / STRETCH), STRETCH * first
+        low, high = max(now, first / STRETCH), first * STRETCH
         kept = min(max(end, low), high)
         self.message = ""
-        self.note = "" if kept == end else f"The slider can end from {low:g} to {high:g} only."
+        self.note = "" if kept == end else kept_between(low, high)
         self.reach = self.scene.reach = self.reach.stretched(tendon, by, kept)
         self.way.stride = self.reach.stride(self.session.controls.by)
         self.page.follow()
@@ -317,4 +300,4 @@ class Viewer:
         self.page.tell()
 
 
-__all__ = ["STRETCH", "Viewer"]
+__all__ = ["Viewer"]
