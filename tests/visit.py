@@ -147,12 +147,12 @@ class Visit:
         self.wait_for("tension_1", "0.000")
         self.wait_for("total_angle", "0.00")
 
-    def picture(self):
-        """The middle of the page, where the robot stands, as numbers."""
+    def picture(self, clip=None):
+        """A part of the page as numbers: the middle, where the robot stands, if not said."""
         from matplotlib import image
 
         self.settle()
-        clip = {"x": 300, "y": 60, "width": 600, "height": 620}
+        clip = clip or {"x": 300, "y": 60, "width": 600, "height": 620}
         shot = self.page.screenshot(clip=clip, timeout=PATIENCE)
         return image.imread(io.BytesIO(shot), format="png")[..., :3]
 

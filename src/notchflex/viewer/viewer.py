@@ -13,8 +13,8 @@ from notchflex.robot import Robot
 from notchflex.viewer import parts
 from notchflex.viewer.address import HOST, PORT, check_host, check_installed
 from notchflex.viewer.controls import STROKE, Controls
-from notchflex.viewer.origin import bracketed
 from notchflex.viewer.notes import beyond, kept_between
+from notchflex.viewer.origin import bracketed
 from notchflex.viewer.page import Page
 from notchflex.viewer.reach import STRETCH, Reach, reach_of
 from notchflex.viewer.scene import Scene, Shown
@@ -274,8 +274,8 @@ class Viewer:
         except InputError as problem:
             self._fail(f"The file was saved, but cannot be used: {problem}")
             return
-        self.original = robot
         self.change(robot)
+        self.original = robot
 
     def stretch(self, tendon: int, by: str, end: float) -> None:
         """Let a slider of a tendon (from 0) go to another end (N or mm), within sensible limits."""
