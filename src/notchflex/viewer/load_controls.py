@@ -127,6 +127,7 @@ class _Drive:
                 chosen = next(by for by, text in _BY.items() if text == self._by.value)
                 viewer.tasks.add(lambda: viewer.drive_by(tendon, chosen), self._key)
                 # At once, so that what is set next stands for what was chosen.
+                self._sliders[chosen].put(viewer.session.where(tendon, chosen))
                 self._show(chosen)
 
     def _slider(self, by: str) -> Slider:

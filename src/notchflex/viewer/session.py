@@ -66,6 +66,16 @@ class Session:
         """The state that the robot is in; `solved` holds it as a path of one step."""
         return self.solved[0]
 
+    def where(self, tendon: int, by: str) -> float:
+        """Return the tension [N] or stroke [mm] that a tendon (from 0) has now.
+
+        Args:
+            tendon: The tendon.
+            by: `TENSION` or `STROKE`.
+        """
+        found = self.state.stroke if by == STROKE else self.state.tension
+        return float(found[tendon])
+
     def reset(self) -> Step:
         """Go back to the free robot that remembers nothing, nor any earlier loop."""
         self.before = None

@@ -12,7 +12,7 @@ from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.viewer import parts
 from notchflex.viewer.address import HOST, PORT, check_host, check_installed
-from notchflex.viewer.controls import STROKE, Controls
+from notchflex.viewer.controls import Controls
 from notchflex.viewer.notes import beyond, kept_between
 from notchflex.viewer.origin import bracketed
 from notchflex.viewer.page import Page
@@ -151,7 +151,7 @@ class Viewer:
             value: Its new value; one beyond its slider becomes the end of the slider.
             label: What the page calls it, with its unit in brackets.
         """
-        low, high = self.reach.ends(number, self._by(number))
+        low, high = self.reach.ends(number, self.session.controls.command(number))
         kept = min(max(value, low), high)
         self._playing = False
         self.message = self.note = ""
@@ -160,26 +160,20 @@ class Viewer:
         self.way.turn(number, kept)
         self.page.follow()
 
-    def _by(self, number: int) -> str:
-        """How a number of the controls is commanded, where it is a tendon's."""
-        by = self.session.controls.by
-        return by[number] if number < len(by) else ""
-
     def drive_by(self, tendon: int, by: str) -> None:
         """Command a tendon (from 0) by tension or by stroke from now on; nothing moves."""
         self._playing = False
         self.message = self.note = ""
-        self.way.clear(self.session.controls)
-        found = self.session.state
-        value = float((found.stroke if by == STROKE else found.tension)[tendon])
-        self.advance(self.session.controls.with_tendon(tendon, by, value))
+        goal = self.session.controls.with_tendon(tendon, by, self.session.where(tendon, by))
+        self.way.clear(goal)
+        self.advance(goal)
         self._stand(self.session.controls)
 
     def cycle(self, tendon: int) -> None:
         """Pull a tendon (from 0) from nothing to the end of its slider and let it go again."""
         self.message = self.note = ""
         self.way.hold(tendon)
-        most = self.reach.ends(tendon, self._by(tendon))[1]
+        most = self.reach.ends(tendon, self.session.controls.command(tendon))[1]
         for value in (0.0, most, 0.0):
             end = self.way.end
             self.way.add(end.with_tendon(tendon, end.by[tendon], value))
@@ -280,7 +274,9 @@ class Viewer:
     def stretch(self, tendon: int, by: str, end: float) -> None:
         """Let a slider of a tendon (from 0) go to another end (N or mm), within sensible limits."""
         first = self._first_reach.ends(tendon, by)[1]
-        now = abs(self.way.end.value[tendon]) if self._by(tendon) == by else 0.0
+        now = (
+            abs(self.way.end.value[tendon]) if self.session.controls.command(tendon) == by else 0.0
+        )
         low, high = max(now, first / STRETCH), first * STRETCH
         kept = min(max(end, low), high)
         self.message = ""
