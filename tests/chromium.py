@@ -18,7 +18,7 @@ FLAGS = [
     "--ignore-gpu-blocklist",
     "--no-sandbox",
 ]
-PATIENCE = 30_000
+PATIENCE = 120_000  # ms: without a graphics card, on a busy machine
 
 
 @pytest.fixture(scope="module")

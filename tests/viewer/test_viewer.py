@@ -89,23 +89,44 @@ def test_a_robot_that_is_refused_is_told_and_leaves_the_one_before(start, change
     assert viewer.message == ""
 
 
-def test_a_law_that_does_not_fit_the_robot_leaves_the_law_before(start):
-    """Corner friction by the chord needs a strip, which an arc notch has not."""
+def test_a_law_that_is_refused_leaves_the_law_before_on_the_page_too(start, monkeypatch):
+    viewer = start(nf.load_robot("pacheco2021-a"))
+    viewer.ask(lambda: viewer.set(0, 0.5, "tension [N]"))
+    wait(lambda: reached(viewer, 0.5))
+    robot, angle = viewer.session.robot, float(viewer.session.state.total_angle)
+    law = viewer.page.model._parts["friction"]._kind
+
+    def refuse(*_, **__):
+        raise nf.InputError("this law does not fit these notches")
+
+    monkeypatch.setattr(type(viewer.session), "change", refuse)
+    law.value = "frictionless"  # as the page has it when somebody chose it
+    viewer.ask(lambda: viewer.change_part("friction", "frictionless"))
+    wait(lambda: viewer.message)
+    wait(lambda: law.value == "capstan")
+    assert viewer.message == "this law does not fit these notches"
+    assert viewer.session.robot is viewer.scene.robot is robot
+    assert float(viewer.session.state.total_angle) == angle
+    monkeypatch.undo()
+    viewer.ask(lambda: viewer.change_part("friction", "frictionless"))
+    wait(lambda: viewer.session.robot.friction.kind == "frictionless" and not viewer.message)
+
+
+def test_corner_friction_by_the_chord_on_arc_notches_never_spoils_the_viewer(start):
+    """An arc notch has no strip, whose chord counts: the robot is refused or is solved."""
     robot = robot_from_text(TWO_ARCS)
-    text = TWO_ARCS + 'turning = "chord"\n'
-    viewer = start(robot, read=lambda: robot_from_text(text))
+    viewer = start(robot, read=lambda: robot_from_text(TWO_ARCS + 'turning = "chord"\n'))
     viewer.ask(lambda: viewer.set(0, 0.1, "tension [N]"))
     wait(lambda: reached(viewer, 0.1))
-    viewer._read = lambda: robot_from_text(text)
     viewer.ask(viewer.reload)
-    wait(lambda: viewer.message)
-    assert viewer.session.robot is viewer.original is robot
-    for law in ("frictionless", "corner"):  # and the law can still be switched
+    wait(lambda: viewer.message or viewer.original is not robot)
+    if viewer.message:
+        assert viewer.session.robot is viewer.original is robot
+    for law in ("frictionless", "corner"):
         viewer.ask(lambda law=law: viewer.change_part("friction", law))
         wait(lambda law=law: viewer.session.robot.friction.kind == law)
     wait(lambda: viewer.message == "")
-    assert viewer.session.robot.friction.turning == "slope"
-    assert viewer.page.model._parts["friction"]._kind.value == "corner"
+    assert viewer.session.robot == viewer.original
 
 
 def test_a_number_beyond_its_slider_is_set_to_the_end_and_told(start):
