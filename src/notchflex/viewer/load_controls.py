@@ -112,10 +112,10 @@ class _Drive:
 
     def __init__(self, viewer: Viewer, owner: LoadControls, tendon: int) -> None:
         self._viewer, self._owner, self._tendon = viewer, owner, tendon
-        self._of = f"{tendon + 1} " if viewer.session.robot.number_of_tendons > 1 else ""
+        self._of = f" {tendon + 1}" if viewer.session.robot.number_of_tendons > 1 else ""
         self._key = ("by", tendon)
         self._by = viewer.server.gui.add_dropdown(
-            f"tendon {self._of}by", tuple(_BY.values()), initial_value=_BY[TENSION]
+            f"tendon{self._of} by", tuple(_BY.values()), initial_value=_BY[TENSION]
         )
         self._sliders = {by: self._slider(by) for by in _BY}
         self._lasts = {by: self._last(by) for by in _BY}
@@ -132,14 +132,18 @@ class _Drive:
 
     def _slider(self, by: str) -> Slider:
         ends = self._viewer.reach.ends(self._tendon, by)
-        label = f"{self._of}{_BY[by]}"
+        label = self._label(by)
         return Slider(self._viewer, self._tendon, label, ends, lambda value: self._moved(by, value))
+
+    def _label(self, by: str) -> str:
+        """Text of a slider, such as `tension 2 [N]`."""
+        return _BY[by].replace(" [", f"{self._of} [")
 
     def _last(self, by: str) -> Field:
         return Field(
             self._viewer,
             f"last {self._tendon} {by}",
-            f"{self._of}slider to",
+            f"slider{self._of} to",
             self._viewer.reach.ends(self._tendon, by)[1],
             lambda value: self._viewer.stretch(self._tendon, by, value),
             hint="how far this slider goes",
@@ -156,7 +160,7 @@ class _Drive:
             return  # the tendon could not be commanded so, and the page said why
         if self._owner.active != self._tendon:
             self._owner.show(self._tendon)
-        self._viewer.set(self._tendon, value, f"{self._of}{_BY[by]}")
+        self._viewer.set(self._tendon, value, self._label(by))
 
     def follow(self, by: str, value: float) -> None:
         """Show the slider that drives the tendon, where it goes."""
