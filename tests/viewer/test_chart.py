@@ -1,10 +1,13 @@
 """The charts and tables of the page as text, read as a browser reads them."""
 
+import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+import notchflex as nf
 from notchflex.viewer import Session
 from notchflex.viewer.chart import Line, chart, ticks
 from robots import ready
@@ -65,7 +68,7 @@ def test_the_loop_tells_pulling_from_letting_go_and_keeps_the_loop_before():
 
 def test_colours_of_contacts_and_strains():
     from notchflex.plotting.style import BLUE, GREEN, GREY, VERMILLION
-    from notchflex.viewer.colours import METAL, of_contacts, of_strain
+    from notchflex.viewer.colours import BEYOND, METAL, of_contacts, of_strain
 
     robot = ready("A").with_value("friction.wrap", "geometric")
     session = Session(robot)
@@ -78,20 +81,81 @@ def test_colours_of_contacts_and_strains():
     assert GREEN in seen[1]
     assert seen[2] == {VERMILLION}
     assert of_strain(None) == METAL
-    assert of_strain(1.5) == of_strain(1.0) == of_strain(-1.0) != of_strain(0.9)
+    assert of_strain(1.0) == of_strain(-1.0) != of_strain(0.9)
+    assert of_strain(1.5) == of_strain(-1.01) == BEYOND != of_strain(1.0)
+
+
+def cells(text):
+    return {
+        one.attrib["data-name"]: one.text
+        for one in elements(text, "td")
+        if "data-name" in one.attrib
+    }
 
 
 def test_the_table_tells_units_strain_and_closed_notches():
     from notchflex.viewer.readout import readout
 
     session = Session(ready("A"))
+    session.go(session.controls.with_tendon(0, "tension", 0.5))
+    text = readout(session)
+    assert cells(text)["peak_strain"].endswith(" % of 8 % allowed")
+    assert "data-warning" not in text
     session.go(session.controls.with_tendon(0, "tension", 1.8))
-    cells = {
-        one.attrib["data-name"]: one.text
-        for one in elements(readout(session), "td")
-        if "data-name" in one.attrib
-    }
-    assert cells["tension_1"] == "1.800"
-    assert float(cells["total_angle"]) == pytest.approx(np.degrees(session.state.total_angle), 1e-4)
-    assert cells["peak_strain"].endswith("of 8 % allowed")
-    assert cells["closed"] == "1, 2"
+    text = readout(session)
+    found = cells(text)
+    assert found["tension_1"] == "1.800"
+    assert float(found["total_angle"]) == pytest.approx(np.degrees(session.state.total_angle), 1e-4)
+    assert found["peak_strain"] == "11.80 % > 8 % allowed"
+    warned = [one for one in elements(text, "tr") if "data-warning" in one.attrib]
+    assert [one[0].text for one in warned] == ["largest strain"]
+    assert found["closed"] == "1, 2"
+
+
+def test_a_strain_without_a_limit_says_so():
+    from notchflex.viewer.legend import legend_html
+    from notchflex.viewer.readout import readout
+
+    robot = ready("A")
+    robot = robot.replace(material=replace(robot.material, allowed_strain=None))
+    session = Session(robot)
+    session.go(session.controls.with_tendon(0, "tension", 1.8))
+    assert cells(readout(session))["peak_strain"] == "11.80 %, no limit set"
+    assert "sets no allowed strain" in legend_html(robot, 1.0)
+
+
+@pytest.mark.parametrize("name", ["A", "gao2017"])
+def test_no_sign_before_a_zero(name):
+    from notchflex.viewer.readout import readout
+
+    robot = ready(name) if name == "A" else nf.load_robot(name)
+    found = cells(readout(Session(robot)))
+    for one in ("tension_1", "stroke_1", "total_angle", "tip_position"):
+        assert not re.search(r"-0\.0+(?!\d)", found[one])
+
+
+def test_every_colour_means_one_thing():
+    from notchflex.plotting.curves import COLOUR
+    from notchflex.viewer.legend import BALL, entries
+
+    told = entries(ready("A"))
+    balls = [one.colour for one in told if one.mark == BALL]
+    assert len(set(balls)) == len(balls)
+    tendon = next(one.colour for one in told if one.text == "tendon")
+    assert tendon not in balls
+    assert tendon not in COLOUR.values()
+
+
+def test_by_stroke_the_loop_is_drawn_against_stroke():
+    from notchflex.viewer.charts import loop, loop_chart
+
+    session = Session(ready("A"))
+    for stroke in (0.0, 1.0, 2.0, 1.5):
+        session.go(session.controls.with_tendon(0, "stroke", stroke))
+    found = loop(session, 0)
+    assert found.x_label == "tendon stroke [mm]"
+    assert found.lines[-1].x.tolist() == pytest.approx([1.5])
+    assert max(line.x.max() for line in found.lines) == pytest.approx(2.0)
+    assert "total angle against stroke" in loop_chart(session, 0)
+    session.go(session.controls.with_tendon(0, "tension", float(session.state.tension[0])))
+    assert loop(session, 0).x_label == "tendon tension [N]"

@@ -119,10 +119,59 @@ def test_numbers_are_those_of_the_file():
     assert [one.value for one in numbers(ready("A"), "friction")] == [0.13]
 
 
-def test_sliders_reach_far_enough_to_bend_a_robot_and_stay_within_what_is_solved():
-    reach = reach_of(ready("A"))
-    for load in (nf.Load(tension=reach.tension[0]), nf.Load(tension=0.6 * reach.tension[0])):
-        state = nf.solve(ready("A"), load)
-        assert state.converged
-        assert degrees(state.total_angle) > 60.0
-    assert nf.solve(ready("A"), nf.Load(stroke=0.5 * reach.stroke[0])).converged
+def test_a_robot_that_cannot_be_solved_leaves_the_one_before(monkeypatch):
+    session = Session(ready("A"))
+    pulled(session, 0.5, 1.0)
+    before = dict(session.__dict__)
+    go = Session.go
+
+    def refuse(self, controls):
+        if controls.value[0] == 1.0 and self is not session:
+            raise nf.InputError("no such robot")
+        return go(self, controls)
+
+    monkeypatch.setattr(Session, "go", refuse)
+    with pytest.raises(nf.InputError, match="no such robot"):
+        session.change(ready("A").with_value("friction.coefficient", 0.2))
+    assert session.__dict__ == before
+
+
+def test_doing_all_again_can_be_stopped():
+    session = Session(ready("A"))
+    angles = pulled(session, 0.2, 0.4, 0.6)
+    step = session.change(
+        ready("A").with_value("friction.coefficient", 0.1), go_on=lambda done, _: done < 3
+    )
+    assert "stopped after step 3 of 4" in step.reason
+    assert session.controls.value == (0.4,)
+    assert angles[1] < float(session.state.total_angle) < angles[2]
+    assert session.change(ready("A"), go_on=lambda *_: True).reason == ""
+
+
+@pytest.mark.parametrize("name", ["pacheco2021-a", "gao2017", "liu2022", "two-axis-wrist"])
+def test_sliders_end_where_the_robot_is_well_bent_and_by_stroke_at_the_same_place(name):
+    robot = nf.load_robot(name)
+    reach = reach_of(robot)
+    state = nf.solve(robot, nf.Load(tension=reach.tension[0]))
+    assert state.converged
+    assert degrees(np.abs(state.notch_angle).sum()) > 60.0
+    assert reach.stroke[0] == pytest.approx(float(state.stroke[0]), rel=0.01)
+    assert reach.stroke[0] <= float(state.stroke[0])
+
+
+def test_the_stroke_of_wrist_a_ends_where_it_is_closed():
+    assert reach_of(ready("A")).stroke[0] == pytest.approx(3.7, abs=0.05)
+    state = nf.solve(ready("A"), nf.Load(stroke=reach_of(ready("A")).stroke[0]))
+    assert state.converged
+
+
+def test_steps_and_ends_of_every_number():
+    reach = reach_of(nf.load_robot("two-axis-wrist"))
+    count = len(reach.tension)
+    assert reach.ends(0, "tension") == (0.0, reach.tension[0])
+    assert reach.ends(1, "stroke") == (-reach.stroke[1], reach.stroke[1])  # let out as well
+    assert reach.ends(count, "") == (-reach.force, reach.force)
+    assert reach.ends(count + 3, "") == (0.0, reach.mass)
+    by = ("stroke",) + ("tension",) * (count - 1)
+    assert 60.0 * reach.stride(by)[:2] == pytest.approx([reach.stroke[0], reach.tension[1]])
+    assert reach.stretched(1, "tension", 9.0).tension[1] == 9.0

@@ -1,4 +1,6 @@
-"""Settings that come faster than they are solved: none that turns back is lost."""
+"""The way of the robot to its settings: in small steps, and turned at once by a new one."""
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,25 +25,55 @@ def test_a_long_way_is_gone_in_equal_steps():
     assert way.next() is None
 
 
-def test_a_slider_pushed_up_and_back_has_been_up():
-    way = Way(REST, STRIDE)
-    for value in (0.3, 1.0, 2.0, 1.2, 0.4):
-        way.add(REST.with_tendon(0, "tension", value))
-    assert len(way) == 2  # up, and down
-    values = [one.value[0] for one in steps(way)]
-    assert max(values) == 2.0
-    assert values[-1] == 0.4
-    turn = values.index(2.0)
-    assert values[:turn] == sorted(values[:turn])
-    assert values[turn:] == sorted(values[turn:], reverse=True)
+def values(way, tendon=0):
+    return [round(one.value[tendon], 12) for one in steps(way)]
 
 
-def test_sliders_moved_one_after_the_other_are_moved_in_that_order():
+def test_a_number_set_anew_is_obeyed_from_where_the_robot_is():
     way = Way(REST, STRIDE)
-    first = REST.with_tendon(0, "tension", 1.0)
-    way.add(first)
-    way.add(first.with_tendon(1, "tension", 1.0))
+    way.turn(0, 3.0)
+    assert way.next().value == (0.5, 0.0)
+    assert way.next().value == (1.0, 0.0)
+    way.turn(0, 0.2)
+    assert len(way) == 1
+    assert values(way) == [0.5, 0.2]
+    assert way.here.value == (0.2, 0.0)
+
+
+def test_a_number_set_anew_leaves_the_goals_of_others_in_their_order():
+    way = Way(REST, STRIDE)
+    way.turn(0, 3.0)
+    assert way.next().value == (0.5, 0.0)
+    way.turn(1, 1.0)
+    way.turn(0, 0.0)
+    assert [one.value for one in steps(way)] == [(0.5, 0.5), (0.5, 1.0), (0.0, 1.0)]
+
+
+def test_numbers_set_one_after_the_other_are_reached_in_that_order():
+    way = Way(REST, STRIDE)
+    way.turn(0, 1.0)
+    way.turn(1, 1.0)
     assert [one.value for one in steps(way)] == [(0.5, 0.0), (1.0, 0.0), (1.0, 0.5), (1.0, 1.0)]
+
+
+def test_a_number_that_is_held_stays_and_a_cycle_of_it_is_dropped():
+    way = Way(REST, STRIDE)
+    for value in (0.0, 2.0, 0.0):
+        way.add(way.end.with_tendon(0, "tension", value))
+    assert way.next().value == (0.5, 0.0)
+    way.hold(0)
+    assert way.next() is None
+    assert way.here.value == (0.5, 0.0)
+
+
+def test_a_way_goes_on_from_elsewhere_but_not_by_another_command():
+    way = Way(REST, STRIDE)
+    way.turn(0, 2.0)
+    other = replace(REST, pointing="down")
+    way.restart(other)
+    assert way.end == other.with_tendon(0, "tension", 2.0)
+    way.restart(REST.with_tendon(0, "stroke", 0.3))
+    assert way.next() is None
 
 
 def test_another_kind_of_command_is_one_step():

@@ -98,16 +98,21 @@ class Bent:
         """Return the line of a tendon (from 0) through its true points, from below the base."""
         return np.concatenate([points for points, _ in self._along(number)])
 
-    def contacts(self, number: int) -> Points:
+    def contacts(self, number: int, radius: float | None = None) -> Points:
         """Return the points of a tendon (from 0) where it rubs, base to tip, (contacts, 3).
 
         Those are the edges of the bodies that it runs through, but for the one behind which it is
         fixed.
+
+        Args:
+            number: The tendon.
+            radius: Distance [mm] from the tube axis to which the points are moved outward; None
+                leaves them on the tendon.
         """
-        edges = [points for points, on_body in self._along(number) if on_body]
+        edges = [points for points, on_body in self._along(number, radius) if on_body]
         return np.concatenate(edges)[1:-2]  # neither the foot, nor both edges of the last body
 
-    def _along(self, number: int) -> Iterator[tuple[Points, bool]]:
+    def _along(self, number: int, radius: float | None = None) -> Iterator[tuple[Points, bool]]:
         """Pieces of a tendon, and whether each lies on a body or crosses a notch."""
         from notchflex.tendon.wall_arc import WallArc
 
@@ -118,6 +123,9 @@ class Bent:
         )
         walls = self.walls(self.robot.tendon[number].direction_deg)
         place = np.asarray(self.chain.tendon_place)[number]
+        if radius is not None:
+            angle = np.radians(self.robot.tendon[number].direction_deg)
+            place = radius * np.array([np.cos(angle), np.sin(angle), 0.0])
         for body in range(len(self.position)):
             if body and not present[body - 1]:
                 break
@@ -128,9 +136,14 @@ class Bent:
             if ends is not None and (body == 0 or visits[body - 1]):
                 yield self.on_body(body, [place + at * UP for at in ends]), True
 
-    def lips(self, notch: int) -> Points:
-        """Return the point between the lips of a notch (from 0), where it closes."""
-        outer = self.robot.tube.outer_radius
+    def lips(self, notch: int, radius: float | None = None) -> Points:
+        """Return the point between the lips of a notch (from 0), where it closes.
+
+        Args:
+            notch: The notch.
+            radius: Distance [mm] of the point from the tube axis; None is that of the lips.
+        """
+        outer = self.robot.tube.outer_radius if radius is None else radius
         found: list[tuple[float, Points]] = []
         for turn in (0.0, 180.0):
             side = self.robot.notches[notch].direction_deg + turn

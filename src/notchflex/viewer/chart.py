@@ -10,8 +10,8 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-WIDTH, HEIGHT = 380, 260
-LEFT, RIGHT, TOP, BOTTOM = 52, 12, 12, 40
+WIDTH, HEIGHT = 290, 190
+LEFT, RIGHT, TOP, BOTTOM = 46, 12, 8, 36
 MOST_POINTS = 1500
 """More points of a line are thinned, but for its ends."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from notchflex.plotting.curves import COLOUR
@@ -15,31 +17,55 @@ from notchflex.viewer.session import Session
 BEFORE = "#b5b5b5"
 
 
-def axis(name: str, of: str = "") -> str:
+def axis(name: str) -> str:
     """Return the label of an axis of a quantity, without the symbol that is set as mathematics."""
     quantity = QUANTITIES[name]
-    return f"{quantity.title}{of} [{quantity.unit}]"
+    return f"{quantity.title} [{quantity.unit}]"
+
+
+class Loop(NamedTuple):
+    """A chart of the total angle.
+
+    Attributes:
+        lines: What is drawn.
+        x_label: Text of the horizontal axis.
+        y_label: Text of the vertical axis.
+        name: What it shows.
+    """
+
+    lines: list[Line]
+    x_label: str
+    y_label: str
+    name: str
+
+
+def loop(session: Session, tendon: int) -> Loop:
+    """Return the total angle against tension or stroke of a tendon (from 0), since it was at rest.
+
+    It is against what commands the tendon now. What was pulled and what was let go have their
+    colours; a loop of the robot before its last change is grey.
+    """
+    scale = QUANTITIES["total_angle"].scale
+    by = session.controls.by[tendon]
+    lines: list[Line] = []
+    if session.before is not None:
+        drawn, angle = session.before.loop(tendon, by)
+        lines.append(Line(drawn, scale * angle, BEFORE, name="before the change"))
+    drawn, angle = session.history.loop(tendon, by)
+    for part, growing in branches(drawn) if len(drawn) > 1 else ():
+        way = PULLING if growing else LETTING_GO
+        lines.append(Line(drawn[part], scale * angle[part], COLOUR[way], name=way))
+    lines.append(Line(drawn[-1:], scale * angle[-1:], "", 0.0, ("#111111",), 4.5, "now"))
+    x_label = axis(by)
+    if session.robot.number_of_tendons > 1:
+        x_label = x_label.replace(f"tendon {by}", f"{by} of tendon {tendon + 1}")
+    return Loop(lines, x_label, axis("total_angle"), f"total angle against {by}")
 
 
 def loop_chart(session: Session, tendon: int) -> str:
-    """Draw the total angle against the tension of a tendon (from 0), since the robot was at rest.
-
-    What was pulled and what was let go have their colours; a loop of the robot before its last
-    change is grey.
-    """
-    scale = QUANTITIES["total_angle"].scale
-    lines: list[Line] = []
-    if session.before is not None:
-        tension, angle = session.before.loop(tendon)
-        lines.append(Line(tension, scale * angle, BEFORE, name="before the change"))
-    tension, angle = session.history.loop(tendon)
-    for part, growing in branches(tension) if len(tension) > 1 else ():
-        way = PULLING if growing else LETTING_GO
-        lines.append(Line(tension[part], scale * angle[part], COLOUR[way], name=way))
-    lines.append(Line(tension[-1:], scale * angle[-1:], "", 0.0, ("#111111",), 4.5, "now"))
-    of = f" of tendon {tendon + 1}" if session.robot.number_of_tendons > 1 else ""
-    x_label = axis("tension").replace("tendon tension", f"tension{of}" if of else "tendon tension")
-    return chart(lines, x_label, axis("total_angle"), "total angle against tension")
+    """Draw `loop` as an SVG element."""
+    found = loop(session, tendon)
+    return chart(found.lines, found.x_label, found.y_label, found.name)
 
 
 def tendon_chart(session: Session, tendon: int) -> str:
@@ -63,4 +89,4 @@ def tendon_chart(session: Session, tendon: int) -> str:
     )
 
 
-__all__ = ["axis", "loop_chart", "tendon_chart"]
+__all__ = ["Loop", "axis", "loop", "loop_chart", "tendon_chart"]

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
-from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plotting.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+)
 from notchflex.statics import Equilibrium
 
 Colour = tuple[int, int, int]
@@ -22,8 +34,10 @@ def rgb(code: str) -> Colour:
 
 METAL: Colour = (176, 182, 190)
 TENDON = rgb(ORANGE)
-CLOSED = rgb(VERMILLION)
-LOAD = {"force": rgb(PURPLE), "moment": rgb(SKY)}
+CLOSED = rgb(BLACK)
+BEYOND: Colour = (214, 0, 147)
+"""A strain beyond the allowed one, outside the scale of the others."""
+LOAD = {"force": PURPLE, "moment": SKY}
 CONTACT = {0: GREEN, 1: BLUE, -1: VERMILLION}
 """Colour of a friction contact by its state: sticks, slips toward the base, toward the tip."""
 UNKNOWN = GREY
@@ -38,6 +52,11 @@ STEPS = 64
 """How many colours of strain there are; a notch is painted anew only when its colour changes."""
 
 
+def is_beyond(part: float) -> bool:
+    """Whether a strain, as a part of the allowed one, is larger than that."""
+    return abs(part) > 1.0
+
+
 def of_strain(part: float | None) -> Colour:
     """Return the colour of a strain.
 
@@ -46,6 +65,8 @@ def of_strain(part: float | None) -> Colour:
     """
     if part is None or not np.isfinite(part):
         return METAL
+    if is_beyond(part):
+        return BEYOND
     place = round(min(abs(part), 1.0) * STEPS) / STEPS * (len(_SCALE) - 1)
     columns = [np.interp(place, np.arange(len(_SCALE)), column) for column in _SCALE.T]
     red, green, blue = (round(float(value)) for value in columns)
@@ -67,12 +88,27 @@ def of_contacts(state: Equilibrium, tendon: int) -> list[str]:
     ]
 
 
+def linear(codes: Sequence[str]) -> NDArray[np.uint8]:
+    """Return colour codes as linear light from 0 to 255, (count, 3).
+
+    viser takes the colours of many like things at once for linear light, and all others as sRGB.
+
+    Example:
+        >>> linear(["#0072B2", "#FFFFFF"]).tolist()
+        [[0, 43, 114], [255, 255, 255]]
+    """
+    part = np.array([rgb(code) for code in codes], float).reshape(-1, 3) / 255.0
+    light = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * light).astype(np.uint8)
+
+
 def css(colour: Colour) -> str:
     """Return a colour as a page writes it."""
     return "#" + "".join(f"{part:02x}" for part in colour)
 
 
 __all__ = [
+    "BEYOND",
     "CLOSED",
     "CONTACT",
     "LOAD",
@@ -80,6 +116,8 @@ __all__ = [
     "TENDON",
     "UNKNOWN",
     "css",
+    "is_beyond",
+    "linear",
     "of_contacts",
     "of_strain",
     "rgb",

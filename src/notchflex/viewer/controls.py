@@ -69,6 +69,10 @@ class Controls:
             self, by=_put(self.by, tendon, by), value=_put(self.value, tendon, float(value))
         )
 
+    def command(self, number: int) -> str:
+        """Return how one of the `numbers` is commanded: "" where it is no tendon's."""
+        return self.by[number] if number < len(self.by) else ""
+
     @property
     def numbers(self) -> np.ndarray:
         """All that can be changed bit by bit: tendons, force, mass."""

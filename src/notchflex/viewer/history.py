@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from notchflex.statics import Equilibrium
-from notchflex.viewer.controls import Controls
+from notchflex.viewer.controls import TENSION, Controls
 
 
 @dataclass
@@ -37,10 +37,16 @@ class History:
         self.stroke.append(np.asarray(state.stroke, float))
         self.total_angle.append(float(state.total_angle))
 
-    def loop(self, tendon: int) -> tuple[np.ndarray, np.ndarray]:
-        """Tension of a tendon (from 0), N, and total angle, rad, step by step."""
-        tension = [values[tendon] for values in self.tension if tendon < len(values)]
-        return np.array(tension), np.array(self.total_angle[: len(tension)])
+    def loop(self, tendon: int, by: str = TENSION) -> tuple[np.ndarray, np.ndarray]:
+        """Return tension [N] or stroke [mm] of a tendon (from 0) and total angle [rad], by steps.
+
+        Args:
+            tendon: The tendon.
+            by: `TENSION` or `STROKE`.
+        """
+        steps = self.tension if by == TENSION else self.stroke
+        drawn = [values[tendon] for values in steps if tendon < len(values)]
+        return np.array(drawn), np.array(self.total_angle[: len(drawn)])
 
 
 __all__ = ["History"]

@@ -5,15 +5,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from notchflex.viewer.charts import loop_chart, tendon_chart
+from notchflex.viewer.legend import legend_html
 from notchflex.viewer.load_controls import LoadControls
 from notchflex.viewer.model_controls import ModelControls
-from notchflex.viewer.readout import legend, notice, readout
+from notchflex.viewer.readout import notice, readout
 from notchflex.viewer.robot_controls import RobotControls
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
 
-CHARTS_WIDTH, CONTROLS_WIDTH = 400, 340
+CHARTS_WIDTH, CONTROLS_WIDTH = 280, 290
+
+# viser's own messages, such as that there is no graphics card, lie over the scene until somebody
+# closes them. There they are small, at the lower edge and let the mouse through.
+STYLE = """<style>
+.mantine-Notifications-root { top: auto !important; bottom: 0.5em !important; max-width: 16em; }
+.mantine-Notification-root { padding: 2px 6px 2px 16px; }
+.mantine-Notification-title { font-size: 11px; margin: 0; }
+.mantine-Notification-root:not(:hover) .mantine-Notification-description { display: none; }
+</style>"""
 
 
 class Page:
@@ -34,17 +44,17 @@ class Page:
         with self._side.add_tab("State"):
             self._readout = gui.add_html("")
             self._loop = gui.add_html("")
-            self._tendon = gui.add_html("")
             self._legend = gui.add_html("")
+            self._tendon = gui.add_html("")
         self._side.dock_left()
         self._side.set_width(CHARTS_WIDTH)
         self._notice = gui.add_html("", order=0.0)
         self._folders: list[Any] = []
+        gui.add_html(STYLE, order=99.0)
         self.rebuild()
-        self._first_look()
 
     def rebuild(self) -> None:
-        """Lay the controls out anew, for another robot or other ends of sliders.
+        """Lay the controls out anew, for another robot.
 
         Once for each change: of controls that are taken away before they were sent, viser still
         sends the updates, to a page that does not know them.
@@ -52,46 +62,56 @@ class Page:
         viewer = self.viewer
         for folder in self._folders:
             folder.remove()
-        viewer.server.gui.set_panel_label(viewer.session.robot.name)
         self.loads = LoadControls(viewer)
         self.model = ModelControls(viewer)
         self.robot = RobotControls(viewer)
         self._folders = [*self.loads.folders, *self.model.folders, *self.robot.folders]
-        self._legend.content = legend(viewer.session.robot, viewer.scene.grid_cell)
+        self.name()
         self._first_look()
 
+    def name(self) -> None:
+        """Write the name of the robot, and what colours mean on it."""
+        viewer = self.viewer
+        viewer.server.gui.set_panel_label(viewer.session.robot.name)
+        self._legend.content = legend_html(viewer.session.robot, viewer.scene.grid_cell)
+
     def tell(self) -> None:
-        """Renew numbers, charts and the notice."""
+        """Renew numbers and charts, and all that `follow` does."""
         session = self.viewer.session
         tendon = min(self.loads.active, session.robot.number_of_tendons - 1)
-        self._notice.content = notice(self.viewer.message)
         self._readout.content = readout(session)
         self._loop.content = loop_chart(session, tendon)
         self._tendon.content = tendon_chart(session, tendon)
-        if self.loads.following:
-            self.loads.follow(session.controls)
+        self.follow()
+
+    def follow(self) -> None:
+        """Show in controls and notice what the robot has and where it goes."""
+        viewer = self.viewer
+        self._notice.content = notice(viewer.message or viewer.note)
+        self.loads.follow(viewer.goal)
+        self.model.follow(viewer.session.robot)
 
     def busy(self, sentence: str) -> None:
         """Say at once what takes longer."""
         self._notice.content = notice(sentence, waiting=True)
         self.viewer.server.flush()
 
-    def follow(self) -> None:
-        """Put the sliders where the robot stands."""
-        self.loads.follow(self.viewer.session.controls)
+    def look(self, side: bool = False) -> None:
+        """Let every browser look at the robot, from where it is seen best or straight from a side.
 
-    def look(self) -> None:
-        """Let every browser look at the robot from where it is seen best."""
-        place, target = self._first_look()
-        for client in self.viewer.server.get_clients().values():
-            client.camera.position, client.camera.look_at = place, target
+        Args:
+            side: Look at right angles on the plane in which the robot bends.
+        """
+        viewer = self.viewer
+        for client in viewer.server.get_clients().values():
+            eye = viewer.scene.eye(viewer.session.pointing, side, client.camera.aspect)
+            client.camera.position, client.camera.look_at = eye.position, eye.target
 
-    def _first_look(self) -> tuple[Any, Any]:
+    def _first_look(self) -> None:
         """The same for browsers that come later."""
-        place, target = self.viewer.scene.look(self.viewer.session.pointing)
+        eye = self.viewer.scene.eye(self.viewer.session.pointing)
         camera = self.viewer.server.initial_camera
-        camera.position, camera.look_at = place, target
-        return place, target
+        camera.position, camera.look_at = eye.position, eye.target
 
 
 __all__ = ["Page"]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from notchflex.robot import Robot
 from notchflex.statics import Load, solve
+from notchflex.viewer.controls import STROKE, TENSION
 
 # Tensions from 1/64 N on are tried, each twice the one before, until the robot is well bent; a
 # slider goes half as far again.
@@ -21,6 +23,8 @@ FORCE_PART = 0.05
 GRAVITY = 9.81e-3  # N/g
 STRIDES = 60
 """Steps from one end of a slider to the other."""
+STRETCH = 10.0
+"""A slider can be made to go as many times as far as at first, or as many times less far."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +43,34 @@ class Reach:
     force: float
     mass: float
 
-    def stride(self, by_stroke: list[bool]) -> np.ndarray:
-        """Largest step of each number of `Controls`."""
-        pairs = zip(by_stroke, self.stroke, self.tension, strict=True)
-        tendons = [stroke if drawn else tension for drawn, stroke, tension in pairs]
-        return np.array([*tendons, *[2.0 * self.force] * 3, self.mass]) / STRIDES
+    def ends(self, number: int, by: str) -> tuple[float, float]:
+        """Return the ends of the slider of a number of `Controls`.
+
+        Args:
+            number: Its place in `Controls.numbers`.
+            by: `TENSION` or `STROKE`, where it is a tendon's.
+        """
+        count = len(self.tension)
+        if number < count:
+            most = (self.tension if by == TENSION else self.stroke)[number]
+            # Drawn on one side, a tendon on the other is let out.
+            return (-most if by == STROKE and count > 1 else 0.0), most
+        return (0.0, self.mass) if number == count + 3 else (-self.force, self.force)
+
+    def stride(self, by: Sequence[str]) -> np.ndarray:
+        """Return the largest step of each number of `Controls`.
+
+        Args:
+            by: `TENSION` or `STROKE` for every tendon.
+        """
+        ends = [self.ends(tendon, one)[1] for tendon, one in enumerate(by)]
+        return np.array([*ends, *[2.0 * self.force] * 3, self.mass]) / STRIDES
+
+    def stretched(self, tendon: int, by: str, end: float) -> Reach:
+        """Return the same with another end of the slider of a tendon (from 0)."""
+        ends = list(self.tension if by == TENSION else self.stroke)
+        ends[tendon] = end
+        return replace(self, **{by: tuple(ends)})
 
 
 def reach_of(robot: Robot) -> Reach:
@@ -69,19 +96,40 @@ def round_up(value: float) -> float:
 
 
 def _pulled(robot: Robot, tendon: int) -> tuple[float, float]:
-    """Tension and stroke at the ends of the sliders of a tendon."""
+    """Tension and stroke at the ends of the sliders of a tendon, which bend the robot as far."""
     tension, drawn = FIRST, 0.0
     while tension <= MOST:
-        state = solve(robot, Load(tension=[None] * tendon + [tension]))
-        if not state.converged:
+        found = _stroke(robot, tendon, tension)
+        if found is None:
             tension *= 0.5 if drawn > 0.0 else 1.0
             break
-        drawn = float(state.stroke[tendon])
-        if np.abs(state.notch_angle).sum() >= WELL_BENT or _closed(state.closed, state.gap):
+        drawn, bent = found
+        if bent:
             break
         tension *= 2.0
-    tension = round_up(ROOM * min(tension, MOST))
-    return tension, round_up(ROOM * max(drawn, 1e-3))
+    end = round_up(ROOM * min(tension, MOST))
+    found = _stroke(robot, tendon, end)
+    return end, round_down(found[0]) if found and found[0] > drawn else round_up(max(drawn, 1e-3))
+
+
+def round_down(value: float) -> float:
+    """The largest number of three digits that is not above.
+
+    Example:
+        >>> [round_down(value) for value in (3.7482, 0.0129, 15.0)]
+        [3.74, 0.0129, 15.0]
+    """
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{math.floor(value / unit * (1.0 + 1e-9)) * unit:.12g}")
+
+
+def _stroke(robot: Robot, tendon: int, tension: float) -> tuple[float, bool] | None:
+    """Stroke at a tension and whether the robot is well bent there; None without a solution."""
+    state = solve(robot, Load(tension=[None] * tendon + [tension]))
+    if not state.converged:
+        return None
+    well = np.abs(state.notch_angle).sum() >= WELL_BENT or _closed(state.closed, state.gap)
+    return float(state.stroke[tendon]), bool(well)
 
 
 def _closed(closed: np.ndarray, gap: np.ndarray) -> bool:
@@ -90,4 +138,4 @@ def _closed(closed: np.ndarray, gap: np.ndarray) -> bool:
     return bool(can.any() and closed[can].all())
 
 
-__all__ = ["STRIDES", "Reach", "reach_of", "round_up"]
+__all__ = ["STRETCH", "STRIDES", "Reach", "reach_of", "round_down", "round_up"]

@@ -36,16 +36,21 @@ class RobotControls:
             for field in dataclasses.fields(viewer.shown):
                 self._switch(field.name)
             view = gui.add_button("View from the side")
+            whole = gui.add_button("View as at first")
         with gui.add_folder("Robot", order=6.0, expand_by_default=False) as robot:
             ready = gui.add_dropdown("ready robot", (_CHOOSE, *list_robots()))
             file = gui.add_upload_button("Load a robot file", mime_type=".toml")
         with gui.add_folder("Save", order=7.0, expand_by_default=False) as save:
-            picture = gui.add_button("Picture (PNG)", hint="of the scene as it is seen here")
+            picture = gui.add_button("Picture (PNG)", hint="with loads, loop, numbers and legend")
             table = gui.add_button("Table (CSV)", hint="all steps, as notchflex simulate writes")
             toml = gui.add_button("Robot file (TOML)", hint="with the friction and material set")
         self.folders: list[Any] = [show, robot, save]
 
         @view.on_click
+        async def _(_: Any) -> None:
+            viewer.ask(lambda: viewer.page.look(side=True))
+
+        @whole.on_click
         async def _(_: Any) -> None:
             viewer.ask(viewer.page.look)
 
@@ -62,7 +67,8 @@ class RobotControls:
 
         @picture.on_click
         async def _(event: Any) -> None:
-            viewer.ask(lambda: saving.send_picture(event.client, viewer.session))
+            viewer.page.busy("drawing the picture")
+            viewer.ask(lambda: _picture(viewer, event.client))
 
         @table.on_click
         async def _(event: Any) -> None:
@@ -83,6 +89,14 @@ class RobotControls:
             if event.client is not None:
                 value = bool(box.value)
                 viewer.ask(lambda: viewer.show(name, value))
+
+
+def _picture(viewer: Viewer, client: Any) -> None:
+    """Send a picture of what is seen, and say again what there is to say."""
+    try:
+        saving.send_picture(client, viewer.session, viewer.scene, viewer.page.loads.active)
+    finally:
+        viewer.page.tell()
 
 
 def _robot(name: str, content: bytes) -> Any:

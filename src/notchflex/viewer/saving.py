@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import tempfile
 from pathlib import Path
@@ -11,13 +10,16 @@ from typing import TYPE_CHECKING
 from notchflex.errors import InputError
 from notchflex.results.csv import write_path_csv
 from notchflex.robot import Robot, robot_text
+from notchflex.viewer.camera import quaternions
 from notchflex.viewer.session import Session
 
 if TYPE_CHECKING:
     import viser
 
+    from notchflex.viewer.scene import Scene
+
 _WAIT = 20.0  # s, for a browser that is asked for a picture
-_SIZE = (1080, 1440)  # pixels, height and width
+_FOV = 0.5  # rad, of saved pictures: from far away, with little perspective
 
 
 def file_name(robot: Robot, ending: str) -> str:
@@ -55,23 +57,37 @@ def send_robot(client: viser.ClientHandle, session: Session) -> None:
     )
 
 
-def send_picture(client: viser.ClientHandle, session: Session) -> None:
-    """Send the scene as that browser sees it, on a clear ground.
+def send_picture(client: viser.ClientHandle, session: Session, scene: Scene, tendon: int) -> None:
+    """Send a picture of the robot from where that browser sees it, with its loop and a legend.
+
+    Args:
+        client: The browser.
+        session: What was done to the robot.
+        scene: The scene that the browser draws.
+        tendon: The tendon of the loop, from 0.
 
     Raises:
         InputError: The browser does not answer.
     """
-    from matplotlib.image import imsave
+    from notchflex.viewer.picture import SHAPE, picture
 
+    height, width = SHAPE
+    toward = client.camera.position - client.camera.look_at
+    eye = scene.picture_eye(toward, _FOV, width / height)
     try:
-        picture = client.get_render(*_SIZE, transport_format="png", timeout=_WAIT)
+        view = client.get_render(
+            height,
+            width,
+            wxyz=quaternions(eye.rotation[None])[0],
+            position=eye.position,
+            fov=_FOV,
+            transport_format="png",
+            timeout=_WAIT,
+        )
     except (TimeoutError, RuntimeError):
         raise InputError("the browser sent no picture; bring its window to the front") from None
-    target = io.BytesIO()
-    imsave(target, picture, format="png")
-    client.send_file_download(
-        file_name(session.robot, "png"), target.getvalue(), save_immediately=True
-    )
+    content = picture(session, view, tendon)
+    client.send_file_download(file_name(session.robot, "png"), content, save_immediately=True)
 
 
 __all__ = ["file_name", "send_picture", "send_robot", "send_table", "table_bytes"]

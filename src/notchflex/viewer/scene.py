@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 
 from notchflex.plotting.acting import Acting, acting_at
 from notchflex.plotting.bent import HELD, Bent, bent_at
+from notchflex.plotting.twist import rotation_of
 from notchflex.robot import Robot
 from notchflex.statics import Path
-from notchflex.viewer.colours import CLOSED, LOAD, METAL, TENDON, of_contacts, of_strain, rgb
+from notchflex.viewer.camera import Eye, first_eye, framed, quaternions
+from notchflex.viewer.colours import LOAD, METAL, linear, of_strain
 from notchflex.viewer.controls import POINTING, Controls
+from notchflex.viewer.marks import Marks
 from notchflex.viewer.reach import GRAVITY, Reach, round_up
 from notchflex.viewer.skins import PIECES, Skin, at_rest, skins
 from notchflex.viewer.solids import body_solids
@@ -25,8 +28,8 @@ from notchflex.viewer.solids import body_solids
 if TYPE_CHECKING:
     import viser
 
-# As parts of the outer radius of the tube.
-_TENDON, _CONTACT, _LIPS, _FRAME = 0.09, 0.22, 0.15, 2.2
+# As a part of the outer radius of the tube.
+_FRAME = 2.2
 # As parts of the length of the robot.
 _ARROW, _SHORTEST = 0.35, 0.06
 _SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
@@ -100,37 +103,14 @@ class Scene:
         ]
         self._see_through = False
         self._colours: list[Any] = [METAL] * len(self._flexures)
-        self._closed = [
-            scene.add_icosphere(f"{ROOT}/closed_{number + 1}", _LIPS * outer, color=CLOSED)
-            for number in range(len(self._flexures))
-        ]
-        self._tendons = [
-            scene.add_line_segments(
-                f"{ROOT}/tendon_{number + 1}",
-                _segments(rest.tendon(number)),
-                TENDON,
-                thickness=_TENDON * outer,
-            )
-            for number in range(self.robot.number_of_tendons)
-        ]
-        self._contacts = [
-            scene.add_point_cloud(
-                f"{ROOT}/contacts_{number + 1}",
-                rest.contacts(number).astype(np.float32),
-                TENDON,
-                point_size=_CONTACT * outer,
-                point_shape="circle",
-                precision="float32",
-            )
-            for number in range(self.robot.number_of_tendons)
-        ]
+        self._marks = Marks(scene, ROOT, rest)
         long, thin = _FRAME * outer, 0.05 * outer
         self._base_frame = scene.add_frame(f"{ROOT}/base", axes_length=long, axes_radius=thin)
         self._tip_frame = scene.add_frame(f"{ROOT}/tip", axes_length=long, axes_radius=thin)
         self._arrows = scene.add_arrows(
             f"{ROOT}/loads",
             np.zeros((1, 2, 3)),
-            np.array([LOAD["force"]]),
+            linear([LOAD["force"]]),
             shaft_radius=0.12 * outer,
             head_radius=0.32 * outer,
             head_length=0.8 * outer,
@@ -166,19 +146,21 @@ class Scene:
             The robot in that state.
         """
         shape = bent_at(path, 0, PIECES)
+        held = shape.position[:1] - [0.0, 0.0, HELD * self.robot.tube.outer_radius]
+        self._seen = np.concatenate([held, shape.position, shape.tip[None]])
         with self.server.atomic():
             self._turn(controls.pointing)
             self._dress(path, shape)
             self._move(shape)
             self._paint(path)
-            self._move_tendons(path, shape)
+            self._marks.move(path, shape, self.shown)
             self._move_loads(path, shape)
             self._base_frame.visible = self._tip_frame.visible = self.shown.frames
         return shape
 
     def _turn(self, pointing: str) -> None:
-        turn = _matrix(np.array(POINTING[pointing]))
-        self._root.wxyz = _quaternions(turn[None])[0]
+        self._pose = rotation_of(np.array(POINTING[pointing]))
+        self._root.wxyz = quaternions(self._pose[None])[0]
         outer = self.robot.tube.outer_radius
         lowest = {"up": HELD * outer, "sideways": 0.35 * self.length, "down": 1.1 * self.length}
         self._grid.position = (0.0, 0.0, -lowest[pointing])
@@ -202,7 +184,7 @@ class Scene:
                 node.vertices = corners
 
     def _move(self, shape: Bent) -> None:
-        turned = _quaternions(shape.rotation)
+        turned = quaternions(shape.rotation)
         for node, place, turn in zip(self._bodies, shape.position, turned, strict=True):
             node.position, node.wxyz = place, turn
         if self._see_through != self.shown.see_through:
@@ -220,21 +202,6 @@ class Scene:
             if colour != self._colours[number]:
                 self._flexures[number].color = self._colours[number] = colour
 
-    def _move_tendons(self, path: Path, shape: Bent) -> None:
-        for number, (line, dots) in enumerate(zip(self._tendons, self._contacts, strict=True)):
-            line.visible, dots.visible = self.shown.tendons, self.shown.contacts
-            if self.shown.tendons:
-                line.points = _segments(shape.tendon(number)).astype(np.float32)
-            if self.shown.contacts:
-                points = shape.contacts(number)
-                dots.points = points.astype(np.float32)
-                codes = of_contacts(path[0], number)
-                dots.colors = np.array([rgb(code) for code in codes], np.uint8)
-        for number, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
-            ball.visible = bool(closed)
-            if closed:
-                ball.position = shape.lips(number)
-
     def _move_loads(self, path: Path, shape: Bent) -> None:
         loads = acting_at(path, 0, shape) if self.shown.loads else []
         self._arrows.visible = bool(loads)
@@ -243,7 +210,7 @@ class Scene:
         if not loads:
             return
         ends = np.stack([np.stack([one.point, one.point + self._arrow(one)]) for one in loads])
-        self._arrows.colors = np.array([LOAD[one.name] for one in loads], np.uint8)
+        self._arrows.colors = linear([LOAD[one.name] for one in loads])
         self._arrows.points = ends.astype(np.float32)
         for label, one, (_, end) in zip(self._labels, loads, ends, strict=False):
             label.text, label.position, label.visible = one.label, end, True
@@ -253,11 +220,30 @@ class Scene:
         size = max(one.size / most, _SHORTEST / _ARROW) * _ARROW * self.length
         return size * one.vector / one.size
 
-    def look(self, pointing: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return where a camera should stand, and where it should look to, mm in the world."""
-        turn = _matrix(np.array(POINTING[pointing]))
-        middle = self.length * (turn @ np.array([0.2, 0.0, 0.42]))
-        return middle + self.length * np.array([0.45, -1.5, 0.5]), middle
+    def eye(self, pointing: str, side: bool = False, aspect: float = 1.0) -> Eye:
+        """Return where a camera should stand, with room for the robot to bend.
+
+        Args:
+            pointing: Where the tube points, a key of `POINTING`.
+            side: Look at right angles on the plane in which the robot bends; else a little from
+                above.
+            aspect: Width of the picture by its height.
+        """
+        turn = rotation_of(np.array(POINTING[pointing]))
+        return first_eye(self.robot.notches[0].direction_deg, self.length, turn, side, aspect)
+
+    def picture_eye(self, toward: NDArray[np.float64], fov: float, aspect: float) -> Eye:
+        """Return where a camera must stand to see the robot as it is bent now, and all of it.
+
+        Args:
+            toward: Direction from the robot to the camera.
+            fov: Angle of view from the lower to the upper edge, rad.
+            aspect: Width of the picture by its height.
+        """
+        outer = 1.3 * self.robot.tube.outer_radius
+        box = outer * np.array(list(np.ndindex(2, 2, 2))) * 2.0 - outer
+        points = (self._seen[:, None] + box).reshape(-1, 3)
+        return framed(points @ self._pose.T, toward, aspect, fov, room=1.1)
 
     def remove(self) -> None:
         """Take everything away again."""
@@ -272,24 +258,6 @@ def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
     whole = trimesh.Trimesh(vertices, faces, process=False)
     shaded = trimesh.graph.smooth_shade(whole, angle=_SMOOTH)
     return scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
-
-
-def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points in a row as the straight pieces between them, (pieces, 2, 3)."""
-    return np.stack([points[:-1], points[1:]], axis=1)
-
-
-def _matrix(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    from notchflex.plotting.twist import rotation_of
-
-    return rotation_of(vector)
-
-
-def _quaternions(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations as (w, x, y, z)."""
-    import viser.transforms as transforms
-
-    return np.asarray(transforms.SO3.from_matrix(rotation).wxyz, np.float64)
 
 
 __all__ = ["Scene", "Shown"]

@@ -66,6 +66,16 @@ class Session:
         """The state that the robot is in; `solved` holds it as a path of one step."""
         return self.solved[0]
 
+    def where(self, tendon: int, by: str) -> float:
+        """Return the tension [N] or stroke [mm] that a tendon (from 0) has now.
+
+        Args:
+            tendon: The tendon.
+            by: `TENSION` or `STROKE`.
+        """
+        found = self.state.stroke if by == STROKE else self.state.tension
+        return float(found[tendon])
+
     def reset(self) -> Step:
         """Go back to the free robot that remembers nothing, nor any earlier loop."""
         self.before = None
@@ -105,7 +115,7 @@ class Session:
         self,
         robot: Robot | None = None,
         pointing: str | None = None,
-        told: Callable[[int, int], None] | None = None,
+        go_on: Callable[[int, int], bool] | None = None,
     ) -> Step:
         """Put another robot in, or point it elsewhere, and do to it all that was done before.
 
@@ -115,27 +125,37 @@ class Session:
         Args:
             robot: The other robot.
             pointing: Where its tube points.
-            told: Called with the number of steps done and of all, once in a while.
+            go_on: Called after every step with the number of steps done and of all; where it
+                returns False, the rest is left out.
 
         Returns:
             The state then; where a step did not converge, the one before it and the reason.
+
+        Raises:
+            InputError: The other robot cannot be solved; this one is as it was.
         """
         past = self.history
         changed = self.robot if robot is None else robot
         fits = changed.number_of_tendons == self.robot.number_of_tendons
-        # Made first: a robot that cannot be solved leaves this one as it is.
-        rest = Session(changed, self.pointing if pointing is None else pointing)
-        rest._known |= self._known
-        self.__dict__.update(rest.__dict__)
-        if not fits:
-            return Step(self.state, "")
-        self.before = past if len(past) > 1 else None
-        for number, controls in enumerate(past.controls[1:], start=2):
+        # Done first: a robot that cannot be solved leaves this one as it is.
+        again = Session(changed, self.pointing if pointing is None else pointing)
+        again._known |= self._known
+        step = Step(again.state, "")
+        if fits:
+            again.before = past if len(past) > 1 else None
+            step = again._repeat(past.controls[1:], go_on)
+        self.__dict__.update(again.__dict__)
+        return step
+
+    def _repeat(self, settings: list[Controls], go_on: Callable[[int, int], bool] | None) -> Step:
+        """Go to settings one after the other, until one is not reached or `go_on` says no."""
+        count = len(settings) + 1
+        for number, controls in enumerate(settings, start=2):
             step = self.go(controls)
             if step.reason:
-                return Step(self.state, f"step {number} of {len(past)} again: {step.reason}")
-            if told is not None and number % 20 == 0:
-                told(number, len(past))
+                return Step(self.state, f"step {number} of {count} again: {step.reason}")
+            if go_on is not None and not go_on(number, count) and number < count:
+                return Step(self.state, f"stopped after step {number} of {count} again")
         return Step(self.state, "")
 
     def path(self) -> Path:

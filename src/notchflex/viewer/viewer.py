@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path as FilePath
-from queue import Empty, Queue
 from threading import Event
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.viewer import parts
 from notchflex.viewer.address import HOST, PORT, check_host, check_installed
-from notchflex.viewer.controls import STROKE, TENSION, Controls
+from notchflex.viewer.controls import Controls
+from notchflex.viewer.notes import beyond, kept_between
+from notchflex.viewer.origin import bracketed
 from notchflex.viewer.page import Page
-from notchflex.viewer.reach import Reach, reach_of
+from notchflex.viewer.reach import STRETCH, Reach, reach_of
 from notchflex.viewer.scene import Scene, Shown
+from notchflex.viewer.serving import serve
 from notchflex.viewer.session import Session, Step
+from notchflex.viewer.tasks import Tasks
 from notchflex.viewer.watch import Watched
 from notchflex.viewer.way import Way
-
-if TYPE_CHECKING:
-    import viser
 
 # What a browser draws: more steps a second than this are not seen.
 MOST_STEPS = 60.0
@@ -64,14 +59,18 @@ class Viewer:
         self.original = robot
         self.session = Session(robot)
         self.reach: Reach = reach_of(robot)
-        self.way = Way(self.session.controls, self._stride(self.session.controls))
+        self._first_reach = self.reach
+        self.way = Way(self.session.controls, self.reach.stride(self.session.controls.by))
         self.shown = Shown()
-        self.message = ""
+        self.message = ""  # why something was not done
+        self.note = ""  # what was made of the last number that was set
+        self.tasks = Tasks()
+        self.interrupted = Event()  # the page asks to stop what takes long
+        self._playing = False
         self._read = read
         self._file = Watched(file) if file is not None and read is not None else None
-        self._tasks: Queue[Callable[[], None]] = Queue()
         self._stopped, self._looked, self._told = Event(), 0.0, 0.0
-        self.server = _server(host, port)
+        self.server = serve(host, port)
         self.scene = Scene(self.server, robot, self.reach, self.shown)
         self.page = Page(self)
         self._draw(told=True)
@@ -79,12 +78,18 @@ class Viewer:
     @property
     def address(self) -> str:
         """Where a browser finds it."""
-        host = self.server.get_host()
-        return f"http://{f'[{host}]' if ':' in host else host}:{self.server.get_port()}"
+        return f"http://{bracketed(self.server.get_host())}:{self.server.get_port()}"
+
+    @property
+    def goal(self) -> Controls:
+        """What the sliders show: where the robot goes, or, in a cycle, where it is."""
+        if self._playing and len(self.way):
+            return self.session.controls
+        return self.way.end
 
     def ask(self, task: Callable[[], None]) -> None:
         """Let the thread that solves do something next; any thread may call this."""
-        self._tasks.put(task)
+        self.tasks.add(task)
 
     def run(self) -> None:
         """Solve and draw until `stop` is called."""
@@ -110,13 +115,10 @@ class Viewer:
             self._looked = started
             if self._file is not None and self._file.changed():
                 self.reload()
-        with contextlib.suppress(Empty):
-            while True:
-                self._tasks.get_nowait()()
+        while (task := self.tasks.take(0.0 if len(self.way) else _LOOK)) is not None:
+            task()
         controls = self.way.next()
         if controls is None:
-            with contextlib.suppress(Empty):
-                self._tasks.get(timeout=_LOOK)()
             return
         self.advance(controls)
         rest = 1.0 / MOST_STEPS - (time.monotonic() - started)
@@ -128,14 +130,10 @@ class Viewer:
         if self.session.is_new(controls):
             self.page.busy("preparing: a new kind of load is compiled once, which takes seconds")
         step = self.session.go(controls)
-        self.message = ""
         if step.reason:
             self.way.clear(self.session.controls)
             self.message = f"Not reached: {step.reason}"
-        done = not len(self.way)
-        now = time.monotonic()
-        told = done or now - self._told > _TEXT
-        self._draw(told)
+        self._draw(told=not len(self.way) or time.monotonic() - self._told > _TEXT)
         return step
 
     def _draw(self, told: bool) -> None:
@@ -145,92 +143,93 @@ class Viewer:
             self._told = time.monotonic()
             self.page.tell()
 
-    def drive(self, tendon: int, by: str, value: float) -> None:
-        """Go on to another tension or stroke of a tendon (from 0)."""
-        self.go(self.way.end.with_tendon(tendon, by, value))
+    def set(self, number: int, value: float, label: str) -> None:
+        """Go to another value of a number of the controls, from wherever the robot is now.
 
-    def go(self, goal: Controls) -> None:
-        """Go on to other settings."""
-        self.way.stride = self._stride(goal)
-        self.way.add(goal)
+        Args:
+            number: Its place in `Controls.numbers`.
+            value: Its new value; one beyond its slider becomes the end of the slider.
+            label: What the page calls it, with its unit in brackets.
+        """
+        low, high = self.reach.ends(number, self.session.controls.command(number))
+        kept = min(max(value, low), high)
+        self._playing = False
+        self.message = self.note = ""
+        if kept != value:
+            self.note = beyond(label, value, (low, high), number < len(self.session.controls.by))
+        self.way.turn(number, kept)
+        self.page.follow()
 
     def drive_by(self, tendon: int, by: str) -> None:
         """Command a tendon (from 0) by tension or by stroke from now on; nothing moves."""
-        self._finish()
-        found = self.session.state
-        value = float((found.stroke if by == STROKE else found.tension)[tendon])
-        self.go(self.session.controls.with_tendon(tendon, by, value))
+        self._playing = False
+        self.message = self.note = ""
+        goal = self.session.controls.with_tendon(tendon, by, self.session.where(tendon, by))
+        self.way.clear(goal)
+        self.advance(goal)
+        self._stand(self.session.controls)
 
     def cycle(self, tendon: int) -> None:
         """Pull a tendon (from 0) from nothing to the end of its slider and let it go again."""
-        end = self.way.end
-        by = end.by[tendon]
-        most = (self.reach.tension if by == TENSION else self.reach.stroke)[tendon]
+        self.message = self.note = ""
+        self.way.hold(tendon)
+        most = self.reach.ends(tendon, self.session.controls.command(tendon))[1]
         for value in (0.0, most, 0.0):
-            self.drive(tendon, by, value)
+            end = self.way.end
+            self.way.add(end.with_tendon(tendon, end.by[tendon], value))
+        self._playing = True
 
     def halt(self) -> None:
         """Stay where the robot is."""
+        self.note = ""
         self.way.clear(self.session.controls)
-        self.page.follow()
-        self._draw(told=True)
+        self._stand(self.session.controls)
 
     def reset(self) -> None:
         """Go back to the free robot without memory."""
         self.session.reset()
-        self.message = ""
-        self._begin()
+        self.message = self.note = ""
+        self.way.clear()
+        self._stand(self.session.controls)
 
-    def _begin(self) -> None:
-        """Stand where the session stands, with nothing ahead."""
-        self.way = Way(self.session.controls, self._stride(self.session.controls))
-        self.page.follow()
+    def _stand(self, here: Controls) -> None:
+        """Stand somewhere and show it; what is still ahead and can be reached from there stays."""
+        self.interrupted.clear()
+        self.way.stride = self.reach.stride(here.by)
+        self.way.restart(here)
         self._draw(told=True)
-
-    def _finish(self) -> None:
-        """Go the whole way that is still ahead."""
-        while (controls := self.way.next()) is not None:
-            self.advance(controls)
 
     def point(self, pointing: str) -> None:
         """Point the tube elsewhere and do again what was done."""
-        self._finish()
-        self._again(self.session.change(pointing=pointing, told=self._replayed))
+        self._again(self.session.change(pointing=pointing, go_on=self._go_on))
         self.page.look()
 
     def change(self, robot: Robot) -> None:
         """Put another robot in and do to it what was done.
 
         One with other tendons begins anew. Its solids are made anew only where its shape changed.
+
+        Raises:
+            InputError: The robot cannot be solved; the one before stays.
         """
-        self._finish()
         old = self.session.robot
+        self.message = self.note = ""
         self.page.busy("preparing the robot")
-        try:
-            step = self.session.change(robot, told=self._replayed)
-            if (old.tube, old.notch, old.tendon) != (robot.tube, robot.notch, robot.tendon):
-                self._reshape(robot)
-            self.scene.robot = robot
-        finally:  # refused, controls show again what the robot has
+        step = self.session.change(robot, go_on=self._go_on)
+        if (old.tube, old.notch, old.tendon) != (robot.tube, robot.notch, robot.tendon):
+            self._reshape(robot)
             self.page.rebuild()
+        self.scene.robot = robot
+        self.page.name()
         self._again(step)
 
     def change_part(self, section: str, kind: str) -> None:
         """Give the robot another kind of friction or material."""
-        self._try(lambda: parts.with_kind(self.session.robot, section, kind, self.original))
+        self.change(parts.with_kind(self.session.robot, section, kind, self.original))
 
     def change_number(self, key: str, value: float) -> None:
         """Change a number of the robot by its name in the robot file."""
-        self._try(lambda: self.session.robot.with_value(key, value))
-
-    def _try(self, made: Callable[[], Robot]) -> None:
-        """Change the robot if that gives one; show in any case what it has."""
-        try:
-            robot = made()
-        except InputError:
-            self.page.rebuild()
-            raise
-        self.change(robot)
+        self.change(self.session.robot.with_value(key, value))
 
     def show(self, name: str, value: bool) -> None:
         """Show something in the scene or not; see `Shown`."""
@@ -238,11 +237,13 @@ class Viewer:
         self._draw(told=False)
 
     def _again(self, step: Step) -> None:
-        self.message = f"Not reached: {step.reason}" if step.reason else ""
-        self._begin()
+        if step.reason:
+            self.message = f"Not reached: {step.reason}"
+            self.way.clear()
+        self._stand(self.session.controls)
 
     def _reshape(self, robot: Robot) -> None:
-        self.reach = reach_of(robot)
+        self.reach = self._first_reach = reach_of(robot)
         self.scene.remove()
         self.scene = Scene(self.server, robot, self.reach, self.shown)
 
@@ -252,10 +253,11 @@ class Viewer:
         session = Session(robot, self.session.pointing)
         self.session, self.original = session, robot
         self._file = file
-        self.message = ""
+        self.message = self.note = ""
         self._reshape(robot)
+        self.way.clear(session.controls)
         self.page.rebuild()
-        self._begin()
+        self._stand(session.controls)
         self.page.look()
 
     def reload(self) -> None:
@@ -266,35 +268,32 @@ class Viewer:
         except InputError as problem:
             self._fail(f"The file was saved, but cannot be used: {problem}")
             return
-        self.original = robot
         self.change(robot)
+        self.original = robot
 
-    def stretch(self, reach: Reach) -> None:
-        """Let sliders go to other ends."""
-        self.reach = self.scene.reach = reach
-        self.way.stride = self._stride(self.way.end)
-        self.page.rebuild()
+    def stretch(self, tendon: int, by: str, end: float) -> None:
+        """Let a slider of a tendon (from 0) go to another end (N or mm), within sensible limits."""
+        first = self._first_reach.ends(tendon, by)[1]
+        now = (
+            abs(self.way.end.value[tendon]) if self.session.controls.command(tendon) == by else 0.0
+        )
+        low, high = max(now, first / STRETCH), first * STRETCH
+        kept = min(max(end, low), high)
+        self.message = ""
+        self.note = "" if kept == end else kept_between(low, high)
+        self.reach = self.scene.reach = self.reach.stretched(tendon, by, kept)
+        self.way.stride = self.reach.stride(self.session.controls.by)
+        self.page.follow()
 
-    def _stride(self, controls: Controls) -> np.ndarray:
-        return self.reach.stride([by == STROKE for by in controls.by])
-
-    def _replayed(self, done: int, of: int) -> None:
-        self.page.busy(f"doing again what was done: step {done} of {of}")
+    def _go_on(self, done: int, of: int) -> bool:
+        """Tell how far the robot is with what it does again, and whether it should go on."""
+        if done % 20 == 0:
+            self.page.busy(f"doing again what was done: step {done} of {of}")
+        return not self.interrupted.is_set()
 
     def _fail(self, sentence: str) -> None:
         self.message = sentence
         self.page.tell()
-
-
-def _server(host: str, port: int) -> viser.ViserServer:
-    """Begin to serve, in silence and without a way round the host."""
-    import viser
-
-    with contextlib.redirect_stdout(io.StringIO()):  # its own lines on where it serves
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-    # A page could ask for a public address, through a server of others.
-    server.request_share_url = lambda verbose=True: None
-    return server
 
 
 __all__ = ["Viewer"]

@@ -1,24 +1,23 @@
-"""The way from one setting to the next, gone in small steps and not cut short.
+"""The way from one setting to the next, gone in small steps.
 
-Friction remembers, so a slider that was pushed up and back again must have been up: settings that
-arrive faster than they are solved are kept, but for those that lie on the way to the next.
+A number that is set anew is obeyed at once: its old goal is dropped, wherever the robot is on its
+way there. Other numbers keep theirs, in the order in which they were set.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
+from dataclasses import replace
 from threading import Lock
 
 import numpy as np
 
 from notchflex.viewer.controls import Controls
 
-# Change of every number as part of its change between two corners that still counts as none.
-_STILL = 1e-12
-
 
 class Way:
-    """Settings still to be reached, in order; several threads may add to it.
+    """Settings still to be reached, in order; several threads may use it.
 
     Args:
         start: The setting where the robot is.
@@ -33,29 +32,71 @@ class Way:
         self.stride = stride
 
     def __len__(self) -> int:
-        """How many corners are still ahead."""
+        """How many settings are still ahead."""
         return len(self._ahead)
 
     @property
     def end(self) -> Controls:
         """Where it leads to."""
         with self._lock:
-            return self._ahead[-1] if self._ahead else self.here
+            return self._end()
+
+    def _end(self) -> Controls:
+        return self._ahead[-1] if self._ahead else self.here
 
     def add(self, goal: Controls) -> None:
-        """Go on to another setting; one before it that lies on the straight way there is passed."""
+        """Go on to another setting after those that are ahead."""
         with self._lock:
-            last = self._ahead[-1] if self._ahead else self.here
-            if goal == last:
-                return
-            if self._ahead:
-                before = self._ahead[-2] if len(self._ahead) > 1 else self.here
-                if _on_the_way(before, last, goal):
-                    self._ahead.pop()
-            self._ahead.append(goal)
+            if goal != self._end():
+                self._ahead.append(goal)
+
+    def turn(self, number: int, value: float) -> None:
+        """Set one of the `numbers` anew: what was ahead for it is dropped.
+
+        Args:
+            number: Its place in `Controls.numbers`.
+            value: Its new value.
+        """
+        with self._lock:
+            self._hold(number)
+            numbers = self._end().numbers
+            numbers[number] = value
+            goal = self._end().with_numbers(numbers)
+            if goal != self._end():
+                self._ahead.append(goal)
+
+    def hold(self, number: int) -> None:
+        """Leave one of the `numbers` where it is: what is ahead for it is dropped."""
+        with self._lock:
+            self._hold(number)
+
+    def _hold(self, number: int) -> None:
+        now = self.here.numbers[number]
+        kept: list[Controls] = []
+        for goal in self._ahead:
+            numbers = goal.numbers
+            numbers[number] = now
+            kept.append(goal.with_numbers(numbers))
+        self._keep(kept)
+
+    def _keep(self, goals: Iterable[Controls]) -> None:
+        self._ahead.clear()
+        for goal in goals:
+            if goal != self._end():
+                self._ahead.append(goal)
+
+    def restart(self, here: Controls) -> None:
+        """Stand elsewhere, under another kind of command it may be, and go on to the same goals.
+
+        Goals that are commanded otherwise than the robot is now are dropped.
+        """
+        with self._lock:
+            self.here = here
+            turned = [replace(goal, pointing=here.pointing) for goal in self._ahead]
+            self._keep(goal for goal in turned if goal.same_kind(here))
 
     def clear(self, here: Controls | None = None) -> None:
-        """Forget what is ahead, and stand elsewhere if told so."""
+        """Forget what is ahead, and stand elsewhere if so told."""
         with self._lock:
             self._ahead.clear()
             if here is not None:
@@ -79,15 +120,6 @@ class Way:
                 self._ahead.popleft()
             self.here = step
             return step
-
-
-def _on_the_way(first: Controls, middle: Controls, last: Controls) -> bool:
-    """Whether only one number changes, and goes the same way from first to middle to last."""
-    if not (first.same_kind(middle) and middle.same_kind(last)):
-        return False
-    before, after = middle.numbers - first.numbers, last.numbers - middle.numbers
-    changing = np.flatnonzero((np.abs(before) > _STILL) | (np.abs(after) > _STILL))
-    return len(changing) == 1 and bool(before[changing[0]] * after[changing[0]] >= 0.0)
 
 
 __all__ = ["Way"]
