@@ -17,9 +17,9 @@ FOLDER = Path(nf.__file__).parent
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
     "Linear", "Superelastic", "Frictionless", "Capstan", "Load", "LoadPath", "pull", "solve",
-    "simulate", "Equilibrium", "Path", "State", "tip_from_angles", "equal_stroke", "closing",
-    "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError", "draw",
-    "solve_each", "Batch", "solve_batch", "simulate_batch",
+    "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke", "closing",
+    "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError", "plot",
+    "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
     "Differentiable", "differentiable", "TipResponse", "tip_response",
     "bodies_from_angles", "SharedStroke", "Closing", "ConvergenceError", "Settings",
     "BodyForce", "save_path", "read_path", "read_table",

@@ -72,7 +72,7 @@ def test_loads_from_outside_and_a_turned_base_come_back(turned, tmp_path, suffix
 
 
 def test_a_path_that_failed_comes_back_with_its_reasons(tmp_path):
-    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.draw(0.0, 9.0, steps=3))
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.stroke_path(0.0, 9.0, steps=3))
     assert not path.converged.all()
     nf.save_path(path, tmp_path / "failed.nc")
     found = nf.read_path(tmp_path / "failed.nc")
