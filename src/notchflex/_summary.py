@@ -71,10 +71,13 @@ def short(value: float) -> str:
     """Return a number with four significant digits, without a minus before a zero.
 
     Example:
-        >>> short(-0.0), short(153.1234), short(float("nan"))
-        ('0', '153.1', 'none')
+        >>> short(-0.0), short(153.1234), short(10_000.0), short(float("nan"))
+        ('0', '153.1', '10000', 'none')
     """
-    return "none" if value != value else f"{value + 0.0:.4g}"
+    if value != value:
+        return "none"
+    # Large moduli and stiffnesses are read more easily without an exponent.
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value + 0.0:.4g}"
 
 
 def vector(values: Iterable[float], digits: int | None = None) -> str:

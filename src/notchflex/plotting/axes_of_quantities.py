@@ -18,8 +18,9 @@ from notchflex.plotting.equilibrium import robot_shape, state_shape
 from notchflex.plotting.sheet import BESIDE, INSIDE, Item, Line, Panel
 from notchflex.plotting.style import house_style, sequence_colours
 from notchflex.plotting.with_matplotlib import draw_panel
-from notchflex.results.csv import entries_of, is_listed
+from notchflex.results.csv import Entry, entries_of, is_listed
 from notchflex.results.quantities import QUANTITIES
+from notchflex.results.quantity import Quantity
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:
@@ -150,8 +151,7 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
     headers = {one.header: (one, of) for of in known for one in entries_of(path, of) if one.header}
     if name in headers:
         entry, quantity = headers[name]
-        words = f"{entry.name} {quantity.title}".strip()
-        label = quantity.label.replace(quantity.title, words, 1)
+        label = quantity.label.replace(quantity.title, _title(quantity, entry), 1)
         return Series(label, [""], [name], np.asarray(entry.values, float)[:, None])
     if name in QUANTITIES:
         raise InputError(f"{name} can't be drawn as lines; draw a quantity such as total_angle")
@@ -159,6 +159,14 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
     near = get_close_matches(str(name), choice, 3, 0.5)
     meant = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(choice)}"
     raise InputError(f"there is no quantity {name!r} to draw; {meant}")
+
+
+def _title(quantity: Quantity, entry: Entry) -> str:
+    """Return what one entry is called: "angle of notch 3", "tip position x"."""
+    if not entry.name or quantity.per == ("axis",):
+        return f"{quantity.title} {entry.name}".strip()
+    title = quantity.title.removeprefix(f"{quantity.per[0]} ")
+    return f"{title} of {entry.name}"
 
 
 def _pairs(x: str, across: Series, upward: Series) -> list[tuple[int, int]]:

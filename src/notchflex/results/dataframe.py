@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,11 +29,7 @@ def dataframe_of(path: EquilibriumPath, library: str = "polars") -> Any:
     """
     if library not in LIBRARIES:
         raise InputError(f"to_dataframe makes a table of polars or pandas; got {library!r}")
-    if library == "pandas" and find_spec("pandas") is None:
-        raise InputError(
-            "to_dataframe('pandas') needs pandas, which is not installed: pip install pandas"
-        )
-    need("polars" if library == "polars" else "pandas", "data", "to_dataframe")
+    need(library, "data", f"to_dataframe({library!r})")  # xarray, of the same extra, needs pandas
     columns = {name: np.asarray(values) for name, values in path_columns(path).items()}
     if library == "polars":
         import polars
