@@ -60,11 +60,11 @@ def test_a_quantity_with_several_entries_has_a_line_for_each(path, ax):
 
 def test_a_column_of_the_csv_is_one_entry(path, ax):
     path.plot("notch_2_deg", "notch_2_peak_strain", ax=ax)
-    assert ax.get_xlabel() == r"angle of notch 2 $\theta_j$ [deg]"
+    assert ax.get_xlabel() == r"angle of notch 2 $\theta_2$ [deg]"
     assert ax.get_ylabel().startswith("peak strain of notch 2")
     np.testing.assert_array_equal(ax.get_lines()[0].get_ydata(), path.peak_strain[:5, 1])
     path.plot("step", "tip_z_mm", ax=ax)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("step", "tip position z $p$ [mm]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("step", "tip position z $p_z$ [mm]")
 
 
 def test_equal_tendons_are_drawn_over_each_other(in_space, ax):

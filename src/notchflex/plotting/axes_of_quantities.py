@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -84,8 +84,10 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
             "axes can be given for a path, a state or a robot; the picture of a "
             f"{type(thing).__name__} has axes of its own: plot(it)"
         )
+    figure = _new_figure(panel) if ax is None else None
     with house_style():
-        axes = _new_axes(panel) if ax is None else ax
+        projection = "3d" if panel.in_space else None
+        axes: Any = ax if figure is None else figure.add_subplot(projection=projection)
         if panel.in_space and axes.name != "3d":
             raise InputError(
                 "this robot bends out of one plane; give axes made with projection='3d'"
@@ -151,7 +153,7 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
     headers = {one.header: (one, of) for of in known for one in entries_of(path, of) if one.header}
     if name in headers:
         entry, quantity = headers[name]
-        label = quantity.label.replace(quantity.title, _title(quantity, entry), 1)
+        label = _label(quantity, entry)
         return Series(label, [""], [name], np.asarray(entry.values, float)[:, None])
     if name in QUANTITIES:
         raise InputError(f"{name} can't be drawn as lines; draw a quantity such as total_angle")
@@ -161,12 +163,17 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
     raise InputError(f"there is no quantity {name!r} to draw; {meant}")
 
 
-def _title(quantity: Quantity, entry: Entry) -> str:
-    """Return what one entry is called: "angle of notch 3", "tip position x"."""
-    if not entry.name or quantity.per == ("axis",):
-        return f"{quantity.title} {entry.name}".strip()
-    title = quantity.title.removeprefix(f"{quantity.per[0]} ")
-    return f"{title} of {entry.name}"
+def _label(quantity: Quantity, entry: Entry) -> str:
+    """Return the label of one entry: "angle of notch 3", "tip position x"."""
+    name = entry.name
+    if not name:
+        return quantity.label
+    if quantity.per == ("axis",):
+        title, symbol = f"{quantity.title} {name}", f"{quantity.symbol}_{name}"
+    else:
+        title = f"{quantity.title.removeprefix(f'{quantity.per[0]} ')} of {name}"
+        symbol = quantity.symbol.replace("_j", f"_{name.removeprefix('notch ')}")
+    return replace(quantity, title=title, symbol=symbol).label
 
 
 def _pairs(x: str, across: Series, upward: Series) -> list[tuple[int, int]]:
@@ -185,10 +192,13 @@ def _pairs(x: str, across: Series, upward: Series) -> list[tuple[int, int]]:
     return [(used[0], row) for row in range(upward.values.shape[1])]
 
 
-def _new_axes(panel: Panel) -> Any:
-    """Return axes in a new figure of pyplot, so that a notebook or `pyplot.show()` shows it."""
+def _new_figure(panel: Panel) -> Any:
+    """Return a new figure of pyplot, so that a notebook or `pyplot.show()` shows it.
+
+    It is made outside our style: pyplot chooses its backend, and with it whether figures show
+    themselves, when it makes the first figure, and leaving the style would undo that.
+    """
     from matplotlib import pyplot
 
     size = (5.6, 5.6) if panel.equal or panel.in_space else (6.0, 4.0)
-    projection = {"projection": "3d"} if panel.in_space else {}
-    return pyplot.subplots(figsize=size, layout="constrained", subplot_kw=projection)[1]
+    return pyplot.figure(figsize=size, layout="constrained")

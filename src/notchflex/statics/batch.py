@@ -94,7 +94,7 @@ def solve_batch(
     Args:
         robots: One robot, or one per row.
         loads: One load, or one per row (the steps of a `LoadPath` are loads of their own here).
-        outputs: What to return, by names of `Path`; fewer names are less memory.
+        outputs: What to return, by names of `EquilibriumPath`; fewer names are less memory.
         settings: How hard the solver tries.
         refinement: More strain modes, as for `simulate`.
         cores: How many cores to use; all where not given.

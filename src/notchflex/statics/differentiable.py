@@ -57,7 +57,7 @@ def differentiable(
         parameters: What may vary: numbers of the robot by name (as for `Robot.with_value`, in the
             units of the robot file), and of the loads "tension" (N, steps by tendons), "stroke"
             (mm), "tip_force" (N, steps by 3) and "tip_moment" (N mm).
-        outputs: What to return, by names of `Path`.
+        outputs: What to return, by names of `EquilibriumPath`.
         settings: How hard the solver tries.
         refinement: More strain modes, as for `simulate`.
 
