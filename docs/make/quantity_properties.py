@@ -30,11 +30,11 @@ from jaxtyping import Bool, Float, Int
 '''
 CLASSES = {
     "PathQuantities": (
-        "Quantities of every step: s steps, n notches, t tendons, b = n + 1 bodies.",
+        "Quantities of every step: s steps, n notches, t tendons, n + 1 bodies.",
         ("s",),
     ),
     "EquilibriumQuantities": (
-        "Quantities of one equilibrium: n notches, t tendons, b = n + 1 bodies.",
+        "Quantities of one equilibrium: n notches, t tendons, n + 1 bodies.",
         (),
     ),
 }

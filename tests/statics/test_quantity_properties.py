@@ -1,6 +1,7 @@
 """Typed properties: those of the table of quantities, with the shapes that they promise."""
 
 import importlib.util
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import notchflex as nf
 from notchflex.results.quantities import QUANTITIES
 from notchflex.statics import quantity_properties
 from notchflex.statics.path_formulas import FORMULAS
+from notchflex.statics.quantities import Quantities, Shape
 
 ROOT = Path(__file__).parents[2]
 
@@ -60,7 +62,7 @@ def test_type_checkers_know_the_shapes():
 
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_values_are_what_the_types_say(path, name):
-    sizes = {"s": 3, "t": 1, "n": 5, "b": 6, "3": 3, "spans": 10, "contacts": 9}
+    sizes = {"s": 3, "t": 1, "n": 5, "bodies": 6, "3": 3, "spans": 10, "contacts": 9}
     for thing, leading in ((path, ("s",)), (path[1], ())):
         value = getattr(thing, name)
         mixin = type(thing).__mro__[1]
@@ -77,6 +79,17 @@ def test_values_are_what_the_types_say(path, name):
         assert np.shape(value) == shape
         if not leading and not shape:
             assert type(value) is quantity.kind
+
+
+@pytest.mark.parametrize("fields", [Shape, Quantities])
+def test_what_the_solver_reports_is_in_the_table_with_its_shape(fields):
+    for name, annotation in fields.__annotations__.items():
+        if name in ("friction_holds", "bend_possible"):  # parts of `converged`
+            continue
+        text = getattr(annotation, "__forward_arg__", str(annotation))
+        kind, sizes = re.fullmatch(r"(\w+)\[Array, ['\"]\*s ?([^'\"]*)['\"]\]", text).groups()
+        assert tuple(sizes.split()) == QUANTITIES[name].shape, name
+        assert kind == {float: "Float", int: "Int", bool: "Bool"}[QUANTITIES[name].kind], name
 
 
 def test_formulas_are_of_known_quantities():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 _SIZES = {
     "tendon": "t",
     "notch": "n",
-    "body": "b",
+    "body": "bodies",
     "row": "3",
     "axis": "3",
     "span": "spans",
@@ -59,12 +59,12 @@ class Quantity:
     def shape(self) -> tuple[str, ...]:
         """The sizes of its axes within one step, by letter or number.
 
-        n notches, t tendons, b = n + 1 bodies, and 3 for x, y, z.
+        n notches, t tendons, n + 1 bodies, and 3 for x, y, z.
 
         Example:
             >>> from notchflex.results.quantities import QUANTITIES
             >>> QUANTITIES["body_position"].shape
-            ('b', '3')
+            ('bodies', '3')
         """
         return tuple(_SIZES[axis] for axis in self.per)
 

@@ -49,13 +49,13 @@ def total_chord_angle(path: EquilibriumPath) -> Float[np.ndarray, " s"]:
 
 
 @_formula
-def body_position(path: EquilibriumPath) -> Float[np.ndarray, "s b 3"]:
+def body_position(path: EquilibriumPath) -> Float[np.ndarray, "s bodies 3"]:
     """Turn the positions from the frame of the base into the world."""
     return path.solver_quantity("body_position") @ path.base_to_world.T
 
 
 @_formula
-def body_rotation(path: EquilibriumPath) -> Float[np.ndarray, "s b 3 3"]:
+def body_rotation(path: EquilibriumPath) -> Float[np.ndarray, "s bodies 3 3"]:
     """Turn the rotations from the frame of the base into the world."""
     return path.base_to_world @ path.solver_quantity("body_rotation")
 

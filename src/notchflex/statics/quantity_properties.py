@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 
 class PathQuantities:
-    """Quantities of every step: s steps, n notches, t tendons, b = n + 1 bodies."""
+    """Quantities of every step: s steps, n notches, t tendons, n + 1 bodies."""
 
     def quantity(self, name: str) -> Any:
         """Return a quantity by its name."""
@@ -102,16 +102,16 @@ class PathQuantities:
         return self.quantity("tip_rotation")
 
     @property
-    def body_position(self) -> Float[np.ndarray, "s b 3"]:
-        """Body position, mm, shape (s, b, 3).
+    def body_position(self) -> Float[np.ndarray, "s bodies 3"]:
+        """Body position, mm, shape (s, bodies, 3).
 
         Origin of every rigid body, on the tube axis at its proximal face, base first, in the world.
         """
         return self.quantity("body_position")
 
     @property
-    def body_rotation(self) -> Float[np.ndarray, "s b 3 3"]:
-        """Body rotation, shape (s, b, 3, 3).
+    def body_rotation(self) -> Float[np.ndarray, "s bodies 3 3"]:
+        """Body rotation, shape (s, bodies, 3, 3).
 
         Rotation matrix of every rigid body, base first, in the world.
         """
@@ -347,7 +347,7 @@ class PathQuantities:
 
 
 class EquilibriumQuantities:
-    """Quantities of one equilibrium: n notches, t tendons, b = n + 1 bodies."""
+    """Quantities of one equilibrium: n notches, t tendons, n + 1 bodies."""
 
     def quantity(self, name: str) -> Any:
         """Return a quantity by its name."""
@@ -437,16 +437,16 @@ class EquilibriumQuantities:
         return self.quantity("tip_rotation")
 
     @property
-    def body_position(self) -> Float[np.ndarray, "b 3"]:
-        """Body position, mm, shape (b, 3).
+    def body_position(self) -> Float[np.ndarray, "bodies 3"]:
+        """Body position, mm, shape (bodies, 3).
 
         Origin of every rigid body, on the tube axis at its proximal face, base first, in the world.
         """
         return self.quantity("body_position")
 
     @property
-    def body_rotation(self) -> Float[np.ndarray, "b 3 3"]:
-        """Body rotation, shape (b, 3, 3).
+    def body_rotation(self) -> Float[np.ndarray, "bodies 3 3"]:
+        """Body rotation, shape (bodies, 3, 3).
 
         Rotation matrix of every rigid body, base first, in the world.
         """
