@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, overload
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -152,6 +152,10 @@ class Robot:
 
         return robot_summary(self).html
 
+    @overload
+    def plot(self) -> "Picture": ...
+    @overload
+    def plot(self, *, ax: "Axes") -> "Axes": ...
     def plot(self, *, ax: "Axes | None" = None) -> "Picture | Axes":
         """Draw the robot without loads; see `notchflex.plot`.
 

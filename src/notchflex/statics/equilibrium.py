@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -33,11 +33,11 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         >>> solve(load_robot("pacheco2021-a"), Load(tension=1.0))
         Equilibrium of Pacheco 2021, wrist A
           load            tension 1 N
-          total angle     51.54 deg
-          notch angles    11.9, 10.9, 10.2, 9.5, 9.0 deg
-          tip position    (4.739, 0.000, 8.250) mm
+          total angle     51.50 deg
+          notch angles    11.2, 10.4, 10.2, 9.9, 9.7 deg
+          tip position    (4.513, 0.000, 7.879) mm
           tendon tension  1 N
-          tendon stroke   1.248 mm
+          tendon stroke   1.246 mm
           converged       yes
     """
 
@@ -94,8 +94,8 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         Example:
             >>> from notchflex import Load, load_robot, solve
             >>> found = solve(load_robot("pacheco2021-a"), Load(tension=1.0)).to_dict()
-            >>> found["load"], round(found["total_angle_deg"], 2)
-            ({'tension_N': [1.0], 'stroke_mm': [None]}, 51.54)
+            >>> found["load"], round(found["total_angle_deg"], 1)
+            ({'tension_N': [1.0], 'stroke_mm': [None]}, 51.5)
         """
         from notchflex.results.json import step_document
 
@@ -105,6 +105,10 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         """This state as a labelled data set: what `EquilibriumPath.to_xarray` has, at this step."""
         return self._path.to_xarray().isel(step=self._step)
 
+    @overload
+    def plot(self) -> Picture: ...
+    @overload
+    def plot(self, *, ax: Axes) -> Axes: ...
     def plot(self, *, ax: Axes | None = None) -> Picture | Axes:
         """Draw this state; see `notchflex.plot`.
 
