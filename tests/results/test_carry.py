@@ -80,6 +80,22 @@ def test_a_path_that_failed_comes_back_with_its_reasons(tmp_path):
     assert found.reason == path.reason
 
 
+def test_a_document_of_the_first_version_with_steps_not_tried_is_read(tmp_path):
+    """It had zeros where now the last good state is repeated."""
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.stroke_path(0.0, 9.0, steps=4))
+    assert not path.run.tried[3]
+    file = tmp_path / "failed.json"
+    nf.save_path(path, file)
+    document = json.loads(file.read_text())
+    document["steps"][3]["total_angle_deg"] = 0.0
+    file.write_text(json.dumps(document))
+    assert_same(nf.read_path(file), path)
+    document["steps"][2]["total_angle_deg"] = 0.0
+    file.write_text(json.dumps(document))
+    with pytest.raises(InputError, match="was changed"):
+        nf.read_path(file)
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_a_table_comes_back_to_the_printed_digits(loop, tmp_path, suffix):
     nf.save_path(loop, tmp_path / f"loop{suffix}")
