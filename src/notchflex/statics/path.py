@@ -15,6 +15,7 @@ from notchflex._summary import Displayed, Summary
 from notchflex.chain import Chain
 from notchflex.motion import rotation_about
 from notchflex.robot import Robot
+from notchflex.statics.actuation import Command
 from notchflex.statics.applied import out_of_frame
 from notchflex.statics.command import command
 from notchflex.statics.equilibrium import ConvergenceError, Equilibrium
@@ -108,9 +109,10 @@ class EquilibriumPath(PathQuantities, Displayed):
         return {}
 
     @cached_property
-    def base_to_world(self) -> Float[np.ndarray, "3 3"]:
-        """Rotation of the base in the world, shape (3, 3)."""
-        return np.asarray(rotation_about(constant(self.load.base_rotation)))
+    def base_to_world(self) -> Float[np.ndarray, "3 3"] | None:
+        """Rotation of the base in the world, shape (3, 3); None for a base that is not turned."""
+        turn = self.load.base_rotation
+        return np.asarray(rotation_about(constant(turn))) if any(turn.tolist()) else None
 
     @property
     def front(self) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
@@ -124,9 +126,14 @@ class EquilibriumPath(PathQuantities, Displayed):
         return self.quantity("front")
 
     @cached_property
+    def commands(self) -> Command:
+        """The loads as the solver takes them."""
+        return command(self.load, self.robot, self.chain)
+
+    @cached_property
     def stability(self) -> tuple[np.ndarray, np.ndarray]:
         """Smallest eigenvalue of the stiffness, N mm, and sign of its determinant, (s,) each."""
-        value, sign = self.run.stability(command(self.load, self.robot, self.chain))
+        value, sign = self.run.stability(self.commands)
         return np.asarray(value), np.asarray(sign)
 
     def state_at(self, step: int) -> State:

@@ -51,19 +51,20 @@ def total_chord_angle(path: EquilibriumPath) -> Float[np.ndarray, " s"]:
 @_formula
 def body_position(path: EquilibriumPath) -> Float[np.ndarray, "s bodies 3"]:
     """Turn the positions from the frame of the base into the world."""
-    return path.solver_quantity("body_position") @ path.base_to_world.T
+    return _in_world(path, "body_position")
 
 
 @_formula
 def body_rotation(path: EquilibriumPath) -> Float[np.ndarray, "s bodies 3 3"]:
     """Turn the rotations from the frame of the base into the world."""
-    return path.base_to_world @ path.solver_quantity("body_rotation")
+    turn, rotation = path.base_to_world, path.solver_quantity("body_rotation")
+    return rotation if turn is None else turn @ rotation
 
 
 @_formula
 def tip_position(path: EquilibriumPath) -> Float[np.ndarray, "s 3"]:
     """Turn the tip from the frame of the base into the world."""
-    return path.solver_quantity("tip_position") @ path.base_to_world.T
+    return _in_world(path, "tip_position")
 
 
 @_formula
@@ -75,13 +76,13 @@ def tip_rotation(path: EquilibriumPath) -> Float[np.ndarray, "s 3 3"]:
 @_formula
 def base_force(path: EquilibriumPath) -> Float[np.ndarray, "s 3"]:
     """Turn the force from the frame of the base into the world."""
-    return path.solver_quantity("base_force") @ path.base_to_world.T
+    return _in_world(path, "base_force")
 
 
 @_formula
 def base_moment(path: EquilibriumPath) -> Float[np.ndarray, "s 3"]:
     """Turn the moment from the frame of the base into the world."""
-    return path.solver_quantity("base_moment") @ path.base_to_world.T
+    return _in_world(path, "base_moment")
 
 
 @_formula
@@ -162,6 +163,12 @@ def determinant_sign(path: EquilibriumPath) -> Float[np.ndarray, " s"]:
 def stable(path: EquilibriumPath) -> Bool[np.ndarray, " s"]:
     """Test the smallest eigenvalue and the sign of the determinant."""
     return (path.smallest_eigenvalue > 0.0) & (path.determinant_sign > 0.0)
+
+
+def _in_world(path: EquilibriumPath, name: str) -> np.ndarray:
+    """Turn vectors, as last axis, from the frame of the base into the world."""
+    turn, vectors = path.base_to_world, path.solver_quantity(name)
+    return vectors if turn is None else vectors @ turn.T
 
 
 def _accumulated(path: EquilibriumPath, force: str, length: str) -> np.ndarray:
