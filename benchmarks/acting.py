@@ -58,7 +58,7 @@ class State:
         undecided: Whether a contact force is reported that may stand on either of two edges.
     """
 
-    def __init__(self, robot: nf.Robot, path: nf.Path, step: int) -> None:
+    def __init__(self, robot: nf.Robot, path: nf.EquilibriumPath, step: int) -> None:
         self.robot, self.step = robot, step
         self.origin, self.rotation = path.body_position[step], path.body_rotation[step]
         self.load = path.load.external[step]
@@ -137,7 +137,7 @@ class State:
         """Body in which a tendon ends."""
         return self.robot.tendon[number].end_body or len(self.robot.notches)
 
-    def _external(self, path: nf.Path):
+    def _external(self, path: nf.EquilibriumPath):
         """Loads from outside, as the load tells them."""
         load, last, none = self.load, len(self.origin) - 1, np.zeros(3)
         for one in load.body_forces:

@@ -59,7 +59,7 @@ class Arcs(NamedTuple):
     problems: list[str]
 
 
-def judge_arcs(state: State, path: nf.Path) -> Arcs:
+def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
     """Fit strains to the poses of one step, and add up every arc notch.
 
     Args:
@@ -144,7 +144,12 @@ def _out_of_balance(
 
 
 def _disagreeing(
-    state: State, path: nf.Path, notch: int, modes: np.ndarray, precurved: float, lip: float
+    state: State,
+    path: nf.EquilibriumPath,
+    notch: int,
+    modes: np.ndarray,
+    precurved: float,
+    lip: float,
 ) -> list[str]:
     """Gap as the lips' fibre has it."""
     height = state.robot.notches[notch].height

@@ -32,7 +32,7 @@ SHARP = 1e-10  # of rotations
 _NEAR = 1e-7
 
 
-def wrong(robot: nf.Robot, loads: Any, path: nf.Path) -> list[str]:
+def wrong(robot: nf.Robot, loads: Any, path: nf.EquilibriumPath) -> list[str]:
     """Tell what does not hold of the solved steps of a path.
 
     NaN would pass for right here; it is looked for by `silent` in robustness.py.
@@ -82,7 +82,7 @@ def _demanded(loads: Any, tendons: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _commands(
-    tension: np.ndarray, stroke: np.ndarray, state: State, path: nf.Path
+    tension: np.ndarray, stroke: np.ndarray, state: State, path: nf.EquilibriumPath
 ) -> Iterator[str]:
     """Tensions and strokes are as demanded; a tendon with too much length is slack."""
     near = _NEAR * state.height
@@ -99,7 +99,7 @@ def _commands(
             yield f"{name}: {drawn[number]:.6g} mm, not {stroke[number]:.6g}"
 
 
-def _poses(state: State, path: nf.Path) -> list[str]:
+def _poses(state: State, path: nf.EquilibriumPath) -> list[str]:
     """Rotations are rotations; angles and tip are those of the bodies."""
     found = []
     step, turn = state.step, state.rotation
@@ -121,7 +121,7 @@ def _poses(state: State, path: nf.Path) -> list[str]:
     return found
 
 
-def _whole(state: State, path: nf.Path) -> list[str]:
+def _whole(state: State, path: nf.EquilibriumPath) -> list[str]:
     """Holder, drives and loads balance; moments are about the proximal end."""
     step, origin = state.step, np.zeros(3)
     force, moment, sizes = state.beyond_with_size(0, origin)
@@ -143,7 +143,7 @@ def _whole(state: State, path: nf.Path) -> list[str]:
     return found
 
 
-def _contacts(state: State, path: nf.Path) -> list[str]:
+def _contacts(state: State, path: nf.EquilibriumPath) -> list[str]:
     """Closed notches: force and gap not negative, one of them nil, gaps those of the poses."""
     step, found = state.step, []
     force, gap = path.contact_force[step], path.gap[step]

@@ -73,7 +73,7 @@ class Outcome:
     wrong: list[str] = field(default_factory=list)
 
 
-def silent(path: nf.Path) -> list[str]:
+def silent(path: nf.EquilibriumPath) -> list[str]:
     """What a path of one load fails to tell."""
     if not path.converged[0]:
         return [] if path.reason[0] else ["not converged, and no reason"]

@@ -17,7 +17,7 @@ STROKE, LENGTH = 1e-6, 1e-11
 _Z = np.array([0.0, 0.0, 1.0])
 
 
-def judge_ropes(state: State, path: nf.Path, arcs: Arcs) -> list[str]:
+def judge_ropes(state: State, path: nf.EquilibriumPath, arcs: Arcs) -> list[str]:
     """Judge strokes, turning angles, friction and tensions of one step.
 
     Args:
@@ -106,7 +106,7 @@ def _free_arc(notch: nf.ArcNotch, tube: nf.Tube) -> tuple[np.ndarray, np.ndarray
 
 
 def _stroke(
-    state: State, path: nf.Path, number: int, shorter: np.ndarray, lengths: np.ndarray
+    state: State, path: nf.EquilibriumPath, number: int, shorter: np.ndarray, lengths: np.ndarray
 ) -> list[str]:
     """The stroke is what the poses set free and what the tendon is stretched."""
     tendon, tension = state.robot.tendon[number], state.tension[number]
@@ -121,7 +121,9 @@ def _stroke(
     return []
 
 
-def _friction(state: State, path: nf.Path, number: int, turning: np.ndarray) -> list[str]:
+def _friction(
+    state: State, path: nf.EquilibriumPath, number: int, turning: np.ndarray
+) -> list[str]:
     """Tensions are not negative, fall by the log ratios, and these are within their bound."""
     step, name, found = state.step, f"tendon {number + 1}", []
     ratio = path.contact_log_ratio[step, number]

@@ -32,7 +32,7 @@ _LEVER = 3.0
 MOMENT = 1e-6
 
 
-def judge_strips(state: State, path: nf.Path) -> list[str]:
+def judge_strips(state: State, path: nf.EquilibriumPath) -> list[str]:
     """Problems of the strips and U-links of one step; none where the robot leaves its plane."""
     robot, step = state.robot, state.step
     normal = plane_normal(state)

@@ -5,7 +5,7 @@ from math import degrees
 import notchflex as nf
 
 wrist = nf.load_robot("pacheco2021-a")
-path = nf.simulate(wrist, nf.draw(0.0, 3.0, steps=31).release()).raise_if_failed()
+path = nf.simulate(wrist, nf.stroke_path(0.0, 3.0, steps=31).release()).raise_if_failed()
 
 # At equal stroke loading and unloading give nearly the same angle, but different tensions.
 for millimetres in (1.0, 2.0, 3.0):

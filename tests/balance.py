@@ -7,7 +7,7 @@ import numpy as np
 import notchflex as nf
 
 
-def left_over(path: nf.Path) -> tuple[np.ndarray, np.ndarray]:
+def left_over(path: nf.EquilibriumPath) -> tuple[np.ndarray, np.ndarray]:
     """What holder, drives and loads leave unbalanced of force and moment, each over its size.
 
     The size is the sum of the magnitudes of all that acts. Moments are about the origin of the
@@ -23,7 +23,7 @@ def left_over(path: nf.Path) -> tuple[np.ndarray, np.ndarray]:
     return force, moment
 
 
-def cone_used(path: nf.Path) -> np.ndarray:
+def cone_used(path: nf.EquilibriumPath) -> np.ndarray:
     """Friction over the largest that the contacts can bear, from tensions and turning alone.
 
     (s, t, contacts); 0 where no tendon is. At a corner (Gao 2017, Liu 2022) it is the friction
@@ -67,7 +67,7 @@ def _ratio(friction: np.ndarray, normal: np.ndarray, coefficient: float) -> np.n
     return np.divide(size, bound, out=without, where=there & (bound > 0.0))
 
 
-def _acting(path: nf.Path, step: int) -> list[tuple[np.ndarray, np.ndarray]]:
+def _acting(path: nf.EquilibriumPath, step: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """Every force with its moment about the origin; moments alone with no force."""
     external, nothing = path.load.external[step], np.zeros(3)
     bodies = list(zip(path.body_position[step], path.body_rotation[step], strict=True))

@@ -28,19 +28,19 @@ def robot() -> nf.Robot:
 
 
 @cache
-def pulled_and_let_go(refinement: int = 0) -> nf.Path:
+def pulled_and_let_go(refinement: int = 0) -> nf.EquilibriumPath:
     """0 to 13 N by 1 N and back."""
     return nf.simulate(robot(), nf.pull(0.0, 13.0, PULLED).release(), refinement=refinement)
 
 
 @cache
-def squeezed() -> nf.Path:
+def squeezed() -> nf.EquilibriumPath:
     """0 to 25 N by 1 N: slots close."""
     return nf.simulate(robot(), nf.pull(0.0, 25.0, 26))
 
 
 @cache
-def under_weight(case: int, refinement: int = 0) -> nf.Path:
+def under_weight(case: int, refinement: int = 0) -> nf.EquilibriumPath:
     """A case of the table of external loads: the weight first, then the tendon by 1 N."""
     loads = [weight_load(*row[:3]) for row in external_rows(case)]
     return nf.simulate(robot(), loads, refinement=refinement)
@@ -62,6 +62,6 @@ def external_rows(case: int) -> np.ndarray:
     return choose(reference("gao_external_loads.csv"), case=(0, case))
 
 
-def tip(path: nf.Path) -> np.ndarray:
+def tip(path: nf.EquilibriumPath) -> np.ndarray:
     """Tip in the coordinates of the tables: y away from the tendon, z along the tube, mm."""
     return path.tip_position[:, [0, 2]] * [-1.0, 1.0]

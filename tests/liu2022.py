@@ -31,7 +31,7 @@ def liu(model: int, mu: float, turning: str = "chord") -> nf.Robot:
     return nf.load_robot("liu2022").with_values(values)
 
 
-def pulled(robot: nf.Robot, forces: ArrayLike) -> nf.Path:
+def pulled(robot: nf.Robot, forces: ArrayLike) -> nf.EquilibriumPath:
     """Pull from rest through the tensions of one cable, or of both [N]."""
     rows = np.asarray(forces, dtype=float)
     assert len(rows) == STEPS

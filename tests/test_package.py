@@ -17,9 +17,9 @@ FOLDER = Path(nf.__file__).parent
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
     "Linear", "Superelastic", "Frictionless", "Capstan", "Load", "LoadPath", "pull", "solve",
-    "simulate", "Equilibrium", "Path", "State", "tip_from_angles", "equal_stroke", "closing",
-    "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError", "draw",
-    "solve_each", "Batch", "solve_batch", "simulate_batch",
+    "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",
+    "closing", "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError",
+    "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
     "Differentiable", "differentiable", "TipResponse", "tip_response",
     "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus", "Kink",
     "ConvergenceError", "Settings",
@@ -50,6 +50,20 @@ def test_names():
         assert name in dir(nf)
     with pytest.raises(AttributeError, match="nothing_like_it"):
         _ = nf.nothing_like_it
+
+
+def test_only_public_names_are_listed():
+    assert {name for name in dir(nf) if not name.startswith("__")} == set(NAMES)
+    assert "import_module" not in vars(nf)
+
+
+@pytest.mark.parametrize(("old", "new"), [("Path", "EquilibriumPath"), ("draw", "stroke_path")])
+def test_old_names_still_work_with_a_warning(old, new):
+    with pytest.warns(DeprecationWarning, match=f"notchflex.{old} is now notchflex.{new}"):
+        found = getattr(nf, old)
+    assert found is getattr(nf, new)
+    assert old not in dir(nf)
+    assert old not in nf.__all__
 
 
 def test_type_checkers_see_the_same_names_from_the_same_places():

@@ -1,4 +1,4 @@
-"""The folder of compiled programs: private, verified, bounded; what others could write is not run."""
+"""The folder of compiled programs: private, verified and bounded in size."""
 
 import os
 import subprocess

@@ -16,7 +16,7 @@ READINGS = ("pull along the gap", "small deflection", "dead pull", "follower")
 COEFFICIENTS = (0.0, 0.1, 0.15, 0.2, 0.3)
 
 
-def run(model: int, mu: float, turning: str = "chord") -> tuple[nf.Path, np.ndarray]:
+def run(model: int, mu: float, turning: str = "chord") -> tuple[nf.EquilibriumPath, np.ndarray]:
     """Pull the robot in one reading of the paper, and read the rows of the table beside it."""
     if turning == "slope":
         rows = choose(reference("liu_robot_slope.csv"), mu=(0, mu))

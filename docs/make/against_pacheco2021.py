@@ -16,7 +16,7 @@ from robots import linear_copy, ready
 MODELS = ("full", "linear, with friction", "linear, frictionless", "kinematic (equal strokes)")
 
 
-def curves() -> dict[tuple[str, int], tuple[nf.Path, np.ndarray]]:
+def curves() -> dict[tuple[str, int], tuple[nf.EquilibriumPath, np.ndarray]]:
     """Pull every wrist, cut in either way, to 3 N, and read the rows of the table beside it."""
     table = reference("pacheco_force_curves.csv")
     found = {}

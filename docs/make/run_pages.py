@@ -22,8 +22,9 @@ from pathlib import Path
 from notchflex.cli import run
 
 DOCS = Path(__file__).resolve().parents[1]
-# Examples are run, and written, by themselves; how often a calibration solves hangs on rounding.
-BY_THEMSELVES = ("examples.md", "calibrate.md")
+# Examples and the notebook are run, and written, by themselves; how often a calibration solves
+# hangs on rounding.
+BY_THEMSELVES = ("examples.md", "calibrate.md", "notebook.md")
 PAGES = tuple(sorted(page.name for page in DOCS.glob("*.md") if page.name not in BY_THEMSELVES))
 BLOCK = re.compile(
     r'^```(?P<kind>\w+)(?: title="(?P<title>[^"]+)")?\n(?P<body>.*?)^```\n'

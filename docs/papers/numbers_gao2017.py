@@ -34,7 +34,7 @@ def geometry() -> dict[str, str]:
     }
 
 
-def pulled(path: nf.Path) -> dict[str, str]:
+def pulled(path: nf.EquilibriumPath) -> dict[str, str]:
     """The free bending to 13 N and back."""
     top, down = path[PULLED - 1], range(PULLED, 2 * PULLED)
     tension, angle = top.span_tension[0], np.degrees(top.notch_angle)

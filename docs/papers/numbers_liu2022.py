@@ -27,7 +27,7 @@ def robot(mu: float, reading: str = "gap", small: bool = False, **values: object
     return nf.load_robot("liu2022").with_values(changed)
 
 
-def pulled(one: nf.Robot, forces: ArrayLike) -> nf.Path:
+def pulled(one: nf.Robot, forces: ArrayLike) -> nf.EquilibriumPath:
     """Pull the first cable through forces, N."""
     loads = [nf.Load(tension=float(force)) for force in np.asarray(forces)]
     return nf.simulate(one, loads).raise_if_failed()

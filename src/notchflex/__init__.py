@@ -5,8 +5,6 @@ Names are loaded when first used (PEP 562), so that importing the package costs 
 not import JAX.  The first use of a computing name imports JAX and switches it to 64-bit floats.
 """
 
-from importlib import import_module
-
 __version__ = "0.1.0"
 
 # Public name -> the package that exports it. `__init__.pyi` lists the same names for type checkers.
@@ -33,6 +31,7 @@ _HOME = {
         "notchflex.robot",
     ),
     **dict.fromkeys(("read_path", "read_table", "save_path"), "notchflex.results"),
+    "plot": "notchflex._plot",
     **dict.fromkeys(("Section", "annular_sector", "annular_segment"), "notchflex.section"),
     **dict.fromkeys(("Elastica", "elastica", "modulus_from_single_notch"), "notchflex.flexure"),
     **dict.fromkeys(
@@ -45,9 +44,9 @@ _HOME = {
             "Differentiable",
             "Equilibrium",
             "Kink",
+            "EquilibriumPath",
             "Load",
             "LoadPath",
-            "Path",
             "Settings",
             "SharedStroke",
             "State",
@@ -55,7 +54,6 @@ _HOME = {
             "bodies_from_angles",
             "closing",
             "differentiable",
-            "draw",
             "equal_stroke",
             "pull",
             "simulate",
@@ -63,6 +61,7 @@ _HOME = {
             "solve",
             "solve_batch",
             "solve_each",
+            "stroke_path",
             "tip_from_angles",
             "tip_response",
         ),
@@ -94,11 +93,22 @@ _HOME = {
     ),
 }
 
+# Old name -> the name that replaces it. They still work, with a warning, and are not listed.
+_RENAMED = {"Path": "EquilibriumPath", "draw": "stroke_path"}
+
 __all__ = [*sorted(_HOME), "__version__"]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> object:
     """Import the home of a public name on first use and keep the name here."""
+    from importlib import import_module
+
+    if name in _RENAMED:
+        from warnings import warn
+
+        new = _RENAMED[name]
+        warn(f"notchflex.{name} is now notchflex.{new}", DeprecationWarning, stacklevel=2)
+        return __getattr__(new)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(_HOME[name]), name)
@@ -108,4 +118,4 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     """List the public names, loaded or not."""
-    return sorted({*globals(), *_HOME})
+    return sorted({"__doc__", "__file__", "__name__", "__path__", *__all__})

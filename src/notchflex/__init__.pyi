@@ -1,3 +1,4 @@
+from notchflex._plot import plot as plot
 from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.fit import Calibration as Calibration
@@ -49,10 +50,10 @@ from notchflex.statics import ClosingStatus as ClosingStatus
 from notchflex.statics import ConvergenceError as ConvergenceError
 from notchflex.statics import Differentiable as Differentiable
 from notchflex.statics import Equilibrium as Equilibrium
+from notchflex.statics import EquilibriumPath as EquilibriumPath
 from notchflex.statics import Kink as Kink
 from notchflex.statics import Load as Load
 from notchflex.statics import LoadPath as LoadPath
-from notchflex.statics import Path as Path
 from notchflex.statics import Settings as Settings
 from notchflex.statics import SharedStroke as SharedStroke
 from notchflex.statics import State as State
@@ -60,7 +61,6 @@ from notchflex.statics import TipResponse as TipResponse
 from notchflex.statics import bodies_from_angles as bodies_from_angles
 from notchflex.statics import closing as closing
 from notchflex.statics import differentiable as differentiable
-from notchflex.statics import draw as draw
 from notchflex.statics import equal_stroke as equal_stroke
 from notchflex.statics import pull as pull
 from notchflex.statics import simulate as simulate
@@ -68,6 +68,7 @@ from notchflex.statics import simulate_batch as simulate_batch
 from notchflex.statics import solve as solve
 from notchflex.statics import solve_batch as solve_batch
 from notchflex.statics import solve_each as solve_each
+from notchflex.statics import stroke_path as stroke_path
 from notchflex.statics import tip_from_angles as tip_from_angles
 from notchflex.statics import tip_response as tip_response
 

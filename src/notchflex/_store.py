@@ -200,7 +200,7 @@ def _files(folder: Path) -> list[tuple[float, int, str]]:
     found: list[tuple[float, int, str]] = []
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if entry.name.startswith(_PREFIX) and entry.is_file(follow_symlinks=False):
+            if entry.is_file(follow_symlinks=False):  # those of JAX too
                 about = entry.stat(follow_symlinks=False)
                 found.append((about.st_mtime, about.st_size, entry.name))
     return found

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from notchflex import _canary
+from notchflex import _canary, _store
 from notchflex.cli import run
-from notchflex.cli.doctor import folder_size, requirements
+from notchflex.cli.doctor import requirements
 
 
 @pytest.fixture
@@ -68,11 +68,14 @@ def test_requirements_of_this_wheel():
     assert "ruff" not in found[""]
 
 
-def test_size_of_a_folder(tmp_path):
-    assert folder_size(tmp_path / "none") == 0
-    (tmp_path / "a").mkdir()
-    (tmp_path / "a" / "b").write_bytes(b"123")
-    assert folder_size(tmp_path) == 3
+def test_kept_programs_are_counted_and_cleared(call, tmp_path, monkeypatch):
+    monkeypatch.setenv(_store.VARIABLE, str(tmp_path))
+    _store.write("one", b"123")
+    code, out, err = call("doctor", "--clear-cache", "--json", "-")
+    assert code == 0
+    assert "removed 1 programs" in err
+    assert json.loads(out)["compile_cache"]["programs"] == 0
+    assert _store.read("one") is None
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

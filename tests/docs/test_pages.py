@@ -17,7 +17,7 @@ import notchflex as nf
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
-BY_THEMSELVES = ["calibrate.md", "examples.md"]  # run by tests of their own
+BY_THEMSELVES = ["calibrate.md", "examples.md", "notebook.md"]  # run by tests of their own
 RUN = [name for name in PAGES if "/" not in name and name not in BY_THEMSELVES]
 
 

@@ -72,12 +72,28 @@ def test_loads_from_outside_and_a_turned_base_come_back(turned, tmp_path, suffix
 
 
 def test_a_path_that_failed_comes_back_with_its_reasons(tmp_path):
-    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.draw(0.0, 9.0, steps=3))
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.stroke_path(0.0, 9.0, steps=3))
     assert not path.converged.all()
     nf.save_path(path, tmp_path / "failed.nc")
     found = nf.read_path(tmp_path / "failed.nc")
     assert_same(found, path)
     assert found.reason == path.reason
+
+
+def test_a_document_of_the_first_version_with_steps_not_tried_is_read(tmp_path):
+    """It had zeros where now the last good state is repeated."""
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.stroke_path(0.0, 9.0, steps=4))
+    assert not path.run.tried[3]
+    file = tmp_path / "failed.json"
+    nf.save_path(path, file)
+    document = json.loads(file.read_text())
+    document["steps"][3]["total_angle_deg"] = 0.0
+    file.write_text(json.dumps(document))
+    assert_same(nf.read_path(file), path)
+    document["steps"][2]["total_angle_deg"] = 0.0
+    file.write_text(json.dumps(document))
+    with pytest.raises(InputError, match="was changed"):
+        nf.read_path(file)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])

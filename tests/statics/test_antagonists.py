@@ -17,7 +17,7 @@ def elastic() -> nf.Robot:
 
 
 @pytest.fixture(scope="module")
-def pretensioned(elastic) -> nf.Path:
+def pretensioned(elastic) -> nf.EquilibriumPath:
     return nf.simulate(elastic, [nf.Load(tension=(3.0, 3.0))]).raise_if_failed()
 
 

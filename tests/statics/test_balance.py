@@ -37,7 +37,7 @@ CASES = {
 
 
 @cache
-def loaded(name: str, refinement: int = 0) -> list[nf.Path]:
+def loaded(name: str, refinement: int = 0) -> list[nf.EquilibriumPath]:
     """Pulled under all loads; then tendons and loads changed, the tendons keeping in mind."""
     case, robot = CASES[name], nf.load_robot(name)
     assert robot.material.density is not None

@@ -23,7 +23,7 @@ def robot() -> nf.Robot:
     )
 
 
-def run(robot: nf.Robot, first, force) -> nf.Path:
+def run(robot: nf.Robot, first, force) -> nf.EquilibriumPath:
     """Tension of the first tendon and a force across the tip, step by step; 0.4 N on the second."""
     first, force = np.broadcast_arrays(np.atleast_1d(first), np.atleast_1d(force))
     loads = [
@@ -39,7 +39,7 @@ def ramp(*turns: float, steps: int = 12) -> np.ndarray:
     return np.concatenate([[turns[0]], *parts])
 
 
-def work(path: nf.Path, force: np.ndarray, start: int, stop: int) -> float:
+def work(path: nf.EquilibriumPath, force: np.ndarray, start: int, stop: int) -> float:
     """Work of all that acts from outside from one step to another, by the trapezoid rule."""
     pulled = 0.5 * (path.tension[start + 1 : stop + 1] + path.tension[start:stop])
     drawn = np.diff(path.stroke[start : stop + 1], axis=0)

@@ -32,24 +32,24 @@ def legs(turns: list[float], steps_per_newton: float) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def simulate(robot: nf.Robot, tension: np.ndarray) -> nf.Path:
+def simulate(robot: nf.Robot, tension: np.ndarray) -> nf.EquilibriumPath:
     path = nf.simulate(robot, tensions(tension))
     assert path.converged.all(), [reason for reason in path.reason if reason][:3]
     return path
 
 
-def tendon_work(path: nf.Path, start: int = 0) -> float:
+def tendon_work(path: nf.EquilibriumPath, start: int = 0) -> float:
     """Integral of T ds at the base [N mm] from step `start` on."""
     return float(np.trapezoid(path.tension[start:, 0], path.stroke[start:, 0]))
 
 
-def friction_work(path: nf.Path, start: int = 0) -> np.ndarray:
+def friction_work(path: nf.EquilibriumPath, start: int = 0) -> np.ndarray:
     """Loss at every contact [N mm]: tension lost over it times the tendon that slid over it."""
     span, slid = path.span_tension[start:, 0], path.contact_slid[start:, 0]
     return np.trapezoid(span[:, :-1] - span[:, 1:], slid, axis=0)
 
 
-def stored(path: nf.Path, step: int) -> float:
+def stored(path: nf.EquilibriumPath, step: int) -> float:
     """Elastic energy [N mm] of wrist A at a step: integral of the material law over the angle."""
     wrist = WRISTS["A"]
     law, energy = wrist.material, 0.0
@@ -117,7 +117,7 @@ def test_closed_inner_loop(margin):
     check_loop(path, start, margin)
 
 
-def check_loop(path: nf.Path, start: int, margin) -> None:
+def check_loop(path: nf.EquilibriumPath, start: int, margin) -> None:
     work, lost = tendon_work(path, start), friction_work(path, start)
     margin.within("work of the loop = dissipation", (work - lost.sum()) / work, 1e-6)
     assert work > 0.05, "nothing is lost round the loop"

@@ -29,7 +29,9 @@ ORACLES = {
 }
 
 
-def compare(wrist: Wrist, robot: nf.Robot, tension: Sequence[float], margin, what: str) -> nf.Path:
+def compare(
+    wrist: Wrist, robot: nf.Robot, tension: Sequence[float], margin, what: str
+) -> nf.EquilibriumPath:
     """Assert that a history of base tensions [N] leaves the package where the oracle is."""
     path = nf.simulate(robot, tensions(tension))
     assert path.converged.all(), [r for r in path.reason if r]

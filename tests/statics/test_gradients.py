@@ -33,7 +33,7 @@ CASES = {
     ),
     "wrist, stroke": (
         "pacheco2021-a",
-        nf.draw(0.0, 0.8, steps=3),
+        nf.stroke_path(0.0, 0.8, steps=3),
         ["notch.depth", "friction.coefficient", "stroke"],
     ),
     "strips": (
@@ -56,7 +56,7 @@ def judged(found: dict[str, jax.Array]) -> jax.Array:
     return found["total_angle"][-1] + 0.1 * jnp.sum(found["tip_position"][-1]) + slid
 
 
-def seen(path: nf.Path) -> float:
+def seen(path: nf.EquilibriumPath) -> float:
     return float(judged({name: jnp.asarray(getattr(path, name)) for name in OUTPUTS}))
 
 
@@ -154,7 +154,7 @@ def test_it_maps_and_compiles(margin):
 
 def test_what_is_not_solved_has_no_slope():
     robot = nf.load_robot("pacheco2021-a")
-    draw = nf.differentiable(robot, nf.draw(50.0, 50.0, steps=1), ["stroke"])
+    draw = nf.differentiable(robot, nf.stroke_path(50.0, 50.0, steps=1), ["stroke"])
     assert not draw()["converged"][0]
     assert np.isnan(jax.grad(lambda v: draw(v)["total_angle"][0])(draw.start)["stroke"]).all()
 

@@ -56,7 +56,7 @@ def test_load_paths_are_numbers(value):
         nf.LoadPath(value, [[NAN]])
 
 
-@pytest.mark.parametrize("make", [nf.pull, nf.draw])
+@pytest.mark.parametrize("make", [nf.pull, nf.stroke_path])
 @pytest.mark.parametrize("wrong", [2.5, "5", True, None, 0, -1])
 def test_steps_and_tendon_are_whole_numbers(make, wrong):
     with pytest.raises(InputError, match="step"):
@@ -73,7 +73,7 @@ def test_ends_of_a_ramp_are_finite_numbers(end):
 
 
 def test_paths_of_different_tendons_follow_each_other():
-    both = nf.pull(0, 1, 2).then(nf.draw(0, 0.5, 2, tendon=2))
+    both = nf.pull(0, 1, 2).then(nf.stroke_path(0, 0.5, 2, tendon=2))
     np.testing.assert_array_equal(both.tension, [[0, NAN], [1, NAN], [NAN, NAN], [NAN, NAN]])
     np.testing.assert_array_equal(both.stroke[2:], [[NAN, 0.0], [NAN, 0.5]])
     back = nf.pull(0, 1, 2, tendon=2).then(nf.pull(0, 1, 2))

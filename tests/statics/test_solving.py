@@ -18,7 +18,7 @@ def wrist() -> nf.Robot:
 
 
 def test_failure_is_data_with_the_last_good_state(wrist: nf.Robot) -> None:
-    load = nf.draw(3.0, 4.2, steps=3)
+    load = nf.stroke_path(3.0, 4.2, steps=3)
     path = nf.simulate(wrist, load)
     assert path.converged.tolist() == [True, True, False]
     assert "every notch closed" in path.reason[2]
@@ -120,10 +120,10 @@ def test_a_new_load_or_robot_of_the_same_shape_compiles_nothing(
 ) -> None:
     monkeypatch.setattr(Kept, "folder", None)  # programs that are loaded are not counted
     nf.simulate(wrist, nf.pull(0.0, 1.0, steps=5))
-    nf.simulate(wrist, nf.draw(0.0, 1.0, steps=5))  # strokes are a program of their own
+    nf.simulate(wrist, nf.stroke_path(0.0, 1.0, steps=5))  # strokes are a program of their own
     compiled = run_module._follow.count()
     nf.simulate(wrist, nf.pull(0.0, 2.0, steps=17).release())
-    nf.simulate(nf.load_robot("pacheco2021-b-specimen"), nf.draw(0.0, 1.0, steps=40))
+    nf.simulate(nf.load_robot("pacheco2021-b-specimen"), nf.stroke_path(0.0, 1.0, steps=40))
     nf.simulate(wrist.with_value("notch[2].depth", 1.3), nf.pull(0.0, 2.0, steps=3))
     assert run_module._follow.count() == compiled
 
@@ -147,7 +147,7 @@ def test_kinematic_model_tells_the_stroke_it_loses(wrist: nf.Robot) -> None:
 
 @pytest.mark.parametrize("steps", [5, 31, 200])
 def test_stroke_turned_round(wrist: nf.Robot, steps: int) -> None:
-    path = nf.simulate(wrist, nf.draw(0.0, 3.6, steps=steps).release()).raise_if_failed()
+    path = nf.simulate(wrist, nf.stroke_path(0.0, 3.6, steps=steps).release()).raise_if_failed()
     np.testing.assert_allclose(path.stroke, path.commanded_stroke, atol=1e-12)
     assert path.stable.all()
 
@@ -164,8 +164,8 @@ def test_a_robot_of_another_size_bends_alike(wrist: nf.Robot, scale: float) -> N
         material=wrist.material,
         friction=wrist.friction,
     )
-    path = nf.simulate(wrist, nf.draw(0.0, 3.6).release())
-    other = nf.simulate(scaled, nf.draw(0.0, 3.6 * scale).release()).raise_if_failed()
+    path = nf.simulate(wrist, nf.stroke_path(0.0, 3.6).release())
+    other = nf.simulate(scaled, nf.stroke_path(0.0, 3.6 * scale).release()).raise_if_failed()
     np.testing.assert_allclose(other.notch_angle, path.notch_angle, atol=1e-9)
     np.testing.assert_allclose(other.tension, path.tension * scale**2, rtol=1e-8, atol=1e-9)
 

@@ -84,7 +84,7 @@ def test_the_base_turns_it_all(wrist, found, margin):
 
 
 def test_what_is_not_solved_has_none(wrist):
-    response = nf.tip_response(wrist, nf.draw(0.5, 50.0, steps=2))
+    response = nf.tip_response(wrist, nf.stroke_path(0.5, 50.0, steps=2))
     assert np.isfinite(response.compliance[0]).all()
     assert np.isnan(response.compliance[1]).all()
     assert np.isnan(response.jacobian[1]).all()

@@ -118,7 +118,7 @@ def test_gaps_are_those_between_the_pieces(step, margin):
     margin.within("gaps", path.gap[step] - found, 1e-12, "mm")
 
 
-def _moved(path: nf.Path, step: int, body: int, point: np.ndarray) -> np.ndarray:
+def _moved(path: nf.EquilibriumPath, step: int, body: int, point: np.ndarray) -> np.ndarray:
     """Where a point of a body has gone that was `point` in the free robot."""
     inside = path.body_rotation[0, body].T @ (point - path.body_position[0, body])
     return path.body_position[step, body] + path.body_rotation[step, body] @ inside

@@ -30,7 +30,7 @@ def corner(turning: np.ndarray, mu: float) -> np.ndarray:
     return (np.cos(half) - mu * np.sin(half)) / (np.cos(half) + mu * np.sin(half))
 
 
-def check(path: nf.Path, mu: float, rows: dict[str, np.ndarray], margin) -> None:
+def check(path: nf.EquilibriumPath, mu: float, rows: dict[str, np.ndarray], margin) -> None:
     """Hold a path to the columns of a table that both tables have."""
     assert path.converged.all(), path.reason
     turning, spans = path.contact_turning[:, 0], path.span_tension[:, 0]

@@ -7,7 +7,6 @@ import re
 import sys
 from collections.abc import Iterable
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 from notchflex import __version__
@@ -20,15 +19,23 @@ BUILDERS = ("test", "dev", "docs", "all")
 """Extras for those who change the program, or of all others together."""
 
 
-def doctor(*, json: JsonFile = None, quiet: Quiet = False) -> int:
-    """Check the installation: versions, the device of JAX, extras, the compile cache.
+def doctor(*, clear_cache: bool = False, json: JsonFile = None, quiet: Quiet = False) -> int:
+    """Check the installation: versions, the device of JAX, extras, the kept programs.
 
     JAX 0.10.2 and 0.11.0 compute wrong sums on the processor; one such sum is computed and
     compared. The exit code is 1 where it is wrong: no number of this program can be trusted then.
+
+    Args:
+        clear_cache: Remove the compiled programs kept on disk; they are compiled anew when needed.
     """
     terminal.be_quiet(quiet)
     if json is not None:
         check_output(json, "--json")
+    if clear_cache:
+        from notchflex import _store
+
+        removed = _store.clear()
+        terminal.note(f"removed {removed.programs} programs, {removed.size / 1e6:.1f} MB")
     with terminal.working("computing a sum that is known"):
         found = examination()
     if json is not None:
@@ -50,14 +57,15 @@ def doctor(*, json: JsonFile = None, quiet: Quiet = False) -> int:
 
 def examination() -> dict[str, Any]:
     """Return what `doctor` has found out, as plain values."""
-    from notchflex.cli.compile_cache import cache_folder, use_compile_cache
+    from notchflex import _store
+    from notchflex.cli.compile_cache import use_compile_cache
 
     use_compile_cache()
     from notchflex._canary import canary
     from notchflex._jax import jax
 
     sum_of_squares = canary()
-    folder = cache_folder()
+    folder, kept = _store.program_folder(), _store.usage()
     return {
         "program": "notchflex",
         "version": __version__,
@@ -75,7 +83,9 @@ def examination() -> dict[str, Any]:
         "extras": _extras(),
         "compile_cache": {
             "folder": None if folder is None else str(folder),
-            "bytes": 0 if folder is None else folder_size(folder),
+            "programs": kept.programs,
+            "bytes": kept.size,
+            "most_bytes": _store.MOST_BYTES,
         },
     }
 
@@ -105,18 +115,6 @@ def requirements(lines: Iterable[str] | None = None) -> dict[str, list[str]]:
         if name and name[0] != "notchflex":
             packages.append(name[0])
     return found
-
-
-def folder_size(folder: Path) -> int:
-    """Return the bytes of all files under a folder; 0 where there is none."""
-    sizes: list[int] = []
-    for file in folder.rglob("*"):
-        try:
-            if file.is_file():
-                sizes.append(file.stat().st_size)
-        except OSError:  # another process has just taken it away
-            continue
-    return sum(sizes)
 
 
 def _versions(packages: Iterable[str]) -> dict[str, str | None]:
@@ -177,9 +175,13 @@ def _print(found: dict[str, Any]) -> None:
             ("device", f"{device['kind']}: {', '.join(device['names'])}"),
             ("floats", "64 bits" if device["x64"] else "32 bits"),
             ("known sum", "right" if found["healthy"] else "WRONG"),
-            ("compiled code", f"{cache['bytes'] / 1e6:.1f} MB in {cache['folder']}")
+            (
+                "programs",
+                f"{cache['programs']} compiled, {cache['bytes'] / 1e6:.1f} MB of at most "
+                f"{cache['most_bytes'] / 1e6:.0f}, in {cache['folder']}",
+            )
             if cache["folder"]
-            else ("compiled code", "is not kept"),
+            else ("programs", "compiled in every process, not kept"),
         ],
     )
     section("\nExtras", [(name, _extra_words(extra)) for name, extra in found["extras"].items()])

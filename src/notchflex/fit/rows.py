@@ -68,7 +68,8 @@ class Rows:
         load: Loads of all rows; tensions may be those of a gauge with an offset, below 0 too.
         paths: Rows of every path, in order.
         names: Numbers that vary: of the robot by name, or of `SENSOR`.
-        outputs: What is predicted, by names of `Path`; "axis_points" for those at `places`.
+        outputs: What is predicted, by names of `EquilibriumPath`; "axis_points" for
+            those at `places`.
         measured: Tension (N) or stroke (mm) as measured, rows by tendons.
         flexures: How many flexures the arrays have, so that unlike robots share a program.
         places: Points of the tube axis; None where none are asked.

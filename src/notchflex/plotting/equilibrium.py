@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from notchflex.plotting.sheet import BESIDE, SOLID, Cell, Item, Line, Note, Pane
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities import QUANTITIES
 from notchflex.results.spans import spans_of
+from notchflex.robot import Robot
 
 if TYPE_CHECKING:
     from notchflex.statics import Path
@@ -31,11 +33,37 @@ def state_picture(path: Path, step: int, *, title: str | None = None) -> Picture
     Returns:
         The picture; its `save` writes it as PNG, SVG, PDF or HTML.
     """
-    solved = [step] if path.converged[step] else []
     panels = [notch_bars(path, step), tension_along(path, step)]
-    cells = [Cell(shape_panel(path, solved, plane_of(path)), (0, 2), (0, 1))]
+    cells = [Cell(state_shape(path, step), (0, 2), (0, 1))]
     cells += [Cell(panel, (row, row + 1), (1, 2)) for row, panel in enumerate(panels)]
     return Picture(path.robot.name if title is None else title, 9.6, 6.4, cells)
+
+
+def robot_picture(robot: Robot, *, title: str | None = None) -> Picture:
+    """Describe the picture of a robot without loads.
+
+    Args:
+        robot: The robot.
+        title: Heading; the name of the robot if None.
+
+    Returns:
+        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
+    """
+    cells = [Cell(robot_shape(robot), (0, 1), (0, 1))]
+    return Picture(robot.name if title is None else title, 5.6, 6.4, cells)
+
+
+def robot_shape(robot: Robot) -> Panel:
+    """Return the shape of a robot without loads."""
+    from notchflex.statics import Load, solve
+
+    free = solve(robot, Load())
+    return replace(state_shape(free.path, free.step), legend="")
+
+
+def state_shape(path: Path, step: int) -> Panel:
+    """Return the shape of one state, to scale, with its loads."""
+    return shape_panel(path, [step] if path.converged[step] else [], plane_of(path))
 
 
 def notch_bars(path: Path, step: int) -> Panel:

@@ -10,15 +10,16 @@ from notchflex.errors import InputError
 from notchflex.plotting.sheet import Picture
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 
 def picture(result: Any, *, title: str | None = None) -> Picture:
     """Describe the picture of a result, whatever its kind.
 
     Args:
-        result: A `Path`, an `Equilibrium`, a `Batch`, a `Comparison`, a `Calibration`, a
-            `FrictionRig`, or a dict of label to path for several beside each other.
+        result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, a `Comparison`, a
+            `Calibration`, a `FrictionRig`, or a dict of label to path for several beside each
+            other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -46,12 +47,15 @@ def _picture(result: Any) -> Picture:
     from notchflex.plotting.beside import beside_picture
     from notchflex.plotting.calibration import calibration_picture
     from notchflex.plotting.comparison import comparison_picture
-    from notchflex.plotting.equilibrium import state_picture
+    from notchflex.plotting.equilibrium import robot_picture, state_picture
     from notchflex.plotting.friction import friction_picture
     from notchflex.plotting.path import path_picture
-    from notchflex.statics import Batch, Equilibrium, Path
+    from notchflex.robot import Robot
+    from notchflex.statics import Batch, Equilibrium, EquilibriumPath
 
-    if isinstance(result, Path):
+    if isinstance(result, Robot):
+        return robot_picture(result)
+    if isinstance(result, EquilibriumPath):
         return path_picture(result)
     if isinstance(result, Equilibrium):
         return state_picture(result.path, result.step)
@@ -59,8 +63,10 @@ def _picture(result: Any) -> Picture:
         return batch_picture(result)
     if isinstance(result, Comparison):
         return comparison_picture(result)
-    if isinstance(result, Mapping) and all(isinstance(one, Path) for one in result.values()):
-        return beside_picture(cast("Mapping[str, Path]", result))
+    if isinstance(result, Mapping) and all(
+        isinstance(one, EquilibriumPath) for one in result.values()
+    ):
+        return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
 
     # Late: it takes a second to import, and those above do without.
     from notchflex.fit import Calibration, FrictionRig
@@ -70,6 +76,6 @@ def _picture(result: Any) -> Picture:
     if isinstance(result, FrictionRig):
         return friction_picture(result)
     raise InputError(
-        "a picture is made of a Path, an Equilibrium, a Batch, a Comparison, a Calibration, a "
-        f"FrictionRig or a dict of paths; got {type(result).__name__}."
+        "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, a "
+        f"Comparison, a Calibration, a FrictionRig or a dict of paths; got {type(result).__name__}."
     )

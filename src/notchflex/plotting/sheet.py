@@ -30,6 +30,9 @@ FINE, MIXED = (3.0, 2.0), (5.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 MARKERS = "osD^vP*X"
 """Marks that a line can have at its points."""
 
+SCREEN_DOTS = 72
+"""Dots per inch of a picture in a notebook."""
+
 INSIDE, BESIDE, BELOW = "inside", "beside", "below"
 """Where the legend of a panel stands."""
 
@@ -258,7 +261,7 @@ class Cell:
     columns: tuple[int, int]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Picture:
     """Panels on a grid, under a heading.
 
@@ -286,6 +289,19 @@ class Picture:
         from notchflex.plotting.with_matplotlib import figure_of
 
         return figure_of(self)
+
+    def __repr__(self) -> str:
+        """What it shows, and how to write it."""
+        count = len(self.cells)
+        return f"Picture {self.title!r} of {count} panel{'s' * (count != 1)}; .save(file) writes it"
+
+    def _repr_png_(self) -> bytes:
+        """Return it as a notebook shows it."""
+        from io import BytesIO
+
+        written = BytesIO()
+        self.figure().savefig(written, format="png", dpi=SCREEN_DOTS)
+        return written.getvalue()
 
     def interactive(self) -> Any:
         """Return it as a figure of plotly.

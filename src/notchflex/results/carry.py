@@ -6,6 +6,8 @@ import json
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.results.files import replacing
@@ -13,7 +15,7 @@ from notchflex.results.json import path_document, plain
 from notchflex.results.record import decoded, encoded, path_of, record_of
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 READ_BACK = "read_back"
 """Key of a JSON document under which the exact numbers stand."""
@@ -21,7 +23,7 @@ READ_BACK = "read_back"
 _KINDS = ".json, .nc, .parquet or .csv"
 
 
-def save_path(path: Path, file: str | FilePath) -> None:
+def save_path(path: EquilibriumPath, file: str | FilePath) -> None:
     """Write a path to a file; by its suffix as JSON, NetCDF, Parquet or CSV.
 
     JSON, NetCDF and Parquet hold the whole path, and `read_path` makes an equal one of them. CSV
@@ -64,7 +66,7 @@ def save_path(path: Path, file: str | FilePath) -> None:
             raise InputError(_no_kind(file, other, "written"))
 
 
-def read_path(file: str | FilePath) -> Path:
+def read_path(file: str | FilePath) -> EquilibriumPath:
     """Read a path back from a file; it equals the one that was written, its states too.
 
     Nothing is solved: every number is that of the file. A simulation goes on from `.state` as from
@@ -110,21 +112,24 @@ def read_path(file: str | FilePath) -> Path:
     return path_of(read_head(file), str(file))
 
 
-def whole_document(path: Path) -> dict[str, Any]:
+def whole_document(path: EquilibriumPath) -> dict[str, Any]:
     """Return a path as the JSON document that can be read back: for people, and for `read_path`."""
     return {**path_document(path), READ_BACK: encoded(record_of(path))}
 
 
-def write_netcdf(target: str | FilePath, path: Path) -> None:
-    """Write a path as NetCDF, as `Path.to_xarray` has it.
+def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
+    """Write a path as NetCDF: what `to_xarray` has, and the rest of its record in a group.
 
     Raises:
         InputError: A library is not installed, or the file cannot be written.
     """
     need_netcdf("NetCDF")
-    data = path.to_xarray()
+    from notchflex.results.dataset import RECORD_GROUP, dataset_of, record_dataset
+
+    data, record = dataset_of(path), record_dataset(path)
     with replacing(target) as temporary:
         data.to_netcdf(temporary, engine="h5netcdf")
+        record.to_netcdf(temporary, engine="h5netcdf", group=RECORD_GROUP, mode="a")
 
 
 def need_netcdf(what: str) -> None:
@@ -133,21 +138,31 @@ def need_netcdf(what: str) -> None:
         need(module, "data", what)
 
 
-def _from_netcdf(file: str | FilePath) -> Path:
+def _from_netcdf(file: str | FilePath) -> EquilibriumPath:
     need_netcdf("NetCDF")
     import xarray
 
-    from notchflex.results.dataset import path_of_dataset
+    from notchflex.results.dataset import RECORD_GROUP, path_of_datasets
 
     try:
         data = xarray.load_dataset(file, engine="h5netcdf")
+        record = None
+        if RECORD_GROUP in _groups(file):
+            record = xarray.load_dataset(file, engine="h5netcdf", group=RECORD_GROUP)
     except (OSError, ValueError, KeyError) as problem:
         words = " ".join(str(problem).split())
         raise InputError(f"{file} cannot be read as NetCDF: {words}.") from None
-    return path_of_dataset(data, str(file))
+    return path_of_datasets(data, record, str(file))
 
 
-def _from_json(file: str | FilePath) -> Path:
+def _groups(file: str | FilePath) -> list[str]:
+    import h5py
+
+    with h5py.File(file, "r") as opened:
+        return [str(name) for name in opened]
+
+
+def _from_json(file: str | FilePath) -> EquilibriumPath:
     try:
         document = json.loads(FilePath(file).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
@@ -159,12 +174,24 @@ def _from_json(file: str | FilePath) -> Path:
             "save_path wrote."
         )
     path = path_of(decoded(document[READ_BACK], str(file)), str(file))
-    if plain(path_document(path))["steps"] != document.get("steps"):
+    if not _same_steps(path, document.get("steps")):
         raise InputError(
             f"{file}: its steps are not those that its part {READ_BACK!r} holds, so one of them "
             "was changed; write the file again."
         )
     return path
+
+
+def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
+    """Whether the steps of a document are those of a path, but for steps that were not tried.
+
+    Version 0.1.0 wrote zeros for the shape of those.
+    """
+    wanted = plain(path_document(path))["steps"]
+    if not isinstance(steps, list) or len(steps) != len(wanted):
+        return False
+    pairs = zip(wanted, steps, np.asarray(path.run.tried), strict=True)
+    return all(one == other for one, other, tried in pairs if tried)
 
 
 def _no_kind(file: str | FilePath, suffix: str, done: str) -> str:

@@ -11,6 +11,7 @@ import csv
 import io
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,19 +24,19 @@ from notchflex.results.spans import holds, spans_of
 if TYPE_CHECKING:
     from pathlib import Path as FilePath
 
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 
-def path_columns(path: Path) -> dict[str, Sequence[Any]]:
+def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
     """Return the columns of a path: header to the values of its S steps, at the edge units."""
     columns: dict[str, Sequence[Any]] = {"step": range(1, len(path) + 1)}
     for quantity in QUANTITIES.values():
         if quantity.column and holds(path, quantity):
-            columns.update(_columns_of(path, quantity))
+            columns.update({one.header: one.values for one in entries_of(path, quantity)})
     return columns
 
 
-def write_path_csv(target: str | FilePath, path: Path) -> None:
+def write_path_csv(target: str | FilePath, path: EquilibriumPath) -> None:
     """Write a path as CSV to a file, whole or not at all, or to standard output for `-`.
 
     Raises:
@@ -64,28 +65,54 @@ def write_csv(target: str | FilePath, header: Sequence[str], rows: Iterable[Iter
     write_text(target, text.getvalue())
 
 
-def _columns_of(path: Path, quantity: Quantity) -> Iterator[tuple[str, Any]]:
+@dataclass(frozen=True)
+class Entry:
+    """One entry of a quantity along a path, such as the angle of one notch.
+
+    Attributes:
+        header: The CSV column; "" where the quantity has none.
+        name: Which entry it is, such as "notch 3"; "" for a quantity with one number.
+        values: A value per step, at the edge units.
+    """
+
+    header: str
+    name: str
+    values: Any
+
+
+def is_listed(quantity: Quantity) -> bool:
+    """Tell whether `entries_of` lists the entries of a quantity one by one."""
+    return quantity.per in ((), ("notch",), ("axis",), ("tendon",), ("tendon", "span"))
+
+
+def entries_of(path: EquilibriumPath, quantity: Quantity) -> Iterator[Entry]:
+    """Yield every entry of a quantity, in the order of the CSV columns."""
     values: Any = getattr(path, quantity.name)
     if quantity.scale != 1.0:
         values = np.asarray(values) * quantity.scale
-    tendons = path.tension.shape[1]
-    numbers: list[Any] = [""] if tendons == 1 else list(range(1, tendons + 1))
+    several = path.tension.shape[1] > 1
+    tendons = [(i, i + 1 if several else "") for i in range(path.tension.shape[1])]
     match quantity.per:
         case ():
-            yield quantity.header(), values
+            yield Entry(quantity.header(), "", values)
         case ("notch",):
             for notch in range(values.shape[1]):
-                yield quantity.header(notch=notch + 1), values[:, notch]
+                header = quantity.header(notch=notch + 1)
+                yield Entry(header, f"notch {notch + 1}", values[:, notch])
         case ("axis",):
             for index, axis in enumerate(AXES):
-                yield quantity.header(axis=axis), values[:, index]
+                yield Entry(quantity.header(axis=axis), axis, values[:, index])
         case ("tendon",):
-            for index, number in enumerate(numbers):
-                yield quantity.header(tendon=number), values[:, index]
+            for index, number in tendons:
+                name = f"tendon {number}" if several else ""
+                yield Entry(quantity.header(tendon=number), name, values[:, index])
         case ("tendon", "span"):
-            for index, number in enumerate(numbers):
+            for index, number in tendons:
                 for span, name in enumerate(span_names(spans_of(path, index))):
-                    yield quantity.header(tendon=number, span=name), values[:, index, span]
+                    header = quantity.header(tendon=number, span=name)
+                    words = f"tendon {number}, " if several else ""
+                    words += name.replace("_", " ")
+                    yield Entry(header, words, values[:, index, span])
         case other:
             raise NotImplementedError(f"no CSV columns for a quantity per {other}")
 

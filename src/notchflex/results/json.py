@@ -19,7 +19,7 @@ from notchflex.robot.robot import to_table
 if TYPE_CHECKING:
     from pathlib import Path as FilePath
 
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 PLAIN = tuple(
     q for q in QUANTITIES.values() if q.key and q.per not in (("tendon", "contact"),)
@@ -39,7 +39,7 @@ LOAD_UNITS = {
 }
 
 
-def path_document(path: Path) -> dict[str, Any]:
+def path_document(path: EquilibriumPath) -> dict[str, Any]:
     """Return a path as a document of plain lists, numbers, strings and None.
 
     Args:
@@ -51,11 +51,9 @@ def path_document(path: Path) -> dict[str, Any]:
         number. Angles in deg, lengths in mm, forces in N. Where loads act from outside in any
         step, `load` tells those of every step.
     """
-    failed = [str(r) for r, good in zip(path.reason, path.converged, strict=True) if not good]
-    steps = [_step(path, index) for index in range(len(path))]
     outside = _outside(path)
-    for step, loads in zip(steps, outside, strict=False):
-        step.setdefault("load", {}).update(loads)
+    failed = [str(r) for r, good in zip(path.reason, path.converged, strict=True) if not good]
+    steps = [_step(path, index, outside) for index in range(len(path))]
     return {
         **document_head(path.robot),
         "units": units() | (LOAD_UNITS if outside else {}),
@@ -63,6 +61,11 @@ def path_document(path: Path) -> dict[str, Any]:
         "reason": failed[0] if failed else "",
         "steps": steps,
     }
+
+
+def step_document(path: EquilibriumPath, index: int) -> dict[str, Any]:
+    """Return one step (from 0) of the document of a path, of plain values."""
+    return plain(_step(path, index, _outside(path)))
 
 
 def document_head(robot: Robot) -> dict[str, Any]:
@@ -120,7 +123,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _step(path: Path, index: int) -> dict[str, Any]:
+def _step(path: EquilibriumPath, index: int, outside: list[dict[str, Any]]) -> dict[str, Any]:
     step: dict[str, Any] = {"step": index + 1}
     for quantity in PLAIN:
         if not holds(path, quantity):
@@ -130,11 +133,13 @@ def _step(path: Path, index: int) -> dict[str, Any]:
         for key in outer:
             holder = holder.setdefault(key, {})
         holder[last] = _value(path, quantity, index)
+    if outside:
+        step.setdefault("load", {}).update(outside[index])
     step["contacts"] = [_contacts(path, tendon, index) for tendon in range(path.tension.shape[1])]
     return step
 
 
-def _outside(path: Path) -> list[dict[str, Any]]:
+def _outside(path: EquilibriumPath) -> list[dict[str, Any]]:
     """Loads from outside of every step; nothing at all where no step has any."""
     external = path.load.external
     if all(one.is_nothing for one in external):
@@ -162,7 +167,7 @@ def _outside(path: Path) -> list[dict[str, Any]]:
     ]
 
 
-def _value(path: Path, quantity: Quantity, index: int) -> Any:
+def _value(path: EquilibriumPath, quantity: Quantity, index: int) -> Any:
     value = getattr(path, quantity.name)[index]
     if quantity.per == ("tendon", "span"):
         return [row[: spans_of(path, tendon)] for tendon, row in enumerate(value)]
@@ -171,7 +176,7 @@ def _value(path: Path, quantity: Quantity, index: int) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _contacts(path: Path, tendon: int, index: int) -> list[dict[str, Any]]:
+def _contacts(path: EquilibriumPath, tendon: int, index: int) -> list[dict[str, Any]]:
     count = spans_of(path, tendon) - 1
     columns = {
         q.key.split(".")[1]: getattr(path, q.name)[index, tendon, :count] * q.scale

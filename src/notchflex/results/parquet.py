@@ -8,31 +8,26 @@ from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from notchflex._extras import need
 from notchflex.errors import InputError
-from notchflex.results.csv import path_columns
+from notchflex.results.dataframe import dataframe_of
 from notchflex.results.files import replacing
 from notchflex.results.record import Record, decoded, encoded, record_of
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 _KEY = "notchflex"
 
 
-def write_parquet(target: str | FilePath, path: Path) -> None:
+def write_parquet(target: str | FilePath, path: EquilibriumPath) -> None:
     """Write a path as a Parquet table, one row a step, units in the names of the columns.
 
     Raises:
         InputError: polars is not installed, or the file cannot be written.
     """
     need("polars", "data", "Parquet")
-    import polars
-
-    columns = {name: np.asarray(values) for name, values in path_columns(path).items()}
-    table = polars.DataFrame(columns, nan_to_null=True)
+    table = dataframe_of(path)
     head = {_KEY: json.dumps(encoded(record_of(path)))}
     with replacing(target) as temporary:
         table.write_parquet(temporary, metadata=head)

@@ -1,7 +1,9 @@
 """The one table of quantities: names, symbols, units and texts of everything a result holds.
 
 JSON keys, CSV headers, the axes of pictures, the tables on the terminal and the documentation
-are all made from `QUANTITIES`. A new quantity is one new row here.
+are all made from `QUANTITIES`, and so are the typed properties of a path and of an equilibrium
+(`statics/quantity_properties.py`, written by `docs/make/quantity_properties.py`). A new quantity
+is one new row here.
 
 Inside Python: mm, N, MPa, rad. At the edges (files, pictures, terminal): mm, N, MPa, deg.
 `Quantity.scale` takes a number from the inside to the edge.
@@ -22,12 +24,12 @@ def _rows() -> tuple[Quantity, ...]:
     return (
         q(
             "commanded_tension", "commanded tension", "T", "N",
-            "Tension commanded at the base of a tendon; empty where it is not commanded.",
+            "Tension commanded at the base of a tendon; empty (NaN) where it is not commanded.",
             "load.tension_N", "", ("tendon",),
         ),
         q(
             "commanded_stroke", "commanded stroke", "u", "mm",
-            "Tendon length commanded to be drawn out at the base; empty where not commanded.",
+            "Tendon length commanded to be drawn out at the base; empty (NaN) where not commanded.",
             "load.stroke_mm", "", ("tendon",),
         ),
         q(
@@ -114,7 +116,7 @@ def _rows() -> tuple[Quantity, ...]:
         q(
             "closed", "closed", "", "",
             "True where the lips of a notch touch.",
-            "closed", "notch_{notch}_closed", ("notch",),
+            "closed", "notch_{notch}_closed", ("notch",), kind=bool,
         ),
         q(
             "contact_force", "contact force", "N_j", "N",
@@ -139,7 +141,8 @@ def _rows() -> tuple[Quantity, ...]:
         q(
             "contact_state", "state of a contact", "", "",
             'What a friction contact does: "stick", "slip toward base" or "slip toward tip".',
-            "contacts.state", "", ("tendon", "contact"),
+            "contacts.state", "", ("tendon", "contact"), kind=int,
+            note="0 sticks, +1 slips toward the base, -1 slips toward the tip.",
         ),
         q(
             "contact_bound", "largest tension ratio over a contact", "b_i", "",
@@ -150,12 +153,15 @@ def _rows() -> tuple[Quantity, ...]:
             "dissipation", "dissipation", "D_i", "N mm",
             "Work that a friction contact has turned to heat since the start of the path.",
             "", "", ("tendon", "contact"),
+            note="Integrated by the trapezoid rule from step to step, as is the tendon work, so "
+            "the two balance with the stored energy as the steps get small. A few coarse steps "
+            "across a reversal give a rough value, which may even decrease.",
         ),
         q(
             "front_contact", "friction front", "m", "",
             "Contact, from 1 at the base, up to which the friction of a tendon has turned from "
             "pulling to letting go (Gao 2017, eq. 26); one more than there are where all have.",
-            "front.m", "tendon{tendon}_front_m", ("tendon",),
+            "front.m", "tendon{tendon}_front_m", ("tendon",), kind=int,
         ),
         q(
             "front_eta", "friction at the front", r"\eta", "",
@@ -192,22 +198,29 @@ def _rows() -> tuple[Quantity, ...]:
         q(
             "converged", "converged", "", "",
             "True where the equilibrium was found.",
-            "converged", "converged",
+            "converged", "converged", kind=bool,
+            note="A solved state beyond the limits of the friction law or of the strain modes "
+            "counts as not converged.",
         ),
         q(
             "reason", "reason", "", "",
             "Why the equilibrium was not found; empty where it was.",
-            "reason", "reason",
+            "reason", "reason", kind=str,
         ),
         q(
             "stable", "stable", "", "",
             "True where the equilibrium is stable with its sticking contacts held.",
-            "stable", "stable",
+            "stable", "stable", kind=bool,
         ),
         q(
             "smallest_eigenvalue", "smallest eigenvalue", r"\lambda_\mathrm{min}", "N mm",
             "Smallest real part of an eigenvalue of the stiffness, sticking contacts held.",
             "smallest_eigenvalue_Nmm", "",
+        ),
+        q(
+            "determinant_sign", "sign of the determinant", "", "",
+            "Sign of the determinant of that stiffness; +1 at every stable state.",
+            "", "",
         ),
         q(
             "residual", "residual", "r", "",
@@ -217,7 +230,7 @@ def _rows() -> tuple[Quantity, ...]:
         q(
             "iterations", "iterations", "", "",
             "Number of Newton iterations.",
-            "iterations", "iterations",
+            "iterations", "iterations", kind=int,
         ),
     )  # fmt: skip
 

@@ -21,7 +21,7 @@ from notchflex.errors import InputError
 
 if TYPE_CHECKING:
     from notchflex.robot import Robot
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 FORMAT = "notchflex path 1"
 IN_BASE = "_in_base"
@@ -46,7 +46,7 @@ class Record:
     arrays: Mapping[str, NDArray[Any]]
 
 
-def record_of(path: Path) -> Record:
+def record_of(path: EquilibriumPath) -> Record:
     """Return the record of a path."""
     chain = path.chain
     facts = {
@@ -74,7 +74,7 @@ def robot_of(robot: Robot) -> str:
     return robot_text(robot, source_of(robot))
 
 
-def path_of(record: Record, source: str) -> Path:
+def path_of(record: Record, source: str) -> EquilibriumPath:
     """Return the path of a record.
 
     Args:
@@ -142,7 +142,7 @@ def _little(array: NDArray[Any]) -> Any:
     return array.dtype.newbyteorder("<")
 
 
-def _loads_of(path: Path) -> str:
+def _loads_of(path: EquilibriumPath) -> str:
     """The loads from outside: each different one, and which of them every step has."""
     distinct = [asdict(one) for one in path.load.different]
     return json.dumps({"distinct": distinct, "step": path.load.which.tolist()})
@@ -159,7 +159,7 @@ def _loads_from(text: str) -> tuple[Any, ...]:
     return tuple(distinct[number] for number in told["step"])
 
 
-def _arrays_of(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     import jax.tree_util as tree_util
 
     from notchflex.statics import BEFORE, TOLD
@@ -182,11 +182,19 @@ def _arrays_of(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
         yield _STATE + tree_util.keystr(key), np.asarray(leaf)
 
 
-def _path_of(record: Record) -> Path:
+def _path_of(record: Record) -> EquilibriumPath:
     import jax.tree_util as tree_util
 
     from notchflex.robot import robot_from_text
-    from notchflex.statics import BEFORE, TOLD, LoadPath, Path, Recorded, Settings, prepared
+    from notchflex.statics import (
+        BEFORE,
+        TOLD,
+        EquilibriumPath,
+        LoadPath,
+        Recorded,
+        Settings,
+        prepared,
+    )
 
     facts, arrays = record.facts, record.arrays
     robot = robot_from_text(facts["robot"])
@@ -226,7 +234,7 @@ def _path_of(record: Record) -> Path:
         held=(arrays[_HELD[0]], arrays[_HELD[1]]),
         **run,
     )
-    return Path(
+    return EquilibriumPath(
         robot, load, ready, recorded, facts["each_from_rest"], Settings(**facts["settings"])
     )
 

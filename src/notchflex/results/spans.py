@@ -9,10 +9,10 @@ import numpy as np
 from notchflex.results.quantity import Quantity
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 
-def holds(path: Path, quantity: Quantity) -> bool:
+def holds(path: EquilibriumPath, quantity: Quantity) -> bool:
     """Tell whether a path has a quantity; an optional one without any number counts as missing."""
     values = getattr(path, quantity.name, None)
     if values is None:
@@ -20,7 +20,7 @@ def holds(path: Path, quantity: Quantity) -> bool:
     return not quantity.optional or bool(np.isfinite(values).any())
 
 
-def spans_of(path: Path, tendon: int) -> int:
+def spans_of(path: EquilibriumPath, tendon: int) -> int:
     """Return how many spans a tendon (counted from 0) has: two for each body that it runs through.
 
     Contacts lie between the spans, so there is one fewer of them.

@@ -22,9 +22,6 @@ _PATTERNS = {
     "axis": rf"(?P<axis>[{''.join(AXES)}])",
     "span": r"(?P<span>proximal|gap_[1-9]\d*|body_[1-9]\d*)",
 }
-_TRUTHS = ("closed", "converged", "stable")
-_TEXTS = ("reason",)
-_WHOLE = ("iterations",)
 
 
 def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
@@ -37,7 +34,8 @@ def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
         file: A .csv or .parquet that `notchflex simulate` or `save_path` wrote.
 
     Returns:
-        Quantities by the names of `Path`, steps as leading axis; NaN where a field is empty.
+        Quantities by the names of `EquilibriumPath`, steps as leading axis; NaN where a
+        field is empty.
 
     Raises:
         InputError: No such file, no table, or no column that is known.
@@ -117,12 +115,12 @@ def _index(name: str, text: str | None) -> int:
 
 
 def _numbers(quantity: Quantity, values: Sequence[Any]) -> NDArray[Any]:
-    if quantity.name in _TEXTS:
+    if quantity.kind is str:
         return np.array([value or "" for value in values], dtype=object)
     numbers = np.array([np.nan if value in ("", None) else float(value) for value in values])
-    if quantity.name in _TRUTHS:
+    if quantity.kind is bool:
         return numbers != 0.0
-    return numbers.astype(int) if quantity.name in _WHOLE else numbers / quantity.scale
+    return numbers.astype(int) if quantity.kind is int else numbers / quantity.scale
 
 
 def _joined(quantity: Quantity, parts: Mapping[tuple[int, ...], NDArray[Any]]) -> NDArray[Any]:

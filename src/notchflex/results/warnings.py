@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 MOMENT_ERROR = 0.01
 """A larger part of the bending moment than this that the strain modes miss is warned of."""
 
 
-def path_warnings(path: Path) -> list[str]:
+def path_warnings(path: EquilibriumPath) -> list[str]:
     """Return one sentence for each thing about a path that asks for care.
 
     Args:
@@ -34,7 +34,7 @@ def path_warnings(path: Path) -> list[str]:
     ]
 
 
-def _allowed_strain(path: Path) -> Iterator[str]:
+def _allowed_strain(path: EquilibriumPath) -> Iterator[str]:
     allowed = path.robot.material.allowed_strain
     if allowed is None:
         return
@@ -47,7 +47,7 @@ def _allowed_strain(path: Path) -> Iterator[str]:
     )
 
 
-def _plastic_strain(path: Path) -> Iterator[str]:
+def _plastic_strain(path: EquilibriumPath) -> Iterator[str]:
     limit = getattr(path.robot.material, "plastic_strain", None)
     if limit is None:
         return
@@ -62,7 +62,7 @@ def _plastic_strain(path: Path) -> Iterator[str]:
 
 
 def _first_beyond(
-    path: Path, strain: NDArray[np.float64], limit: float, what: str, so: str
+    path: EquilibriumPath, strain: NDArray[np.float64], limit: float, what: str, so: str
 ) -> Iterator[str]:
     size = np.where(np.asarray(path.converged)[:, None], np.abs(strain), -np.inf)
     beyond = size > limit
@@ -78,7 +78,7 @@ def _first_beyond(
     )
 
 
-def _unstable(path: Path) -> Iterator[str]:
+def _unstable(path: EquilibriumPath) -> Iterator[str]:
     bad = np.flatnonzero(np.asarray(path.converged) & ~np.asarray(path.stable))
     if len(bad):
         plural = "s are" if len(bad) > 1 else " is"
@@ -88,7 +88,7 @@ def _unstable(path: Path) -> Iterator[str]:
         )
 
 
-def _coarse(path: Path) -> Iterator[str]:
+def _coarse(path: EquilibriumPath) -> Iterator[str]:
     error = np.where(np.asarray(path.converged), path.moment_error, -np.inf)
     if not (error > MOMENT_ERROR).any():
         return
@@ -109,5 +109,5 @@ def _coarse(path: Path) -> Iterator[str]:
     )
 
 
-def _load(path: Path, step: int) -> str:
+def _load(path: EquilibriumPath, step: int) -> str:
     return ", ".join(f"{value:.4g}" for value in path.tension[step]) + " N"

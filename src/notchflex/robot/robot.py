@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, overload
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -16,6 +16,10 @@ from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from notchflex.plotting import Picture
+
     AnyNotch: TypeAlias = Notch
     AnyMaterial: TypeAlias = Material
     AnyFriction: TypeAlias = Friction
@@ -136,6 +140,37 @@ class Robot:
     def __getstate__(self) -> dict[str, Any]:
         """Without the hash, which is another one in another process."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
+
+    def __repr__(self) -> str:
+        """A few lines of text."""
+        from notchflex.robot.summary import robot_summary
+
+        return robot_summary(self).text
+
+    def _repr_html_(self) -> str:
+        from notchflex.robot.summary import robot_summary
+
+        return robot_summary(self).html
+
+    @overload
+    def plot(self) -> "Picture": ...
+    @overload
+    def plot(self, *, ax: "Axes") -> "Axes": ...
+    def plot(self, *, ax: "Axes | None" = None) -> "Picture | Axes":
+        """Draw the robot without loads; see `notchflex.plot`.
+
+        Args:
+            ax: Axes of matplotlib to draw into.
+
+        Returns:
+            The picture, which a notebook shows; the axes if some were given.
+
+        Raises:
+            InputError: matplotlib is not installed.
+        """
+        from notchflex._plot import plot
+
+        return plot(self, ax=ax)
 
     @functools.cached_property
     def notches(self) -> tuple[Notch, ...]:

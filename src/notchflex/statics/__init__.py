@@ -16,9 +16,10 @@ from notchflex.statics.kinematics import (
 from notchflex.statics.kinks import Kink
 from notchflex.statics.load import Load, LoadPath
 from notchflex.statics.newton import Settings
-from notchflex.statics.path import Path
+from notchflex.statics.path import EquilibriumPath
+from notchflex.statics.path import EquilibriumPath as Path  # old name, until all files are renamed
 from notchflex.statics.prepare import prepared
-from notchflex.statics.ramps import draw, pull
+from notchflex.statics.ramps import pull, stroke_path
 from notchflex.statics.recorded import BEFORE, TOLD, Recorded
 from notchflex.statics.solve import simulate, solve, solve_each
 from notchflex.statics.state import SavedState, State
@@ -35,6 +36,7 @@ __all__ = [
     "ConvergenceError",
     "Differentiable",
     "Equilibrium",
+    "EquilibriumPath",
     "ExternalLoad",
     "Kink",
     "Load",
@@ -51,7 +53,6 @@ __all__ = [
     "bodies_from_angles",
     "closing",
     "differentiable",
-    "draw",
     "equal_stroke",
     "points_on_axis",
     "prepared",
@@ -61,6 +62,7 @@ __all__ = [
     "solve",
     "solve_batch",
     "solve_each",
+    "stroke_path",
     "tip_from_angles",
     "tip_response",
 ]

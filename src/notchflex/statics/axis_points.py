@@ -21,7 +21,7 @@ from notchflex.robot import Robot
 from notchflex.statics.kinematics import bodies_from_angles
 
 if TYPE_CHECKING:
-    from notchflex.statics.path import Path
+    from notchflex.statics.path import EquilibriumPath
 
 # A place may stick out of the robot by this part of its length: a tip that was rounded.
 _BEYOND = 1e-6
@@ -130,7 +130,7 @@ def points_on_axis(
     return xp.where(inside[:, None], across, on_body)
 
 
-def axis_points(path: Path, axis_at: ArrayLike) -> NDArray[np.float64]:
+def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64]:
     """Points on the tube axis of every state of a path, in the world.
 
     Args:

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._cores import number_of_cores, on_cores
+from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
 from notchflex.native import WIDTH
 from notchflex.robot import Robot
@@ -46,7 +47,7 @@ _BY_BODY = ("body_position", "body_rotation")
 _PIECES = {0: 64, 512: 256, 8192: 2048}
 
 
-class Batch(Mapping[str, np.ndarray]):
+class Batch(Displayed, Mapping[str, np.ndarray]):
     """What a batch returned: arrays by name, the rows of the batch as leading axis.
 
     Example:
@@ -72,10 +73,10 @@ class Batch(Mapping[str, np.ndarray]):
         """How many arrays there are."""
         return len(self._arrays)
 
-    def __repr__(self) -> str:
-        """Names and shapes."""
-        shapes = ", ".join(f"{name}: {array.shape}" for name, array in self._arrays.items())
-        return f"Batch({shapes})"
+    def _summary(self) -> Summary:
+        from notchflex.results.summary import batch_summary
+
+        return batch_summary(self)
 
 
 def solve_batch(
@@ -93,7 +94,7 @@ def solve_batch(
     Args:
         robots: One robot, or one per row.
         loads: One load, or one per row (the steps of a `LoadPath` are loads of their own here).
-        outputs: What to return, by names of `Path`; fewer names are less memory.
+        outputs: What to return, by names of `EquilibriumPath`; fewer names are less memory.
         settings: How hard the solver tries.
         refinement: More strain modes, as for `simulate`.
         cores: How many cores to use; all where not given.

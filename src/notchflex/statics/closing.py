@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from notchflex._summary import Displayed, Summary
 from notchflex.chain import Chain, assemble
 from notchflex.contact import closing_travel, free_angle
 from notchflex.robot import Robot
@@ -18,8 +19,8 @@ from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import lips
 
 
-@dataclass(frozen=True)
-class Closing:
+@dataclass(frozen=True, repr=False)
+class Closing(Displayed):
     """Closing of every notch, base to tip.
 
     Attributes:
@@ -39,6 +40,11 @@ class Closing:
     tendon: np.ndarray
     outer_strain: Float[np.ndarray, " n"]
     peak_strain: Float[np.ndarray, " n"]
+
+    def _summary(self) -> Summary:
+        from notchflex.results.summary import closing_summary
+
+        return closing_summary(self)
 
 
 def closing(robot: Robot) -> Closing:

@@ -25,7 +25,7 @@ from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.numbers import with_slopes
 from notchflex.statics.outputs import followed, known_outputs
 from notchflex.statics.packing import Form
-from notchflex.statics.path import Path
+from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import run
 from notchflex.statics.sensitivity import answered, solved_path
@@ -64,7 +64,7 @@ def differentiable(
         parameters: What may vary: numbers of the robot by name (as for `Robot.with_value`, in the
             units of the robot file), and of the loads "tension" (N, steps by tendons), "stroke"
             (mm), "tip_force" (N, steps by 3) and "tip_moment" (N mm).
-        outputs: What to return, by names of `Path`.
+        outputs: What to return, by names of `EquilibriumPath`.
         settings: How hard the solver tries.
         refinement: More strain modes, as for `simulate`.
 
@@ -204,7 +204,7 @@ class Differentiable:
             )
         return sides[0], sides[1]
 
-    def _path(self, values: dict[str, Array]) -> Path:
+    def _path(self, values: dict[str, Array]) -> EquilibriumPath:
         """Solve the path at some values."""
         numbers = {name: float(values[name]) for name in self.numbers}
         robot = self.robot.with_values(numbers) if numbers else self.robot
@@ -227,7 +227,7 @@ class Differentiable:
         came = run(
             ready, command(load, robot, ready.chain), None, self.settings, each_from_start=False
         )
-        return Path(robot, load, ready, came, settings=self.settings)
+        return EquilibriumPath(robot, load, ready, came, settings=self.settings)
 
     def _taken(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Values of all parameters, in their shapes."""

@@ -19,7 +19,7 @@ def friction_front(
         bound: Its largest magnitude.
 
     Returns:
-        m and eta of every tendon; see `Path.front`.
+        m and eta of every tendon; see `EquilibriumPath.front`.
     """
     there = ~np.isnan(ratio)
     rubs = there & (bound > 0.0)

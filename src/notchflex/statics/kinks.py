@@ -20,7 +20,7 @@ from notchflex.statics.stepping import Solved
 from notchflex.statics.walk import holds
 
 if TYPE_CHECKING:  # for the type only: a path tells its kinks
-    from notchflex.statics.path import Path
+    from notchflex.statics.path import EquilibriumPath
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Kink:
     distance: float
 
 
-def kinks(path: Path, within: float = 1e-6) -> list[Kink]:
+def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
     """List the contacts and notches of a path that lie at a switch, or nearly so.
 
     Args:
@@ -85,7 +85,7 @@ def _contacts(chain: Chain, solved: Solved, before: Solved, within: float) -> li
     return found
 
 
-def _notches(path: Path, within: float) -> list[Kink]:
+def _notches(path: EquilibriumPath, within: float) -> list[Kink]:
     chain = path.chain
     height = np.asarray(chain.rods.length).sum(-1)
     travel = path.contact_force / np.asarray(chain.lip_stiffness)

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
+from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
-from notchflex.statics.external import NOTHING, BodyForce, ExternalLoad
+from notchflex.statics.external import EXTERNAL, NOTHING, BodyForce, ExternalLoad
 from notchflex.statics.given import number, shown, table, vector
 
 _FORM = "a number, or one entry per tendon with None where nothing is commanded"
@@ -65,8 +66,8 @@ class Load(ExternalLoad):
         return f"Load({', '.join(given)})"
 
 
-@dataclass(frozen=True)
-class LoadPath:
+@dataclass(frozen=True, repr=False)
+class LoadPath(Displayed):
     """Loads one after the other.
 
     Args:
@@ -129,6 +130,31 @@ class LoadPath:
     def __len__(self) -> int:
         """Number of steps."""
         return len(self.tension)
+
+    def __getitem__(self, step: int) -> Load:
+        """Return the load of one step, counted from 0.
+
+        Raises:
+            IndexError: There is no such step.
+
+        Example:
+            >>> from notchflex import pull
+            >>> pull(0.0, 3.0, steps=31)[10]
+            Load(tension=1.0)
+        """
+        if not -len(self) <= step < len(self):
+            raise IndexError(f"step {step} of a load path of {len(self)} steps")
+        return Load(
+            _as_given(self.tension[step]),
+            _as_given(self.stroke[step]),
+            tuple(self.base_rotation.tolist()),
+            **{name: getattr(self.external[step], name) for name in EXTERNAL},
+        )
+
+    def _summary(self) -> Summary:
+        from notchflex.results.summary import load_path_summary
+
+        return load_path_summary(self)
 
     @cached_property
     def different(self) -> list[ExternalLoad]:
@@ -306,6 +332,14 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
         return LoadPath(*given, external)  # which says what is wrong
     return LoadPath.checked(*given, external)
+
+
+def _as_given(values: np.ndarray) -> float | list[float | None] | None:
+    """Return one entry per tendon as a `Load` takes them: a number for a single tendon."""
+    entries = [None if isnan(value) else value for value in values.tolist()]
+    if all(entry is None for entry in entries):
+        return None
+    return entries[0] if len(entries) == 1 else entries
 
 
 def _several(loads: Any) -> list[Load]:

@@ -56,7 +56,7 @@ def followed(
 
     Beside `run` this is a second loop over a path, and stays one: `run` goes on or starts anew,
     skips what only fills up its table (a branch that rows side by side would both take), and packs
-    all that a `Path` may be asked for later; here nothing is kept but what is asked for.
+    all that a path may be asked for later; here nothing is kept but what is asked for.
 
     Args:
         chain: The chain.

@@ -31,8 +31,8 @@ def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> Load
     return _ramp("tension", start, stop, steps, tendon)
 
 
-def draw(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
-    """Draw one tendon by stroke, from one value to another in equal steps.
+def stroke_path(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
+    """Prescribe the stroke of one tendon, from one value to another in equal steps.
 
     Args:
         start: First stroke, mm.
@@ -47,7 +47,7 @@ def draw(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> Load
         InputError: Fewer than one step, an infinite stroke, no such tendon.
 
     Example:
-        >>> draw(0.0, 1.0, steps=3).stroke[:, 0].tolist()
+        >>> stroke_path(0.0, 1.0, steps=3).stroke[:, 0].tolist()
         [0.0, 0.5, 1.0]
     """
     return _ramp("stroke", start, stop, steps, tendon)
@@ -69,4 +69,4 @@ def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> Load
     return LoadPath(commanded, nothing) if what == "tension" else LoadPath(nothing, commanded)
 
 
-__all__ = ["draw", "pull"]
+__all__ = ["pull", "stroke_path"]

@@ -9,14 +9,14 @@ import numpy as np
 from notchflex.statics.actuation import drawn_when_closed
 
 if TYPE_CHECKING:  # for the type only: a path tells its reasons
-    from notchflex.statics.path import Path
+    from notchflex.statics.path import EquilibriumPath
 
 # A stroke is followed up to the last good state before the last notch closes, which leaves it
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
 
 
-def why_not(path: Path, step: int) -> str:
+def why_not(path: EquilibriumPath, step: int) -> str:
     """Why a step did not converge; empty where it did."""
     if path.converged[step]:
         return ""
@@ -58,7 +58,7 @@ def why_not(path: Path, step: int) -> str:
     )
 
 
-def _past_closing(path: Path, step: int) -> bool:
+def _past_closing(path: EquilibriumPath, step: int) -> bool:
     """Whether a stroke of a step is more than an inextensible tendon can lose."""
     reach = drawn_when_closed(path.chain)
     inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))

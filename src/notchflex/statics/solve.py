@@ -13,7 +13,7 @@ from notchflex.statics.command import command
 from notchflex.statics.equilibrium import Equilibrium
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
-from notchflex.statics.path import Path
+from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import run
 from notchflex.statics.state import SavedState, State, fitted
@@ -28,7 +28,7 @@ def simulate(
     from_state: State | SavedState | None = None,
     settings: Settings | None = None,
     refinement: int = 0,
-) -> Path:
+) -> EquilibriumPath:
     """Follow loads one after the other, with friction that remembers.
 
     Args:
@@ -62,7 +62,7 @@ def simulate(
     start = None if from_state is None else fitted(from_state, ready.chain)
     commands = command(load, robot, ready.chain)
     came = run(ready, commands, start, settings or DEFAULT, each_from_start=False)
-    return Path(robot, load, ready, came, settings=settings or DEFAULT)
+    return EquilibriumPath(robot, load, ready, came, settings=settings or DEFAULT)
 
 
 def solve(
@@ -104,7 +104,7 @@ def solve_each(
     *,
     settings: Settings | None = None,
     refinement: int = 0,
-) -> Path:
+) -> EquilibriumPath:
     """Solve many loads, each from rest, without memory from one to the next.
 
     Args:
@@ -129,7 +129,9 @@ def solve_each(
     ready = prepared_for(robot, load, refinement=refinement)
     commands = command(load, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=True)
-    return Path(robot, load, ready, came, each_from_rest=True, settings=settings or DEFAULT)
+    return EquilibriumPath(
+        robot, load, ready, came, each_from_rest=True, settings=settings or DEFAULT
+    )
 
 
 def check_refinement(refinement: int) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import jax.tree_util as tree_util
 import numpy as np
 
+from notchflex._summary import Displayed, Summary
 from notchflex.chain import Chain
 from notchflex.errors import InputError
 from notchflex.flexure import LEVELS
@@ -21,8 +22,8 @@ _LOADS = ".applied"
 _FORMAT = "notchflex state 3"
 
 
-@dataclass(frozen=True)
-class State:
+@dataclass(frozen=True, repr=False)
+class State(Displayed):
     """Everything that the next load needs to know of the past.
 
     Attributes:
@@ -63,6 +64,11 @@ class State:
         except (OSError, ValueError) as error:  # ValueError: a null character in the name
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"the state cannot be written to {path}: {reason}") from None
+
+    def _summary(self) -> Summary:
+        from notchflex.results.summary import state_summary
+
+        return state_summary(self)
 
     @property
     def follows(self) -> bool:

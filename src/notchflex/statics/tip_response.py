@@ -24,7 +24,7 @@ from notchflex.statics.known import KnownForm
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.packing import Form, lane_sizes
-from notchflex.statics.path import Path
+from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import prepared
 from notchflex.statics.quantities import shape
 from notchflex.statics.run import run
@@ -48,7 +48,7 @@ class TipResponse:
             world, (s, 6, 6).
     """
 
-    path: Path
+    path: EquilibriumPath
     jacobian: Float[np.ndarray, "s 6 t"]
     compliance: Float[np.ndarray, "s 6 6"]
 
@@ -94,7 +94,7 @@ def tip_response(
     ready = prepared(robot, "space", loaded=True, refinement=refinement, flat=False)
     commands = command(path, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=False)
-    found = Path(robot, path, ready, came)
+    found = EquilibriumPath(robot, path, ready, came)
     long = ready.long
     loads, form = ready.long_commands(commands)
     states, between = (

@@ -1,0 +1,204 @@
+"""One quantity of a path over another, and bent shapes, on axes of matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from notchflex.errors import InputError
+from notchflex.plotting.curves import COLOUR, LINE, failures, solved_only
+from notchflex.plotting.drive import LETTING_GO, PULLING, branches, drive
+from notchflex.plotting.equilibrium import robot_shape, state_shape
+from notchflex.plotting.sheet import BESIDE, INSIDE, Item, Line, Panel
+from notchflex.plotting.style import house_style, sequence_colours
+from notchflex.plotting.with_matplotlib import draw_panel
+from notchflex.results.csv import Entry, entries_of, is_listed
+from notchflex.results.quantities import QUANTITIES
+from notchflex.results.quantity import Quantity
+from notchflex.robot import Robot
+
+if TYPE_CHECKING:
+    from notchflex.statics import EquilibriumPath
+
+STEP = "step"
+"""What stands for the number of the step, from 1."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """Values of one quantity along a path, S steps, k entries.
+
+    Attributes:
+        label: What stands at the axis, with symbol and unit.
+        names: What a legend calls each entry; "" for a quantity with one number.
+        headers: The CSV column of each entry; "" where it has none.
+        values: (S, k), in the units of pictures.
+        per: What the entries stand for, such as ("notch",).
+    """
+
+    label: str
+    names: Sequence[str]
+    headers: Sequence[str]
+    values: NDArray[np.float64]
+    per: tuple[str, ...] = ()
+
+
+def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> Axes:
+    """Draw one quantity of a path over another, or the shape of a state or a robot.
+
+    Args:
+        thing: A path; a state or a robot where x and y are None.
+        x: Quantity along the horizontal axis; see `notchflex.plot`.
+        y: Quantity along the vertical axis.
+        ax: Axes to draw into; new ones of pyplot if None.
+
+    Raises:
+        InputError: It can't be drawn on one pair of axes, or there is no such quantity.
+    """
+    from notchflex.statics import Equilibrium, EquilibriumPath
+
+    if isinstance(thing, EquilibriumPath):
+        if x is None or y is None:
+            raise InputError(
+                "a path is drawn on axes as one quantity over another; give both, such as "
+                "plot('stroke', 'tension')"
+            )
+        panel = quantities_panel(thing, x, y)
+    elif x is not None or y is not None:
+        raise InputError(
+            "one quantity is drawn over another for a path; "
+            f"got a {type(thing).__name__}, which is drawn by plot(it)"
+        )
+    elif isinstance(thing, Equilibrium):
+        panel = state_shape(thing.path, thing.step)
+    elif isinstance(thing, Robot):
+        panel = robot_shape(thing)
+    else:
+        raise InputError(
+            "axes can be given for a path, a state or a robot; the picture of a "
+            f"{type(thing).__name__} has axes of its own: plot(it)"
+        )
+    figure = _new_figure(panel) if ax is None else None
+    with house_style():
+        projection = "3d" if panel.in_space else None
+        axes: Any = ax if figure is None else figure.add_subplot(projection=projection)
+        if panel.in_space and axes.name != "3d":
+            raise InputError(
+                "this robot bends out of one plane; give axes made with projection='3d'"
+            )
+        draw_panel(axes, panel)
+    return axes
+
+
+def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
+    """Return one quantity of a path over another; loading and unloading have their own lines.
+
+    Raises:
+        InputError: There is no such quantity, it is no number, or x has several entries.
+    """
+    ways = [(part, PULLING if up else LETTING_GO) for part, up in branches(drive(path))]
+    both = len({way for _, way in ways}) > 1
+    across, upward = series_of(path, x), series_of(path, y)
+    pairs = _pairs(x, across, upward)
+    several = len(pairs) > 1
+    items: list[Item] = []
+    for (column, row), shade in zip(pairs, sequence_colours(len(pairs)), strict=True):
+        points = np.stack([across.values[:, column], upward.values[:, row]], axis=1)
+        points = solved_only(path, points)
+        named: set[str] = set()
+        for part, way in ways:
+            name = upward.names[row] if several else way
+            items.append(
+                Line(
+                    points[part],
+                    shade if several else COLOUR[way],
+                    LINE[way],
+                    marker="o" if part.stop - part.start == 1 else "",
+                    name="" if name in named or not (several or both) else name,
+                    group=name,
+                    told=True,
+                )
+            )
+            named.add(name)
+    if several and both:
+        items += [Line([], "#4c4c4c", LINE[way], name=way) for way in (PULLING, LETTING_GO)]
+    if len({column for column, _ in pairs}) == 1:
+        items += failures(path, across.values[:, pairs[0][0]])
+    told = both or not np.all(path.converged)
+    legend = BESIDE if several else INSIDE if told else ""
+    return Panel(items, across.label, upward.label, legend=legend, whole_x=x == STEP)
+
+
+def series_of(path: EquilibriumPath, name: str) -> Series:
+    """Return a quantity of a path by its name, or one of its entries by its CSV column.
+
+    Raises:
+        InputError: There is none of that name, or it has no numbers that could be drawn.
+    """
+    if name == STEP:
+        return Series(STEP, [""], [""], np.arange(1.0, len(path) + 1.0)[:, None])
+    known = [one for one in QUANTITIES.values() if is_listed(one) and one.kind is not str]
+    for quantity in known:
+        if quantity.name == name:
+            entries = list(entries_of(path, quantity))
+            values = np.stack([np.asarray(one.values, float) for one in entries], axis=1)
+            names, headers = [one.name for one in entries], [one.header for one in entries]
+            return Series(quantity.label, names, headers, values, quantity.per)
+    headers = {one.header: (one, of) for of in known for one in entries_of(path, of) if one.header}
+    if name in headers:
+        entry, quantity = headers[name]
+        label = _label(quantity, entry)
+        return Series(label, [""], [name], np.asarray(entry.values, float)[:, None])
+    if name in QUANTITIES:
+        raise InputError(f"{name} can't be drawn as lines; draw a quantity such as total_angle")
+    choice = [*(one.name for one in known), *headers, STEP]
+    near = get_close_matches(str(name), choice, 3, 0.5)
+    meant = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(choice)}"
+    raise InputError(f"there is no quantity {name!r} to draw; {meant}")
+
+
+def _label(quantity: Quantity, entry: Entry) -> str:
+    """Return the label of one entry: "angle of notch 3", "tip position x"."""
+    name = entry.name
+    if not name:
+        return quantity.label
+    if quantity.per == ("axis",):
+        title, symbol = f"{quantity.title} {name}", f"{quantity.symbol}_{name}"
+    else:
+        title = f"{quantity.title.removeprefix(f'{quantity.per[0]} ')} of {name}"
+        symbol = quantity.symbol.replace("_j", f"_{name.removeprefix('notch ')}")
+    return replace(quantity, title=title, symbol=symbol).label
+
+
+def _pairs(x: str, across: Series, upward: Series) -> list[tuple[int, int]]:
+    """Which entry of y is drawn over which of x: equal tendons or notches, or all over the one."""
+    count = across.values.shape[1]
+    if count > 1 and across.per == upward.per:
+        return [(index, index) for index in range(count)]
+    used = range(count)
+    if count > 1 and across.per == ("tendon",):  # tendons that nobody pulls say nothing
+        used = np.flatnonzero(np.ptp(across.values, axis=0) > 0.0).tolist()
+    if len(used) != 1:
+        columns = ", ".join(header for header in across.headers if header) or "tension, stroke"
+        raise InputError(
+            f"{x} has {count} entries; take one of them for the horizontal axis: {columns}"
+        )
+    return [(used[0], row) for row in range(upward.values.shape[1])]
+
+
+def _new_figure(panel: Panel) -> Any:
+    """Return a new figure of pyplot, so that a notebook or `pyplot.show()` shows it.
+
+    It is made outside our style: pyplot chooses its backend, and with it whether figures show
+    themselves, when it makes the first figure, and leaving the style would undo that.
+    """
+    from matplotlib import pyplot
+
+    size = (5.6, 5.6) if panel.equal or panel.in_space else (6.0, 4.0)
+    return pyplot.figure(figsize=size, layout="constrained")

@@ -1,0 +1,55 @@
+"""The summary of a robot: what `repr` and a notebook show of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from notchflex._summary import Summary, short
+from notchflex.robot._explain import fields_of
+
+if TYPE_CHECKING:
+    from notchflex.robot.robot import Robot
+
+MOST = 4
+"""Different values of one key that are listed; of more, their range."""
+
+_HINT = ".plot() draws it; .with_value(...) returns a changed copy"
+
+
+def robot_summary(robot: Robot) -> Summary:
+    """Summarise a robot: its tube, notches, tendons, material and friction."""
+    kinds: dict[str, list[Any]] = {}
+    for notch in robot.notches:
+        kinds.setdefault(getattr(notch, "kind"), []).append(notch)  # noqa: B009
+    rows = [("tube", _words([robot.tube]))]
+    rows += [("notches", f"{len(same)} {kind}: {_words(same)}") for kind, same in kinds.items()]
+    rows.append(("tendons", f"{len(robot.tendon)}: {_words(robot.tendon)}"))
+    for name in ("material", "friction"):
+        part = getattr(robot, name)
+        rows.append((name, ", ".join(one for one in (part.kind, _words([part])) if one)))
+    return Summary(f"Robot {robot.name}", rows, _HINT)
+
+
+def _words(parts: Sequence[Any]) -> str:
+    """Return the values of parts of one kind that are not their defaults."""
+    words: list[str] = []
+    for name, field in fields_of(type(parts[0])).items():
+        values = list(dict.fromkeys(getattr(part, name) for part in parts))
+        if name in ("kind", "repeat") or values in ([None], [field.default]):
+            continue
+        extra = field.json_schema_extra
+        unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+        title = name.removesuffix(f"_{unit}").replace("_", " ")
+        words.append(f"{title} {_values(values)} {unit}".strip())
+    return ", ".join(words)
+
+
+def _values(values: Sequence[Any]) -> str:
+    numbers = all(isinstance(one, (int, float)) for one in values)
+    if numbers and len(values) > MOST:
+        return f"{short(min(values))} to {short(max(values))}"
+    return "/".join(short(one) if isinstance(one, float) else str(one) for one in values)
+
+
+__all__ = ["robot_summary"]
