@@ -90,3 +90,16 @@ def test_robots_of_one_form_share_a_program():
     assert module._followed._cache_size() == before
     expected = nf.simulate(other, [nf.Load(tension=0.3), nf.Load(tension=0.7)]).total_angle
     assert np.asarray(angle) == pytest.approx(expected, rel=1e-11)
+
+
+def test_both_sides_by_the_force_at_one_step():
+    """The force of the last step alone: the contacts let go on one side only."""
+    loads = [nf.Load(tension=value, tip_force=(0.02, 0.0, 0.0)) for value in TENSION[:3]]
+    bend = nf.differentiable(TWO, loads, ["tip_force"], outputs=("total_angle",))
+    assert {(one.step, one.kind) for one in bend.kinks()} == {(2, "contact")}
+    force = np.zeros((3, 3))
+    force[2, 0] = 1.0
+    below, above = bend.one_sided({"tip_force": force})
+    assert below["total_angle"][:2] == pytest.approx(0.0, abs=1e-9)
+    assert below["total_angle"][2] == pytest.approx(0.0, abs=1e-4)
+    assert above["total_angle"][2] == pytest.approx(0.6087, abs=1e-3)
