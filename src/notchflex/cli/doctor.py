@@ -7,7 +7,9 @@ import re
 import sys
 from collections.abc import Iterable
 from importlib import metadata
-from typing import Any
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 from notchflex import __version__
 from notchflex._extras import install_command
@@ -19,14 +21,19 @@ BUILDERS = ("test", "dev", "docs", "all")
 """Extras for those who change the program, or of all others together."""
 
 
-def doctor(*, clear_cache: bool = False, json: JsonFile = None, quiet: Quiet = False) -> int:
+ClearCache = Annotated[
+    bool,
+    Parameter(
+        help="Remove the compiled programs kept on disk; they are compiled anew when needed."
+    ),
+]
+
+
+def doctor(*, clear_cache: ClearCache = False, json: JsonFile = None, quiet: Quiet = False) -> int:
     """Check the installation: versions, the device of JAX, extras, the kept programs.
 
     JAX 0.10.2 and 0.11.0 compute wrong sums on the processor; one such sum is computed and
     compared. The exit code is 1 where it is wrong: no number of this program can be trusted then.
-
-    Args:
-        clear_cache: Remove the compiled programs kept on disk; they are compiled anew when needed.
     """
     terminal.be_quiet(quiet)
     if json is not None:
