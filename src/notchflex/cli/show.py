@@ -9,7 +9,15 @@ import numpy as np
 
 from notchflex.cli import terminal
 from notchflex.cli.notch_tables import closing_legend, closing_table, description_tables
-from notchflex.cli.options import JsonFile, Quiet, RobotName, Settings, chosen_robot, robot_files
+from notchflex.cli.options import (
+    JsonFile,
+    Quiet,
+    RobotName,
+    Settings,
+    changed_title,
+    chosen_robot,
+    robot_files,
+)
 from notchflex.results.files import STANDARD_OUTPUT, check_output
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
@@ -47,13 +55,13 @@ def show(
 
         write_json(json, {**document_head(chosen), "notches": notches})
     if json != STANDARD_OUTPUT and not quiet:
-        _print(chosen, length, notches)
+        _print(chosen, changed_title(chosen, settings), length, notches)
 
 
-def _print(robot: Robot, length: float, notches: list[dict[str, Any]]) -> None:
+def _print(robot: Robot, title: str, length: float, notches: list[dict[str, Any]]) -> None:
     console = terminal.output()
     tube = robot.tube
-    console.print(robot.name, style="bold", soft_wrap=True)
+    console.print(title, style="bold", soft_wrap=True)
     console.print(
         f"tube      outer diameter {tube.outer_diameter:g} mm, inner diameter "
         f"{tube.inner_diameter:g} mm, length {length:g} mm"
