@@ -11,6 +11,7 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
+from notchflex.plotting.labels import for_paper, heading_lines, translated
 from notchflex.plotting.sheet import (
     BELOW,
     BESIDE,
@@ -34,8 +35,11 @@ ELEVATION, AZIMUTH = 18.0, -60.0
 
 def figure_of(picture: Picture) -> Figure:
     """Return a picture as a figure of matplotlib."""
+    heading = heading_lines(picture.title, picture.width)
+    picture = translated(picture, for_paper)
     with house_style():
-        figure = new_figure(picture.width, picture.height, picture.title)
+        title = "\n".join(map(for_paper, heading))
+        figure = new_figure(picture.width, picture.height, title)
         grid = figure.add_gridspec(*picture.shape)
         scales: dict[str, list[Axes]] = {}
         shared: dict[str, Axes] = {}
@@ -48,7 +52,7 @@ def figure_of(picture: Picture) -> Figure:
             axes: Any = figure.add_subplot(place, **options)
             for name in sharing:
                 shared.setdefault(name, axes)
-            draw_panel(axes, panel)
+            _draw_panel(axes, panel)
             if panel.scale:
                 scales.setdefault(panel.scale, []).append(axes)
         # matplotlib shares no axes of equal scale, so that each learns what the others show.
@@ -81,6 +85,10 @@ def _columns(names: list[str], width: float) -> int:
 
 def draw_panel(axes: Any, panel: Panel) -> None:
     """Draw a panel into axes of matplotlib, of three dimensions where it is in space."""
+    _draw_panel(axes, translated(panel, for_paper))
+
+
+def _draw_panel(axes: Any, panel: Panel) -> None:
     faces = [item for item in panel.items if isinstance(item, Faces)]
     if faces:
         _draw_faces(axes, faces)
