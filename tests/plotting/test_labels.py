@@ -122,7 +122,9 @@ def test_our_own_symbols_are_mathematics():
         assert "$" not in for_browser(f"angle ${symbol}$ [deg]")
 
 
-@pytest.mark.parametrize("text", [NASTY, "$", "$$", "a$b", r"\$", r"\\$\$", "_", "$T$$", "\x00\x1b"])
+@pytest.mark.parametrize(
+    "text", [NASTY, "$", "$$", "a$b", r"\$", r"\\$\$", "_", "$T$$", "\x00\x1b"]
+)
 def test_any_text_is_drawn_by_matplotlib(text):
     from matplotlib.figure import Figure
 

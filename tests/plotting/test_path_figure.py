@@ -314,5 +314,10 @@ def test_robots_that_leave_the_plane_are_drawn_in_space():
     assert bending_plane(path.robot.with_value("notch[2].direction_deg", 180)) == 0.0
     path.robot = path.robot.with_value("notch[2].direction_deg", 90)
     figure = path_figure(path)
-    assert [axes.name for axes in figure.axes] == ["3d", "rectilinear", "rectilinear", "rectilinear"]
+    assert [axes.name for axes in figure.axes] == [
+        "3d",
+        "rectilinear",
+        "rectilinear",
+        "rectilinear",
+    ]
     assert figure.axes[0].get_zlabel() == "z, along the base [mm]"

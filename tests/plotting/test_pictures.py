@@ -132,7 +132,9 @@ def test_legends_of_a_browser_name_what_those_of_paper_name(drawn):
 
 
 def test_a_shape_goes_with_all_its_parts(drawn):
-    traces = [trace for trace in drawn["path"].interactive().data if trace.fill == "toself" and trace.name]
+    traces = [
+        trace for trace in drawn["path"].interactive().data if trace.fill == "toself" and trace.name
+    ]
     assert all(trace.legendgroup == trace.name for trace in traces)
     area = next(
         one for one in drawn["path"].cells[0].panel.items if isinstance(one, Area) and one.name
