@@ -12,6 +12,12 @@ from notchflex.cli import terminal
 from notchflex.robot import Robot
 
 NO_NUMBER = "–"
+CLOSES, NEVER, NOT_FOUND = "closes", "never", "not found"
+_MEANINGS = {
+    NEVER: "no tension closes the notch",
+    NOT_FOUND: "the solver did not converge at the tensions in question, so the notch may close; "
+    "`notchflex simulate` shows how far it bends",
+}
 SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
 """Heads for what every notch has, so that there is room for what is its own."""
 
@@ -67,8 +73,8 @@ def closing_table(notches: list[dict[str, Any]]) -> Table:
         "arm\nmm": [f"{row['moment_arm_mm'][row['closing_tendon'] - 1]:.4f}" for row in notches],
         "closing\ndeg": _numbers(notches, "closing_angle_deg", ".2f"),
         "tension\nN": [
-            f"{row['closing_tension_N']:.3f}" if np.isfinite(row["closing_tension_N"]) else "never"
-            for row in notches
+            f"{row['closing_tension_N']:.3f}" if status == CLOSES else status
+            for row, status in zip(notches, map(closing_status, notches), strict=True)
         ],
         "strain\n%": _numbers(notches, "closing_outer_strain", ".2f", 100.0),
         "peak\n%": _numbers(notches, "closing_peak_strain", ".2f", 100.0),
@@ -77,10 +83,23 @@ def closing_table(notches: list[dict[str, Any]]) -> Table:
     return _filled(list(shown), [list(row) for row in zip(*shown.values(), strict=True)])
 
 
+def closing_status(row: dict[str, Any]) -> str:
+    """Return whether a notch closes: `CLOSES`, `NEVER`, or `NOT_FOUND` where the search failed.
+
+    Args:
+        row: Of `notch_table`; one without a status of its own has a number where the notch closes,
+            infinity where no tension closes it, and NaN where none was found.
+    """
+    tension = row["closing_tension_N"]
+    missing = NEVER if np.isinf(tension) else NOT_FOUND
+    return str(row.get("closing_status", CLOSES if np.isfinite(tension) else missing))
+
+
 def closing_legend(notches: list[dict[str, Any]]) -> str:
     """Return what the columns of the closing table mean."""
     pulled = "the tendon" if len(notches[0]["moment_arm_mm"]) == 1 else "the tendon named"
     spine = any("centroid_mm" in row for row in notches)
+    shown = {closing_status(row) for row in notches}
     words = (
         "A, y, I: area, centroid (from the tube axis toward the spine) and second moment"
         if spine
@@ -95,6 +114,7 @@ def closing_legend(notches: list[dict[str, Any]]) -> str:
     return (
         f"{words} of what the cut leaves, where it is weakest. arm: moment arm of {pulled}. "
         f"Closing: angle of the notch and tension of that tendon pulled alone from rest{strains}."
+        + "".join(f" {status}: {text}." for status, text in _MEANINGS.items() if status in shown)
     )
 
 
