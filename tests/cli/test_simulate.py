@@ -84,11 +84,23 @@ def test_named_columns(call):
     assert "did you mean `notch_angle`" in err
 
 
-def test_quiet_makes_no_table(call, monkeypatch):
+def test_quiet_computes_only_what_it_warns_of(call, monkeypatch):
+    made, asked = [], []
     monkeypatch.setattr(
-        "notchflex.cli.path_rows.shown_rows", lambda *_: pytest.fail("a table was made")
+        "notchflex.cli.path_table.print_path", lambda *_, **__: made.append("table")
     )
+    monkeypatch.setattr("notchflex.results.carry.whole_document", lambda _: made.append("json"))
+    for name in ("reason", "dissipation", "tendon_work", "front"):
+
+        def spy(path, name=name):
+            asked.append(name)
+            return []
+
+        monkeypatch.setattr(nf.Path, name, property(spy))
     assert call(*LOOP[:2], "--tension", "0,1", "--quiet") == (0, "", "")
+    assert (made, asked) == ([], [])
+    call(*LOOP[:2], "--tension", "0,1")
+    assert made == ["table"]
 
 
 def test_bends_toward_x(call):

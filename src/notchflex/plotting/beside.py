@@ -155,7 +155,7 @@ def _tensions(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel
         items.append(_dots(points, colours, label, size=1.8))
     return Panel(
         items or [Note("no tendon is pulled")],
-        "span of first pulled tendon [number], 0 at the base",
+        "span [number], first pulled tendon",
         quantity.label,
         title="where bent most" if items else "",
         y_range=(0.0, None) if items else None,

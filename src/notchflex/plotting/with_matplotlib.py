@@ -97,7 +97,7 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
     if panel.in_space:
         _equal_in_space(axes, panel)
         axes.view_init(elev=ELEVATION, azim=AZIMUTH)
-        axes.set_zlabel(panel.z_label, labelpad=9.0)
+        axes.set_zlabel(panel.z_label, labelpad=12.0)
     else:
         axes.autoscale_view()
     if panel.equal:
@@ -119,7 +119,9 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
     if panel.legend == BELOW:  # axes of three dimensions have no empty corner
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2)
     elif panel.legend == BESIDE:
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
+        # In space the numbers and the name of the upright axis stand there too.
+        at = (1.25, 1.0) if panel.in_space else (1.0, 1.0)
+        axes.legend(loc="upper left", bbox_to_anchor=at, borderaxespad=0.2)
     elif panel.legend:
         axes.legend(loc="best")
 
