@@ -47,7 +47,7 @@ def path_figure(path: Path, *, title: str | None = None) -> Figure:
         >>> from notchflex.plotting import path_figure
         >>> path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 2.0, steps=5).release())
         >>> len(path_figure(path).axes)
-        7
+        6
     """
     return path_picture(path, title=title).figure()
 
