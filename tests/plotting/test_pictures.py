@@ -10,6 +10,7 @@ import notchflex as nf
 from fake_path import fake_path
 from notchflex.comparison import Measured, compare
 from notchflex.errors import InputError
+from notchflex.fit import weight_held
 from notchflex.plotting import (
     batch_picture,
     beside_picture,
@@ -55,7 +56,7 @@ def a_rig():
     load = np.tile([100.0, 200.0, 400.0], 4)
     deviation = np.full((12, 4), np.nan)
     deviation[1:, 1] = 0.002 * load[1:]
-    held = nf.fit.weight_held(load, 0.1 + 0.05 * turn, turn, turn)
+    held = weight_held(load, 0.1 + 0.05 * turn, turn, turn)
     return nf.friction_rig(nf.FrictionReadings(load, held, turn, turn, deviation))
 
 
