@@ -29,11 +29,11 @@ MOST_FRAMES = 48
 
 DOTS_PER_INCH = 80
 
-MOVING_SECONDS, STANDING_SECONDS = 2.6, 0.9
-"""How long a path moves at least, and how long its first and its last picture stay [s]."""
+SECONDS, STANDING_SECONDS = 4.2, 0.9
+"""How long it takes at least, and how long its first and its last picture stay at least [s]."""
 
-_FRAME = 0.1
-"""Seconds that a frame stays; longer where there are few."""
+_SHORTEST, _LONGEST = 0.1, 0.4
+"""Seconds that a frame stays: the longer the fewer there are."""
 
 
 def save_animation(
@@ -82,8 +82,9 @@ def save_animation(
         axes.plot(x, y, "o", color=colour, markersize=5.0, zorder=9)[0]
         for axes, (x, y, colour) in zip(curves, _dots(path, steps[0]), strict=True)
     ]
-    frame = max(_FRAME, MOVING_SECONDS / len(steps))
-    standing = math.ceil(STANDING_SECONDS / frame)
+    frame = min(max(_SHORTEST, SECONDS / 1.5 / len(steps)), _LONGEST)
+    rest = SECONDS - (len(steps) - 2) * frame
+    standing = math.ceil(max(STANDING_SECONDS, rest / 2.0) / frame)
     writer = PillowWriter(fps=1.0 / frame)  # pyright: ignore[reportArgumentType]
     with (
         replacing(target) as temporary,
