@@ -1,8 +1,9 @@
-"""What is written where: progress on a terminal only, quiet, colours, tables of 80 columns."""
+"""What is written where: progress on a terminal only, quiet, colours, the width of tables."""
 
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 
@@ -86,14 +87,33 @@ def test_tables_fit_80_columns(call, robot):
 
 
 def test_comparison_of_many_notches_fits_80_columns(call, tmp_path):
-    code, out, _ = call("simulate", "gao2017", "--tension", "1=1,2", "--csv", "g.csv")
-    assert code == 0
-    assert max(map(len, out.splitlines())) <= 80
+    assert call("simulate", "gao2017", "--tension", "1=1,2", "--csv", "g.csv")[0] == 0
     code, out, _ = call("compare", "gao2017", "g.csv")
     assert code == 0
     assert max(map(len, out.splitlines())) <= 80
     for notch in range(1, 28):
         assert f"n{notch} " in out.replace("\n", " ")
+
+
+@pytest.mark.parametrize(("columns", "shown"), [("80", False), ("130", True)])
+def test_a_table_is_as_wide_as_the_terminal(columns, shown):
+    loads = ("--tension", "0:2:3", "--gravity", "0,0.5,-9.81")
+    out = on_a_terminal("simulate", "pacheco2021-a", *loads, COLUMNS=columns)
+    lines = out.splitlines()
+    assert any("n5" in line and "tip y" in line for line in lines) is shown
+    assert ("--columns notch_angle shows them" in " ".join(out.split())) is not shown
+    table = lines[: next(i for i, line in enumerate(lines) if line.startswith("T: "))]
+    assert max(len(re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", line)) for line in table[1:]) <= int(
+        columns
+    )
+
+
+@pytest.mark.parametrize("columns", ["", "60"])
+def test_a_pipe_has_one_width_unless_told(call, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", columns)
+    _, out, _ = call("simulate", "two-axis-wrist", "--tension", "1=0:2:3", "--tension", "2=1")
+    assert ("T4" in out and "n8" in out) is not columns
+    assert ("No room in 60 columns for: " in out) is bool(columns)
 
 
 def test_robots_beside_each_other(call, tmp_path):

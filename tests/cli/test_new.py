@@ -1,12 +1,13 @@
 """`notchflex new`: from options, from a pipe, from a person; nothing is overwritten."""
 
 import io
+import re
 
 import pytest
 
 from notchflex import load_robot
 from notchflex.cli import run
-from notchflex.cli.ask import choice, reading, readings, whole
+from notchflex.cli.readings import choice, reading, readings, whole
 from notchflex.errors import InputError
 
 OPTIONS = {
@@ -34,6 +35,23 @@ def pipe(monkeypatch, *lines):
     monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{line}\n" for line in lines)))
 
 
+def person(monkeypatch, *answers):
+    """A person at a terminal who types these answers; returns the prompts that were shown."""
+    left, asked = iter(answers), []
+
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    def typed(prompt):
+        asked.append(prompt)
+        return next(left)
+
+    monkeypatch.setattr("sys.stdin", Terminal())
+    monkeypatch.setattr("builtins.input", typed)
+    return asked
+
+
 def test_options_alone_make_a_robot(monkeypatch, tmp_path, capsys):
     pipe(monkeypatch)
     assert run(command(friction="0.1", precurvature="-1")) == 0
@@ -51,9 +69,73 @@ def test_file_says_what_was_not_measured(monkeypatch, tmp_path):
     pipe(monkeypatch)
     assert run(command(elastic_modulus="9000")) == 0
     lines = (tmp_path / "w.toml").read_text(encoding="utf-8").splitlines()
-    assert any("coefficient" in line and "estimate" in line for line in lines)
-    assert any(line.startswith("radius") and "assumed" in line for line in lines)
-    assert not any(line.startswith("elastic_modulus") and "estimate" in line for line in lines)
+    values = {line.partition(" = ")[0]: line for line in lines}
+    for key in (
+        "superelastic_modulus", "transition_strain", "plastic_strain", "plastic_modulus",
+        "plastic_exponent", "poisson_ratio", "density", "allowed_strain", "coefficient",
+    ):  # fmt: skip
+        assert "estimate: " in values[key], key
+    for key in ("base_length", "precurvature_deg", "radius", "axial_stiffness", "wrap"):
+        assert "assumed" in values[key], key
+    for key in ("elastic_modulus", "outer_diameter", "depth", "height", "uncut_length", "name"):
+        assert not re.search("estimate|assumed", values[key]), key
+    # What a key means stands at the first notch only.
+    assert sum("depth of the cut" in line for line in lines) == 1
+
+
+def test_a_new_wrist_is_warned_of_its_strain(monkeypatch, tmp_path, capsys):
+    pipe(monkeypatch)
+    assert run(command()) == 0
+    assert load_robot(tmp_path / "w.toml").material.allowed_strain == 0.08
+    assert run(["simulate", "w.toml", "--tension", "3", "--quiet"]) == 0
+    assert "passes the allowed strain of 8 %" in capsys.readouterr().err
+    assert run(command("v", allowed_strain="none")) == 0
+    assert load_robot(tmp_path / "v.toml").material.allowed_strain is None
+    assert run(command("u", allowed_strain="0.06")) == 0
+    text = (tmp_path / "u.toml").read_text(encoding="utf-8")
+    assert "recovers" not in text
+    assert run(command("t", material="linear", elastic_modulus="60000")) == 0
+    linear = load_robot(tmp_path / "t.toml").material
+    assert (linear.density, linear.allowed_strain) == (None, None)
+
+
+@pytest.mark.parametrize("word", ["<", "back"])
+def test_a_person_goes_back(monkeypatch, tmp_path, capsys, word):
+    asked = person(
+        monkeypatch, word, "mine", "1.62", "1.4", word, word, "1.8", "1.5", "", "off", "2", "1.2",
+        *[""] * 20,
+    )  # fmt: skip
+    options = {"--height": "1", "--uncut-length": "1"}
+    assert run(["new", "w", *(part for pair in options.items() for part in pair)]) == 0
+    robot = load_robot(tmp_path / "w.toml")
+    assert robot.name == "mine"
+    assert (robot.tube.outer_diameter, robot.tube.inner_diameter) == (1.8, 1.5)
+    assert robot.notches[1].depth == 1.2
+    assert robot.tendon[0].radius == 0.75  # the default follows the answer that was changed
+    diameters = [prompt for prompt in asked if "diameter" in prompt]
+    wanted = ["Outer", "Inner", "Inner", "Outer", "Inner"]
+    assert [prompt.split()[0] for prompt in diameters] == wanted
+    out = capsys.readouterr().out
+    assert "This is the first question" in out
+    assert "goes back to the previous question" in " ".join(out.split())
+
+
+def test_prompts_are_broken_at_words(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "50")
+    asked = person(monkeypatch, "", "1.62", "1.4", "", "on-axis", "3", "1.3", "1", "1", *[""] * 10)
+    assert run(["new", "w"]) == 0
+    shown = [*capsys.readouterr().out.splitlines()[:-1], *asked]
+    assert max(map(len, shown)) <= 50
+    words = " ".join(shown).split()
+    assert {"straight", "stiffness", "superelastic", "commas,"} <= set(words)
+
+
+def test_what_a_pipe_holds_is_no_way_back(monkeypatch, tmp_path):
+    pipe(monkeypatch, "back", "1.62", "1.4", "", "on", "5", "1.4", "0.8", "1.2")
+    assert run(["new", "w"]) == 0
+    assert load_robot(tmp_path / "w.toml").name == "back"
+    pipe(monkeypatch, "x", "1.62", "<")
+    assert run(["new", "v"]) == 2
 
 
 def test_answers_come_line_by_line_from_a_pipe(monkeypatch, tmp_path):
@@ -69,26 +151,14 @@ def test_answers_come_line_by_line_from_a_pipe(monkeypatch, tmp_path):
 def test_a_person_is_asked_again_and_told_why(monkeypatch, tmp_path, capsys):
     tube = ["", "1,62", "1.62", "1.7", "1.40", ""]
     notches = ["x", "on-axis", "0", "2", "9", "1.4", "0.8", "1.2", "", ""]
-    rest = ["", "", "linear", "60000", "0"]
-    answers = iter([*tube, *notches, *rest])
-
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
-
-    asked = []
-
-    def typed(prompt):
-        asked.append(prompt)
-        return next(answers)
-
-    monkeypatch.setattr("sys.stdin", Terminal())
-    monkeypatch.setattr("builtins.input", typed)
+    rest = ["", "", "linear", "60000", "0", "0.01"]
+    asked = person(monkeypatch, *tube, *notches, *rest)
     assert run(["new", "asked"]) == 0
     robot = load_robot(tmp_path / "asked.toml")
     assert robot.number_of_notches == 2
     assert robot.material.elastic_modulus == 60000.0
-    out = capsys.readouterr().out
+    assert robot.material.allowed_strain == 0.01
+    out = " ".join(capsys.readouterr().out.split())
     assert "give a finite number greater than 0 and less than 1.62" in out
     assert "give on-axis or off-axis" in out
     assert asked[1] == "Outer diameter of the tube [mm]: "

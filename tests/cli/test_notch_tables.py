@@ -1,5 +1,7 @@
 """How notches of every kind are listed: their own columns, within 80 characters."""
 
+import math
+
 import pytest
 from rich.console import Console
 
@@ -66,8 +68,27 @@ ROW = {
 }
 
 
+@pytest.mark.parametrize(
+    ("given", "word"),
+    [
+        ({"closing_status": "never"}, "never"),
+        ({"closing_status": "not found"}, "not found"),
+        ({"closing_status": "closes", "closing_tension_N": 1.5}, "1.500"),
+    ],
+)
+def test_a_failed_search_is_not_called_never(given, word):
+    row = ROW | given
+    others = {"never", "not found"} - {word}
+    text = " ".join(text_of(closing_table([row])).split())
+    assert word in text
+    assert not any(other in text for other in others)
+    legend = closing_legend([row])
+    assert ("no tension closes the notch" in legend) is (word == "never")
+    assert ("the notch may close" in legend) is (word == "not found")
+
+
 def test_columns_without_a_number_are_left_out():
-    text = text_of(closing_table([ROW]))
+    text = text_of(closing_table([{**ROW, "closing_tension_N": math.inf}]))
     assert "never" in text
     assert "3.2500" in text
     assert "strain" not in text

@@ -47,15 +47,60 @@ def test_files_and_table_say_the_same(call, tmp_path):
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert "Pacheco 2021, wrist A" in out
     assert f"{steps[3]['total_angle_deg']:.2f}" in out
-    assert max(len(line) for line in out.splitlines()) <= 80
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.json", "a.png"]
 
 
 def test_long_paths_are_thinned_and_say_so(call):
     _, out, _ = call("simulate", "pacheco2021-a", "--tension", "0:3:31,3:0:31")
-    assert "62 steps, 21 of them shown" in out
+    assert "62 steps, 33 shown: every 2nd one, and where the load reverses" in out
     shown = [int(line.split()[0]) for line in out.splitlines() if line[:4].strip().isdigit()]
-    assert {1, 31, 32, 62} <= set(shown)
+    assert shown == sorted({*range(1, 63, 2), 32, 62})
+    _, out, _ = call("simulate", "pacheco2021-a", "--tension", "0:3:31,3:0:31", "--all")
+    shown = [int(line.split()[0]) for line in out.splitlines() if line[:4].strip().isdigit()]
+    assert shown == list(range(1, 63))
+    assert "shown" not in out
+
+
+def test_what_set_changed_stands_above_the_table_and_in_the_picture(call, tmp_path):
+    change = ("--set", "notch.depth=1.38", "--set", "friction.coefficient=0.1")
+    _, out, _ = call(*LOOP[:2], "--tension", "0,1", *change, "--plot", "a.svg")
+    title = "Pacheco 2021, wrist A with notch.depth = 1.38, friction.coefficient = 0.1"
+    assert out.splitlines()[0] == title
+    assert title in (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert call("show", LOOP[1], *change)[1].splitlines()[0] == title
+
+
+def test_named_columns(call):
+    _, out, _ = call(*LOOP[:2], "--tension", "0,2", "--columns", "gap, closed,peak_strain")
+    (last,) = (line.split() for line in out.splitlines() if line.startswith("   2 "))
+    robot = nf.load_robot("pacheco2021-a")
+    state = nf.simulate(robot, [nf.Load(tension=0.0), nf.Load(tension=2.0)])[1]
+    wanted = [f"{value:.3f}" for value in state.gap]
+    wanted += ["yes" if value else "no" for value in state.closed]
+    wanted += [f"{100 * value:.2f}" for value in state.peak_strain]
+    assert [word.lstrip("-") for word in last[1:]] == [word.lstrip("-") for word in wanted]
+    code, out, err = call(*LOOP[:2], "--tension", "1", "--columns", "notch_angel")
+    assert (code, out) == (2, "")
+    assert "did you mean `notch_angle`" in err
+
+
+def test_quiet_computes_only_what_it_warns_of(call, monkeypatch):
+    made, asked = [], []
+    monkeypatch.setattr(
+        "notchflex.cli.path_table.print_path", lambda *_, **__: made.append("table")
+    )
+    monkeypatch.setattr("notchflex.results.carry.whole_document", lambda _: made.append("json"))
+    for name in ("reason", "dissipation", "tendon_work", "front"):
+
+        def spy(path, name=name):
+            asked.append(name)
+            return []
+
+        monkeypatch.setattr(nf.Path, name, property(spy))
+    assert call(*LOOP[:2], "--tension", "0,1", "--quiet") == (0, "", "")
+    assert (made, asked) == ([], [])
+    call(*LOOP[:2], "--tension", "0,1")
+    assert made == ["table"]
 
 
 def test_bends_toward_x(call):
@@ -95,6 +140,30 @@ def test_state_is_continued_with_its_friction(call):
     )
     rest = nf.solve(robot, nf.Load(tension=0.6))
     assert continued["total_angle_deg"] > math.degrees(rest.total_angle) + 0.5
+
+
+def test_state_of_other_values_is_refused(call, tmp_path):
+    call(*LOOP[:2], "--tension", "0:1:4", "--save-state", "state.json")
+    go_on = (*LOOP[:2], "--tension", "0.6", "--from-state", "state.json")
+    code, out, err = call(*go_on, "--set", "notch.depth=1.38")
+    assert (code, out) == (2, "")
+    assert "this robot has notch.depth = 1.38 instead of 1.4" in err
+    code, _, err = call(*go_on, "--set", "notch[2].depth=1.38")
+    assert code == 2
+    assert "notch[2].depth = 1.38 instead of 1.4" in err
+    # When a strain is warned of has no effect on a state.
+    assert call(*go_on, "--set", "material.allowed_strain=0.2")[0] == 0
+    content = json.loads((tmp_path / "state.json").read_text(), parse_constant=pytest.fail)
+    del content["description"]
+    (tmp_path / "state.json").write_text(json.dumps(content))
+    code, _, err = call(*go_on)
+    assert code == 0
+    assert "Warning: state.json was written by an older notchflex" in err
+    content["description"] = "name = 3"
+    (tmp_path / "state.json").write_text(json.dumps(content))
+    code, _, err = call(*go_on)
+    assert code == 2
+    assert "the description of its robot cannot be read" in err
 
 
 def test_stroke_past_the_last_closing_is_not_converged(call, tmp_path):

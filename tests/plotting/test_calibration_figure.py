@@ -40,7 +40,7 @@ def test_panels_and_units():
     ]
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
     assert labels[0] == ("tendon tension $T$ [N]", "angle [deg]")
-    assert labels[6][1] == "residual / its noise"
+    assert labels[6][1] == "residual / its noise [-]"
     assert labels[8][0].replace("\n", "") == "material.elastic_modulus [MPa]"
 
 

@@ -6,11 +6,13 @@ import pytest
 from fake_path import CLOSING, fake_path
 from notchflex.chain import assemble
 from notchflex.errors import InputError
-from notchflex.plotting import path_figure, save
+from notchflex.plotting import path_figure, path_picture, save
 from notchflex.plotting.bent import bent, bent_at
 from notchflex.plotting.drive import abscissa, branches, way_of
 from notchflex.plotting.outline import bending_plane, outline
-from notchflex.plotting.wrist import telling_steps
+from notchflex.plotting.sheet import Area, Level
+from notchflex.plotting.wrist import load_label, telling_steps
+from notchflex.robot import Linear
 from notchflex.statics.external import BodyForce, ExternalLoad
 
 
@@ -32,14 +34,15 @@ def part_of(path, steps):
 LOOP = ["along the base, z"] * 2 + [
     "total bending angle $\\theta$",
     "notch angle $\\theta_j$",
+    "peak strain of every notch",
     "span tension $T$",
-    "friction front $m + (1 - \\eta)/2$, contact",
+    "reversed contacts",
 ]
 
 
 def test_panels_are_what_the_path_holds():
     assert panels(fake_path(5)) == LOOP
-    assert panels(part_of(fake_path(5), slice(0, 5))) == [LOOP[0], *LOOP[2:4]]
+    assert panels(part_of(fake_path(5), slice(0, 5))) == [LOOP[0], *LOOP[2:5]]
     assert panels(part_of(fake_path(5), slice(3, 4))) == LOOP[:1]
     smooth = fake_path(5)
     smooth.columns["contact_bound"] = 0.0 * smooth.contact_bound
@@ -51,34 +54,44 @@ def test_axes_have_quantities_and_units():
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
     assert labels[2] == ("tendon tension $T$ [N]", "total bending angle $\\theta$ [deg]")
     assert labels[3][1] == "notch angle $\\theta_j$ [deg]"
-    assert labels[4] == ("span of tendon, 0 at the base", "span tension $T$ [N]")
+    assert labels[5] == ("span of tendon [number], 0 at the base", "span tension $T$ [N]")
+    assert all("[" in label for labels_of_one in labels for label in labels_of_one)
     assert all("[mm]" in label for labels_of_one in labels[:2] for label in labels_of_one)
     assert figure.axes[0].get_aspect() == 1.0
 
 
 def test_loading_and_unloading_are_told_apart():
     figure = path_figure(fake_path(11))
-    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["pulling", "letting go"]
-    for axes in (figure.axes[2], figure.axes[4]):
+    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["loading", "unloading"]
+    for axes in (figure.axes[2], figure.axes[5]):
         texts = [text.get_text() for text in axes.get_legend().get_texts()]
-        assert texts == ["pulling", "letting go"]
+        assert texts == ["loading", "unloading"]
         assert {line.get_linestyle() for line in axes.get_lines()} == {"-", "--"}
 
 
 def test_tension_is_drawn_from_span_to_span():
     path = fake_path(4)
-    first = path_figure(path).axes[4].get_lines()[0]
+    first = path_figure(path).axes[5].get_lines()[0]
     assert list(first.get_xdata()) == list(range(10))
     np.testing.assert_array_equal(first.get_ydata(), path.span_tension[1, 0])  # step 1 is slack
 
 
 def test_front_goes_from_contact_to_contact_as_eta_falls():
-    path = fake_path(4)
-    path.columns["front_eta"][6] = -0.5
-    path.columns["front_eta"][5] = np.nan
-    _, letting_go = path_figure(path).axes[5].get_lines()
-    # Steps 4 to 8; without tension, in the last, nothing rubs.
-    np.testing.assert_array_equal(letting_go.get_ydata(), [1.0, 2.0, 3.75, np.nan])
+    path = fake_path(5)
+    path.columns["front_eta"][7] = -0.5
+    path.columns["front_eta"][6] = np.nan
+    _, unloading = path_figure(path).axes[6].get_lines()
+    # Steps 5 to 9; without tension, in the last, nothing rubs.
+    np.testing.assert_array_equal(unloading.get_ydata(), [0.0, 1.0, 2.75, 3.0, np.nan])
+
+
+def test_front_is_drawn_only_where_it_moves_through_the_contacts():
+    path = fake_path(5)
+    assert panels(path)[-1] == "reversed contacts"
+    # All at once, as with one contact or after a long way back: there is nothing to see.
+    path.columns["front_contact"][5:] = 1.0 + 9.0 * (np.arange(5) > 0)[:, None]
+    path.columns["front_eta"][6:] = np.nan
+    assert panels(path)[-1] == "span tension $T$"
 
 
 def test_stroke_is_the_abscissa_where_it_is_commanded():
@@ -92,13 +105,78 @@ def test_stroke_is_the_abscissa_where_it_is_commanded():
     np.testing.assert_array_equal(values, path.stroke[:, 0])
 
 
+def by_stroke(steps):
+    path = fake_path(steps)
+    path.columns["commanded_stroke"], path.columns["commanded_tension"] = (
+        path.stroke,
+        path.commanded_stroke,
+    )
+    # Friction: the way back needs less tension.
+    path.columns["tension"][steps:] *= 0.8
+    return path
+
+
+def test_loop_of_tension_over_stroke_is_drawn_where_strokes_drive():
+    path = by_stroke(5)
+    panel = next(cell.panel for cell in path_picture(path).cells if "tension" in cell.panel.y_label)
+    assert panel.x_label == "tendon stroke $u$ [mm]"
+    assert panel.y_label == "tendon tension $T$ [N]"
+    loading, unloading = panel.items
+    assert (loading.name, unloading.name) == ("loading", "unloading")
+    assert (loading.dash, loading.colour) != (unloading.dash, unloading.colour)
+    middle = path.stroke[2, 0]
+    at = [np.interp(middle, *one.rows[np.argsort(one.rows[:, 0])].T) for one in panel.items]
+    assert at[1] < 0.9 * at[0]
+    assert "tendon tension $T$" not in panels(fake_path(5))
+
+
+def test_shapes_are_named_by_what_drives_them():
+    path = by_stroke(4)
+    path.columns["tension"][7] = 4.87e-17
+    names = [
+        text.get_text() for axes in path_figure(path).axes[:2] for text in
+        axes.get_legend().get_texts()
+    ]  # fmt: skip
+    assert all(" mm, " in name or name == "closed notch" for name in names)
+    assert "0 mm, 0.0°" in names
+    path = fake_path(4)
+    path.columns["tension"][0] = 4.87e-17
+    assert load_label(path, 0) == "0 N, 0.0°"
+    assert load_label(path, 2) == f"2 N, {np.degrees(path.total_angle[2]):.1f}°"
+
+
+def test_strain_is_drawn_with_what_is_allowed():
+    path = fake_path(4)
+    panel = next(cell.panel for cell in path_picture(path).cells if "strain" in cell.panel.y_label)
+    (level,) = (item for item in panel.items if isinstance(item, Level))
+    assert (level.at, level.name) == (pytest.approx(8.0), "allowed 8 %")
+    np.testing.assert_allclose(
+        panel.items[0].rows[:, 1], 100.0 * path.peak_strain[:5, 0]
+    )  # the peak is held
+    path.robot = path.robot.replace(material=Linear(10_000.0))
+    panel = next(cell.panel for cell in path_picture(path).cells if "strain" in cell.panel.y_label)
+    assert not any(isinstance(item, Level) for item in panel.items)
+
+
+def test_clamp_ends_where_the_robot_begins():
+    held = outline_at(fake_path(3), 2).held
+    assert held[:, 1].max() == 0.0
+    assert held[:, 1].min() < -0.5
+    assert np.ptp(held[:, 0]) > 1.62
+    areas = [
+        item for cell in path_picture(fake_path(3)).cells[:1] for item in cell.panel.items
+        if isinstance(item, Area) and np.array_equal(item.polygons[0], held)
+    ]  # fmt: skip
+    assert len(areas) == 1  # it stands still, whatever the robot does
+
+
 def test_ways_of_two_tendons_are_told_by_their_sum():
     path = fake_path(3)
     path.columns["tension"] = np.repeat(path.tension, 2, axis=1) * [1.0, 0.5]
     path.columns["commanded_tension"] = path.columns["tension"]
     path.columns["commanded_stroke"] = np.full((6, 2), np.nan)
     path.columns["stroke"] = np.repeat(path.stroke, 2, axis=1)
-    assert way_of(path) == {"pulling": [0, 1, 2, 3], "letting go": [3, 4, 5]}
+    assert way_of(path) == {"loading": [0, 1, 2, 3], "unloading": [3, 4, 5]}
 
 
 def arrows(figure):
@@ -160,7 +238,7 @@ def test_other_formats_are_refused(tmp_path):
 @pytest.mark.parametrize("failed", [1, 6])
 def test_path_with_failures_is_drawn(failed):
     figure = path_figure(fake_path(3, failed=failed))
-    assert len(figure.axes) == (3 if failed == 6 else 6)
+    assert len(figure.axes) == (4 if failed == 6 else 6)
 
 
 def test_single_step_is_drawn():
@@ -189,7 +267,7 @@ def test_abscissa_is_the_step_where_several_tendons_change():
         path.columns[name] = np.repeat(path.columns[name], 2, axis=1)
     assert abscissa(path)[1] == "tension of tendon 1 $T$ [N]"  # both alike
     path.columns["tension"][1, 1] = 0.2
-    assert abscissa(path)[1] == "step"
+    assert abscissa(path)[1] == "step [number]"
     path.columns["tension"][:, 0] = 0.5
     assert abscissa(path)[1] == "tension of tendon 2 $T$ [N]"
 
@@ -238,5 +316,10 @@ def test_robots_that_leave_the_plane_are_drawn_in_space():
     assert bending_plane(path.robot.with_value("notch[2].direction_deg", 180)) == 0.0
     path.robot = path.robot.with_value("notch[2].direction_deg", 90)
     figure = path_figure(path)
-    assert [axes.name for axes in figure.axes] == ["3d", "rectilinear", "rectilinear"]
+    assert [axes.name for axes in figure.axes] == [
+        "3d",
+        "rectilinear",
+        "rectilinear",
+        "rectilinear",
+    ]
     assert figure.axes[0].get_zlabel() == "z, along the base [mm]"

@@ -10,6 +10,7 @@ import notchflex as nf
 from fake_path import fake_path
 from notchflex.comparison import Measured, compare
 from notchflex.errors import InputError
+from notchflex.fit import weight_held
 from notchflex.plotting import (
     batch_picture,
     beside_picture,
@@ -21,7 +22,7 @@ from notchflex.plotting import (
     state_picture,
 )
 from notchflex.plotting.animation import MOST_FRAMES, frames_of
-from notchflex.plotting.plotly_marks import html
+from notchflex.plotting.labels import for_browser as html
 from notchflex.plotting.sheet import Area, Bars, Cell, Line, Panel, Picture
 from notchflex.results.quantities import QUANTITIES
 from notchflex.statics import Batch, ExternalLoad
@@ -55,7 +56,7 @@ def a_rig():
     load = np.tile([100.0, 200.0, 400.0], 4)
     deviation = np.full((12, 4), np.nan)
     deviation[1:, 1] = 0.002 * load[1:]
-    held = nf.fit.weight_held(load, 0.1 + 0.05 * turn, turn, turn)
+    held = weight_held(load, 0.1 + 0.05 * turn, turn, turn)
     return nf.friction_rig(nf.FrictionReadings(load, held, turn, turn, deviation))
 
 
@@ -132,9 +133,13 @@ def test_legends_of_a_browser_name_what_those_of_paper_name(drawn):
 
 
 def test_a_shape_goes_with_all_its_parts(drawn):
-    traces = [trace for trace in drawn["path"].interactive().data if trace.fill == "toself"]
+    traces = [
+        trace for trace in drawn["path"].interactive().data if trace.fill == "toself" and trace.name
+    ]
     assert all(trace.legendgroup == trace.name for trace in traces)
-    area = next(one for one in drawn["path"].cells[0].panel.items if isinstance(one, Area))
+    area = next(
+        one for one in drawn["path"].cells[0].panel.items if isinstance(one, Area) and one.name
+    )
     # Five flexures and six bodies, each closed and followed by a gap.
     assert len(area.polygons) == 11
     assert sum(value is None or np.isnan(value) for value in traces[0].x) == 11
@@ -145,7 +150,6 @@ def test_symbols_are_letters_in_a_browser():
         assert not re.search(r"[$\\{}]", html(quantity.label)), quantity.name
     assert html(QUANTITIES["notch_angle"].label) == "notch angle θ<sub><i>j</i></sub> [deg]"
     assert html("a < b & <i>") == "a &lt; b &amp; &lt;i&gt;"
-    assert html(r"front $m + (1 - \eta)/2$") == "front <i>m</i> + (1 − η)/2"
 
 
 def test_same_picture_is_the_same_file(drawn, tmp_path):
@@ -157,7 +161,7 @@ def test_same_picture_is_the_same_file(drawn, tmp_path):
 def test_state_shows_its_step_alone():
     path = fake_path(4)
     shape, notches, tension = [cell.panel for cell in state_picture(path, 2).cells]
-    assert len([one for one in shape.items if isinstance(one, Area)]) == 1
+    assert len([one for one in shape.items if isinstance(one, Area) and one.name]) == 1
     np.testing.assert_allclose(notches.items[0].rows[:, 1], np.degrees(path.notch_angle[2]))
     np.testing.assert_allclose(tension.items[0].rows[:, 1], path.span_tension[2, 0])
     failed = state_picture(fake_path(3, failed=6), 1)
@@ -194,7 +198,7 @@ def test_batch_leaves_out_what_did_not_converge():
 def test_one_function_for_every_result():
     wrist = nf.load_robot("pacheco2021-a")
     path = nf.simulate(wrist, nf.pull(0.0, 1.0, steps=2))
-    assert len(picture(path).cells) == 3
+    assert len(picture(path).cells) == 4
     assert len(picture(path[1]).cells) == 3
     assert picture({"a": path, "b": path}).title == wrist.name
     assert picture(a_batch(), title="mine").title == "mine"
@@ -237,7 +241,7 @@ def test_names_at_an_axis_have_room_in_a_browser():
         plain = Panel([Line([[0.0, 0.0], [1.0, 1.0]], "red")], "x", "y")
         cells = [Cell(plain, (0, 1), (0, 1)), Cell(panel, (0, 1), (1, 2))]
         layout = Picture("", 6.0, 3.0, cells).interactive().layout
-        return (layout.xaxis2.domain[0] - layout.xaxis.domain[1]) * layout.width
+        return (layout.xaxis2.domain[0] - layout.xaxis.domain[1]) * layout.meta["width"]
 
     assert place("long name " * 4) - place("short") == pytest.approx(7.0 * 40 - 66.0)
 
@@ -255,6 +259,22 @@ def test_animation_moves_and_ends_where_the_path_ends(tmp_path):
         moving.seek(2)
         assert np.abs(np.asarray(moving.convert("L"), int) - first).max() > 100
     assert [found.name for found in tmp_path.iterdir()] == ["x.gif"]
+
+
+@pytest.mark.parametrize("steps", [2, 9, 40])
+def test_animation_takes_its_time_and_stands_at_both_ends(tmp_path, monkeypatch, steps):
+    from PIL import Image
+
+    monkeypatch.setattr("notchflex.plotting.animation.DOTS_PER_INCH", 12)
+    file = tmp_path / "x.gif"
+    save_animation(fake_path(steps), file)
+    with Image.open(file) as moving:
+        stays = []
+        for frame in range(moving.n_frames):
+            moving.seek(frame)
+            stays.append(moving.info["duration"] / 1000.0)
+    assert sum(stays) >= 4.0
+    assert min(stays[0], stays[-1]) >= 0.8
 
 
 def test_frames_are_spread_over_a_long_path():

@@ -48,8 +48,8 @@ VERBS = {
     "show": (
         "Show every notch of a robot: section, closing angle and force, strain at closing.",
         "notchflex show pacheco2021-c\n"
-        "    notchflex show my-wrist.toml --set notch.depth=1.38 --json -\n"
-        "    notchflex show my-wrist.toml --plot drawing.svg",
+        "    notchflex show pacheco2021-a --set notch.depth=1.38 --json -\n"
+        "    notchflex show gao2017 --plot drawing.svg",
     ),
     "schema": (
         "Print the JSON Schema of robot files, for editors that check and complete them.",
@@ -65,7 +65,8 @@ VERBS = {
         "Pull the tendons of a robot through a series of tensions or strokes.",
         "notchflex simulate pacheco2021-a --tension 0:3:31,3:0:31 --plot wrist.png\n"
         "    notchflex simulate pacheco2021-a --stroke 0:2:21 --set friction.coefficient=0.1\n"
-        "    notchflex simulate my-wrist.toml --tension 1=0:2:21 --tension 2=0.1 --json -\n"
+        "    notchflex simulate two-axis-wrist --tension 1=0:1:11 --tension 2=0.1 --json -\n"
+        "    notchflex simulate pacheco2021-a --tension 0:3:301 --columns tension,gap,closed\n"
         "    notchflex simulate pacheco2021-a --tension 0:3:31 --beside pacheco2021-b \\\n"
         '        --beside "slick: friction.coefficient=0" --plot beside.html\n'
         "    notchflex simulate gao2017 --tension 0:8:9,8:0:9 --tip-mass 20 --plot loop.gif\n"
@@ -73,23 +74,29 @@ VERBS = {
     ),
     "view": (
         "Show a robot in the browser, with sliders for its tendons and loads.",
-        "notchflex view pacheco2021-a --open\n    notchflex view my-wrist.toml --port 9000",
+        "notchflex view pacheco2021-a --open\n    notchflex view two-axis-wrist --port 9000",
     ),
     "compare": (
         "Compare a robot with measured notch angles.",
-        "notchflex compare pacheco2021-a-specimen wrist_A_measured.csv --plot compare.png\n"
-        "    notchflex compare my-wrist.toml pulls.csv --path --set friction.coefficient=0.1",
+        "notchflex simulate pacheco2021-a --tension 0:2:9,2:0:9 --csv loop.csv\n"
+        "    notchflex compare pacheco2021-a loop.csv --path --set friction.coefficient=0.1 \\\n"
+        "        --plot compare.png",
     ),
     "calibrate": (
         "Find constants of robots from measurements, with how far to trust them.",
-        "notchflex calibrate my-wrist.toml=pulls.csv \\\n"
+        "notchflex simulate pacheco2021-a --tension 0.2:1.6:8 --csv a.csv\n"
+        "    notchflex simulate pacheco2021-b --tension 0.2:1.2:6 --csv b.csv\n"
+        "    notchflex calibrate pacheco2021-a=a.csv \\\n"
         "        --fit friction.coefficient,material.elastic_modulus -o fitted\n"
-        "    notchflex calibrate a.toml=a.csv b.toml=b.csv --fit material.elastic_modulus \\\n"
-        "        --fit each:friction.coefficient --leave-out robot --plot fit.png",
+        "    notchflex calibrate pacheco2021-a=a.csv pacheco2021-b=b.csv --leave-out robot \\\n"
+        "        --fit material.elastic_modulus,friction.coefficient --plot fit.png",
     ),
     "friction-rig": (
         "Find the coefficient of friction from two hanging weights.",
-        "notchflex friction-rig readings.csv --plot friction.png",
+        "echo weight_1_g,weight_2_g,turn_1_deg,turn_2_deg > readings.csv\n"
+        "    echo 100,63.1,90,85 >> readings.csv\n"
+        "    echo 200,126.8,88,86 >> readings.csv\n"
+        "    notchflex friction-rig readings.csv --plot friction.png",
     ),
     "bench": (
         "Time the solver on this machine.",

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-import ast
-import math
-import operator
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from notchflex.errors import InputError
 
-_OPERATIONS: dict[type, Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-}
+BACK = ("<", "back")
+"""What a person types to be asked the previous question again."""
+
+HEADER = (
+    f"Enter takes the value in brackets. {BACK[0]} or {BACK[1]} goes back to the previous "
+    "question, and Ctrl+C ends without writing anything. A number may be a sum, such as 1.62-0.22."
+)
+
+Result = TypeVar("Result")
+
+
+class _GoBack(Exception):  # noqa: N818
+    """A person wants to answer the previous question again: no error."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,32 @@ class Interview:
         self.accept_defaults = accept_defaults
         self.defaulted: set[str] = set()
         self.person = sys.stdin is not None and sys.stdin.isatty()
+        # What was typed so far, and how much of it has been asked for since the last way back.
+        self._typed: list[str] = []
+        self._asked = 0
+
+    def conduct(self, questions: Callable[[Interview], Result]) -> Result:
+        """Return what the answers make; a person may go back from question to question.
+
+        Args:
+            questions: Asks one question after the other by `ask`. It begins anew whenever the
+                person goes back; what was typed before is then not asked again.
+
+        Raises:
+            InputError: As `ask`.
+        """
+        told = False
+        while True:
+            self.defaulted.clear()
+            self._asked = 0
+            try:
+                return questions(self)
+            except _GoBack:
+                if self._typed:
+                    self._typed.pop()
+                elif not told:
+                    self._tell("This is the first question.")
+                    told = True
 
     def ask(self, question: Question) -> Any:
         """Return the value of an answer; a person who errs is asked again.
@@ -64,24 +96,40 @@ class Interview:
             return self._read(question, said)
         if question.default is not None and self.accept_defaults:
             return self._default(question)
+        self._asked += 1
+        if self._asked <= len(self._typed):
+            return self._value(question, self._typed[self._asked - 1])
+        if self.person and self._asked == 1:
+            self._tell(HEADER)
         if question.hint and self.person:
-            print(f"  {question.hint}")
+            self._tell(question.hint)
         while True:
             answer = self._line(question)
-            if not answer and question.default is not None:
-                return self._default(question)
+            if self.person and answer in BACK:
+                raise _GoBack
             try:
-                return self._read(question, answer)
+                value = self._value(question, answer)
             except InputError as problem:
                 if not self.person:
                     raise
-                print(f"  {problem}")
+                self._tell(str(problem))
+                continue
+            self._typed.append(answer)
+            return value
+
+    def _value(self, question: Question, answer: str) -> Any:
+        if not answer and question.default is not None:
+            return self._default(question)
+        return self._read(question, answer)
 
     def _line(self, question: Question) -> str:
         shown = f" ({question.default})" if question.default is not None else ""
+        # A pipe needs no prompt, and what is printed would only be noise in a log.
+        *before, prompt = _lines(f"{question.text}{shown}:") if self.person else [""]
+        for line in before:
+            print(line)
         try:
-            # A pipe needs no prompt, and what is printed would only be noise in a log.
-            return input(f"{question.text}{shown}: " if self.person else "").strip()
+            return input(f"{prompt} " if prompt else "").strip()
         except UnicodeDecodeError:
             raise InputError(
                 f"{question.text}: the answer is no text in {sys.stdin.encoding}."
@@ -98,6 +146,11 @@ class Interview:
         return self._read(question, question.default or "")
 
     @staticmethod
+    def _tell(text: str) -> None:
+        for line in _lines(text, "  "):
+            print(line)
+
+    @staticmethod
     def _read(question: Question, answer: str) -> Any:
         try:
             return question.read(answer.strip())
@@ -105,106 +158,15 @@ class Interview:
             raise InputError(f"{question.option} {answer}: {problem}") from None
 
 
-def reading(
-    text: str,
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    below: float | None = None,
-    at_most: float | None = None,
-) -> float:
-    """Return a number from what was typed; sums such as `1.62-0.22` are worked out.
-
-    Args:
-        text: A number, or numbers joined by + - * /.
-        above: The number must be greater.
-        at_least: The number must not be less.
-        below: The number must be less.
-        at_most: The number must not be greater.
-
-    Raises:
-        InputError: Not a number, not finite, or outside its bounds.
-
-    Example:
-        >>> round(reading("1.62-0.22", above=0, below=1.62), 9)
-        1.4
-    """
-    try:
-        value = _evaluate(ast.parse(text.replace("−", "-"), mode="eval").body)
-    except (ValueError, SyntaxError, ZeroDivisionError, OverflowError, RecursionError, MemoryError):
-        got = repr(text) if text else "nothing"
-        raise InputError(f"got {got}; give a number such as 1.62, or a sum: 1.62-0.22.") from None
-    bounds = [
-        (above, operator.gt, "greater than"),
-        (at_least, operator.ge, "at least"),
-        (below, operator.lt, "less than"),
-        (at_most, operator.le, "at most"),
-    ]
-    allowed = " and ".join(f"{words} {bound:g}" for bound, _, words in bounds if bound is not None)
-    wanted = f"a finite number {allowed}".strip()
-    if not math.isfinite(value) or any(
-        bound is not None and not holds(value, bound) for bound, holds, _ in bounds
-    ):
-        raise InputError(f"got {value:g}; give {wanted}.")
-    # Nobody reads callipers to a nanometre; this drops the noise of 1.62-0.22.
-    return round(value, 9)
-
-
-def readings(text: str, count: int, **bounds: float) -> list[float]:
-    """Return one number for each of `count` notches; a single one holds for all.
-
-    Raises:
-        InputError: As `reading`, or another number of numbers.
-    """
-    values = [reading(part.strip(), **bounds) for part in text.split(",")]
-    if len(values) not in (1, count):
-        raise InputError(
-            f"got {len(values)} numbers; give one for all, or {count} joined by commas, "
-            "base to tip."
-        )
-    return values * count if len(values) == 1 else values
-
-
-def choice(text: str, allowed: tuple[str, ...]) -> str:
-    """Return one of the allowed words; its beginning is enough.
-
-    Raises:
-        InputError: Not one of them, or the beginning of several.
-    """
-    found = [word for word in allowed if word == text] or [
-        word for word in allowed if text and word.startswith(text.lower())
-    ]
-    if len(found) != 1:
-        got = repr(text) if text else "nothing"
-        raise InputError(f"got {got}; give {' or '.join(allowed)}.")
-    return found[0]
-
-
-def whole(text: str, *, at_least: int, at_most: int) -> int:
-    """Return a whole number within bounds.
-
-    Raises:
-        InputError: Not a whole number, or outside its bounds.
-    """
-    try:
-        value = int(text)
-    except ValueError:
-        got = repr(text) if text else "nothing"
-        raise InputError(f"got {got}; give a whole number.") from None
-    if not at_least <= value <= at_most:
-        raise InputError(f"got {value}; give {at_least} to {at_most}.")
-    return value
-
-
-def _evaluate(node: ast.expr) -> float:
-    match node:
-        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
-            return float(value)
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return -_evaluate(operand)
-        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-            return _evaluate(operand)
-        case ast.BinOp(left=left, op=operation, right=right) if type(operation) in _OPERATIONS:
-            return _OPERATIONS[type(operation)](_evaluate(left), _evaluate(right))
-        case _:
-            raise ValueError("not a sum of numbers")
+def _lines(text: str, indent: str = "") -> list[str]:
+    """Break a text at its words for the width of the terminal; long words stay whole."""
+    # Room for the answer behind the last line.
+    width = max(30, shutil.get_terminal_size((80, 24)).columns - 12)
+    return textwrap.wrap(
+        text,
+        width,
+        initial_indent=indent,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

@@ -12,6 +12,12 @@ from notchflex.cli import terminal
 from notchflex.robot import Robot
 
 NO_NUMBER = "–"
+CLOSES, NEVER, NOT_FOUND = "closes", "never", "not found"
+_MEANINGS = {
+    NEVER: "no tension closes the notch",
+    NOT_FOUND: "the solver did not converge at the tensions in question, so the notch may close; "
+    "`notchflex simulate` shows how far it bends",
+}
 SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
 """Heads for what every notch has, so that there is room for what is its own."""
 
@@ -68,7 +74,7 @@ def closing_table(notches: list[dict[str, Any]]) -> Table:
         "closing\ndeg": _numbers(notches, "closing_angle_deg", ".2f"),
         "tension\nN": [
             f"{row['closing_tension_N']:.3f}"
-            if row["closing_status"] == "closes"
+            if row["closing_status"] == CLOSES
             else row["closing_status"]
             for row in notches
         ],
@@ -83,6 +89,7 @@ def closing_legend(notches: list[dict[str, Any]]) -> str:
     """Return what the columns of the closing table mean."""
     pulled = "the tendon" if len(notches[0]["moment_arm_mm"]) == 1 else "the tendon named"
     spine = any("centroid_mm" in row for row in notches)
+    shown = {row["closing_status"] for row in notches}
     words = (
         "A, y, I: area, centroid (from the tube axis toward the spine) and second moment"
         if spine
@@ -97,6 +104,7 @@ def closing_legend(notches: list[dict[str, Any]]) -> str:
     return (
         f"{words} of what the cut leaves, where it is weakest. arm: moment arm of {pulled}. "
         f"Closing: angle of the notch and tension of that tendon pulled alone from rest{strains}."
+        + "".join(f" {status}: {text}." for status, text in _MEANINGS.items() if status in shown)
     )
 
 

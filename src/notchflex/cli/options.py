@@ -98,6 +98,9 @@ Quiet = Annotated[
     ),
 ]
 
+_MOST_CHANGES = 4
+"""More values of `--set` than this are only counted in a title."""
+
 
 def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
     """Return the robot a user asked for, with the values of `--set`; say what a new kind drops.
@@ -111,6 +114,22 @@ def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
         if dropped:
             terminal.note(f"the new kind has no {', '.join(dropped)}; dropped.")
     return robot
+
+
+def changed_title(robot: Robot, settings: Sequence[str]) -> str:
+    """Return the name of a robot with what `--set` changed, for heads of tables and pictures.
+
+    Example:
+        >>> from notchflex.robot import load_robot
+        >>> changed_title(load_robot("pacheco2021-a"), ["notch.depth=1.38"])
+        'Pacheco 2021, wrist A with notch.depth = 1.38'
+    """
+    pairs = [parse_assignment(text) for text in settings]
+    changes = [f"{path} = {value}" for path, value in pairs if path != "name"]
+    more = len(changes) - _MOST_CHANGES
+    if more > 0:
+        changes = [*changes[:_MOST_CHANGES], f"{more} more"]
+    return f"{robot.name} with {', '.join(changes)}" if changes else robot.name
 
 
 def variant(text: str, other: str = "") -> tuple[str, list[tuple[str, object]]]:

@@ -16,6 +16,7 @@ from notchflex.cli.options import (
     Quiet,
     RobotName,
     Settings,
+    changed_title,
     chosen_robot,
     robot_files,
 )
@@ -80,13 +81,13 @@ def show(
 
         save_dimensioned(chosen, plot)
     if json != STANDARD_OUTPUT and not quiet:
-        _print(chosen, length, notches)
+        _print(chosen, changed_title(chosen, settings), length, notches)
 
 
-def _print(robot: Robot, length: float, notches: list[dict[str, Any]]) -> None:
+def _print(robot: Robot, title: str, length: float, notches: list[dict[str, Any]]) -> None:
     console = terminal.output()
     tube = robot.tube
-    console.print(robot.name, style="bold", soft_wrap=True)
+    console.print(title, style="bold", soft_wrap=True)
     console.print(
         f"tube      outer diameter {tube.outer_diameter:g} mm, inner diameter "
         f"{tube.inner_diameter:g} mm, length {length:g} mm"

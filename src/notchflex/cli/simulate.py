@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
 
-from notchflex._extras import need
 from notchflex.cli import terminal
 from notchflex.cli.beside import beside_files, beside_robots
 from notchflex.cli.loads import (
@@ -33,23 +30,18 @@ from notchflex.cli.options import (
     Quiet,
     RobotName,
     Settings,
+    changed_title,
     chosen_robot,
     robot_files,
 )
+from notchflex.cli.path_columns import parse_columns
+from notchflex.cli.simulate_files import check_files, write_files
 from notchflex.cli.spec import load_columns, parse_vector
 from notchflex.errors import InputError
-from notchflex.results.files import (
-    BROWSER,
-    MOVING,
-    PAPER,
-    STANDARD_OUTPUT,
-    check_distinct,
-    check_output,
-    check_picture,
-)
+from notchflex.results.files import STANDARD_OUTPUT
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import Path, SavedState
 
 SPEC = (
     "Values or `start:stop:count` ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. "
@@ -122,6 +114,25 @@ def simulate(
             "Table, picture and JSON have all of them, other files the first.",
         ),
     ] = (),
+    columns: Annotated[
+        str | None,
+        Parameter(
+            group=OUTPUT,
+            help="Quantities that the table shows, joined by commas, such as "
+            "`tension,notch_angle,gap`. A wrong name lists all names.",
+        ),
+    ] = None,
+    every_row: Annotated[
+        bool,
+        Parameter(
+            name="--all",
+            group=OUTPUT,
+            negative=(),
+            show_default=False,
+            help="Show every step in the table; without it a path of more than 60 steps is "
+            "thinned.",
+        ),
+    ] = False,
     json: JsonFile = None,
     csv: CsvFile = None,
     nc: NetcdfFile = None,
@@ -132,22 +143,13 @@ def simulate(
     """Pull the tendons of a robot through a series of tensions or strokes.
 
     The steps are one path with memory: friction keeps what earlier steps did, so a tension that
-    is let go differs from the same tension pulled. Prints a table of every step (thinned if it is
-    long) unless `--json -` or `--csv -` prints something else.
+    is let go differs from the same tension pulled. Prints a table as wide as the terminal (the
+    variable COLUMNS says otherwise) unless `--json -` or `--csv -` prints something else.
     """
     terminal.be_quiet(quiet)
-    inputs = [*robot_files(robot), *(file for text in beside for file in beside_files(text))]
-    outputs = {
-        "--json": json,
-        "--csv": csv,
-        "--nc": nc,
-        "--parquet": parquet,
-        "--plot": plot,
-        "--save-state": save_state,
-    }
-    check_distinct(outputs)
-    _check(outputs, inputs, moving=not beside)
+    named = () if columns is None else parse_columns(columns)
     chosen = chosen_robot(robot, settings)
+    title = changed_title(chosen, settings)
     robots = beside_robots(chosen, robot, beside)
     loads = parse_loads(
         tip_force=tip_force,
@@ -162,8 +164,16 @@ def simulate(
         tensions = strokes = np.full((1, chosen.number_of_tendons), np.nan)
     else:
         tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
-    if len(tensions) < 2 and plot is not None and FilePath(plot).suffix.lower() in MOVING:
-        raise InputError(f"--plot {plot}: one step does not move; write a .png, .svg or .pdf.")
+    outputs = {
+        "--json": json,
+        "--csv": csv,
+        "--nc": nc,
+        "--parquet": parquet,
+        "--plot": plot,
+        "--save-state": save_state,
+    }
+    inputs = [*robot_files(robot), *(file for text in beside for file in beside_files(text))]
+    check_files(outputs, inputs, steps=len(tensions), several=bool(beside))
     finer = _refinement(refinement)
     turn = np.zeros(3)
     if base_rotation is not None:
@@ -174,7 +184,7 @@ def simulate(
         from notchflex.cli.compile_cache import use_compile_cache
 
         use_compile_cache()
-        start = None if from_state is None else statics.State.load(from_state)
+        start = None if from_state is None else _start(from_state)
         pulled = statics.LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
         pulled = put_on(pulled, loads)
         paths: dict[str, Path] = {}
@@ -183,88 +193,35 @@ def simulate(
                 counted(number, len(robots))
             state = None if number else start
             paths[label] = statics.simulate(one, pulled, from_state=state, refinement=finer)
-    _write(paths, outputs)
+    write_files(paths, outputs, title)
     if STANDARD_OUTPUT not in (json, csv) and not quiet:
         from notchflex.cli.path_table import print_beside, print_path
 
-        print_path(next(iter(paths.values())))
+        shown: dict[str, Any] = {"columns": named, "every_row": every_row}
+        print_path(next(iter(paths.values())), title, **shown)
         if beside:
-            print_beside(paths)
+            print_beside(paths, **shown)
     codes = [_say_what_matters(path, label if beside else "") for label, path in paths.items()]
     return max(codes)
 
 
-def _check(outputs: dict[str, str | None], inputs: Sequence[FilePath], *, moving: bool) -> None:
-    """Raise if a file cannot be written, before anything is computed."""
-    for option, target in outputs.items():
-        if target is None:
-            continue
-        if option == "--plot":
-            kinds = PAPER + BROWSER + (MOVING if moving else ())
-            check_picture(target, option, inputs=inputs, kinds=kinds)
-            continue
-        if option in ("--nc", "--parquet") and target == STANDARD_OUTPUT:
-            raise InputError(f"{option} - : this is no text; name a file.")
-        check_output(target, option, inputs=inputs)
-        if option == "--nc":
-            from notchflex.results.carry import need_netcdf
+def _start(file: str) -> SavedState:
+    """Read the state to go on from; warn where nothing shows which robot it belongs to."""
+    from notchflex import statics
 
-            need_netcdf(option)
-        if option == "--parquet":
-            need("polars", "data", option)
+    state = statics.State.load(file)
+    if state.description is None:
+        terminal.warn(
+            f"{file} was written by an older notchflex and does not hold the values of its robot; "
+            "make sure that they are the same. --save-state writes a file that does."
+        )
+    return state
 
 
 def _refinement(text: str) -> int:
     if text not in ("0", "1", "2", "3"):
         raise InputError(f"--refinement {text}: give a whole number from 0 to 3.")
     return int(text)
-
-
-def _write(paths: dict[str, Path], outputs: dict[str, str | None]) -> None:
-    path, *others = paths.values()
-    if target := outputs["--json"]:
-        from notchflex.results.carry import whole_document
-        from notchflex.results.json import write_json
-
-        document = whole_document(path)
-        if others:
-            told = list(paths.items())[1:]
-            document["beside"] = {label: whole_document(other) for label, other in told}
-        write_json(target, document)
-    if target := outputs["--csv"]:
-        from notchflex.results.csv import write_path_csv
-
-        write_path_csv(target, path)
-    if target := outputs["--nc"]:
-        from notchflex.results.carry import write_netcdf
-
-        write_netcdf(target, path)
-    if target := outputs["--parquet"]:
-        from notchflex.results.parquet import write_parquet
-
-        write_parquet(target, path)
-    if target := outputs["--plot"]:
-        _draw(paths, target)
-    if target := outputs["--save-state"]:
-        from notchflex.results.files import replacing
-
-        with replacing(target) as temporary:
-            path.state.save(temporary)
-
-
-def _draw(paths: dict[str, Path], target: str) -> None:
-    path, *others = paths.values()
-    if FilePath(target).suffix.lower() in MOVING:
-        with terminal.counting(f"drawing {target}") as counted:
-            from notchflex.plotting import save_animation
-
-            save_animation(path, target, progress=counted)
-        return
-    with terminal.working(f"drawing {target}"):
-        from notchflex.plotting import beside_picture, path_picture
-
-        picture = beside_picture(paths) if others else path_picture(path)
-        picture.save(target)
 
 
 def _say_what_matters(path: Path, label: str) -> int:

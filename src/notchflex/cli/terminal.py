@@ -18,8 +18,13 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
 NARROW = 80
-"""Columns of a terminal that every table fits; also the width when writing into a pipe."""
+"""Columns that tables of fixed shape fit; also what is taken for a terminal of unknown width."""
 
+WIDE = 160
+"""Columns of tables that are as wide as the terminal, where none shows them."""
+
+NARROWEST = 40
+"""Tables are never made for fewer columns: a line that breaks is better than no table."""
 
 _PLAIN = {"–": "-", "—": "-", "−": "-", "…": ".", "·": "."}
 
@@ -50,9 +55,25 @@ def _plainer(problem: UnicodeError) -> tuple[str, int]:
     return "".join(letters), problem.end
 
 
-def output() -> Console:
-    """Return the console of standard output: plain text in a pipe, colours on a terminal."""
-    return _console(sys.stdout)
+def width() -> int:
+    """Return how many columns a table on standard output may have.
+
+    Those of the terminal; in a pipe or file a fixed number (`WIDE`), so that the same call writes
+    the same text everywhere. The variable `COLUMNS` says otherwise.
+    """
+    fallback = NARROW if sys.stdout.isatty() else WIDE
+    if sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdecimal():
+        fallback = shutil.get_terminal_size((fallback, 24)).columns
+    return max(fallback, NARROWEST)
+
+
+def output(columns: int | None = None) -> Console:
+    """Return the console of standard output: plain text in a pipe, colours on a terminal.
+
+    Args:
+        columns: How wide tables may be; None for the terminal's width, in a pipe `NARROW`.
+    """
+    return _console(sys.stdout, columns)
 
 
 def messages() -> Console:
@@ -166,7 +187,7 @@ def _say(head: str, style: str, text: str) -> None:
     let_go(sys.stderr)
 
 
-def _console(stream: TextIO) -> Console:
+def _console(stream: TextIO, columns: int | None = None) -> Console:
     from rich.console import Console
 
     class ForgivingConsole(Console):
@@ -177,10 +198,11 @@ def _console(stream: TextIO) -> Console:
             let_go(stream)
 
     terminal = stream.isatty()
-    width = shutil.get_terminal_size((NARROW, 24)).columns if terminal else NARROW
+    if columns is None:
+        columns = shutil.get_terminal_size((NARROW, 24)).columns if terminal else NARROW
     return ForgivingConsole(
         file=stream,
-        width=width,
+        width=columns,
         highlight=False,
         markup=False,
         force_terminal=terminal and os.environ.get("TERM") != "dumb",

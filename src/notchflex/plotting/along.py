@@ -1,14 +1,15 @@
-"""Along a tendon: its tension from span to span, and how far its friction has turned."""
+"""Along a tendon: its tension from span to span, and how far its friction has reversed."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from notchflex.plotting.curves import COLOUR, LINE
 from notchflex.plotting.drive import LETTING_GO, PULLING, abscissa, branches, drive, way_of
-from notchflex.plotting.sheet import INSIDE, Item, Line, Panel
+from notchflex.plotting.sheet import BESIDE, Item, Line, Panel
 from notchflex.plotting.style import sequence_colours
 from notchflex.results.quantities import QUANTITIES
 from notchflex.results.spans import spans_of
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 MOST_STEPS = 6
 MOST_TENDONS = 8
 """Tendons of one state whose tension is drawn."""
+
+_FEWEST = 3
+"""Steps on which the friction is part reversed, for a curve of it to be worth its place."""
 
 SLACK = 1e-9
 """A tendon with less tension [N] all along a path has nothing to show."""
@@ -31,9 +35,9 @@ def pulled_tendons(path: Path) -> list[int]:
 
 
 def profile_panel(path: Path, tendon: int) -> Panel:
-    """Return the tension of a tendon (from 0) from span to span, while pulling and letting go.
+    """Return the tension of a tendon (from 0) from span to span, while loading and unloading.
 
-    Steps of one tension have one colour; solid lines are pulling, dashed ones letting go.
+    Steps of one tension have one colour; solid lines are loading, dashed ones unloading.
     """
     quantity = QUANTITIES["span_tension"]
     number = np.arange(spans_of(path, tendon))
@@ -62,23 +66,23 @@ def profile_panel(path: Path, tendon: int) -> Panel:
     which = f" {tendon + 1}" if path.tension.shape[1] > 1 else ""
     return Panel(
         items,
-        f"span of tendon{which}, 0 at the base",
+        f"span of tendon{which} [number], 0 at the base",
         quantity.label,
-        legend=INSIDE,
+        legend=BESIDE,
         y_range=(0.0, None),
         whole_x=True,
     )
 
 
 def front_panel(path: Path) -> Panel:
-    """Return how far the friction of every pulled tendon has turned from pulling to letting go."""
+    """Return at how many contacts of every pulled tendon the friction has reversed.
+
+    After a reversal of the load friction turns contact by contact, from the base on; between two
+    contacts by how far the one of them has come (`Path.front`).
+    """
     x, label = abscissa(path)
     tendons = pulled_tendons(path)
-    m, eta = (np.asarray(part, float) for part in path.front)
-    # Between contacts by eta, which falls from 1 to -1 while one contact turns.
-    front = m + 0.5 * (1.0 - np.where(np.isnan(eta), 1.0, eta))
-    front[~np.asarray(path.converged)] = np.nan
-    front[path.tension <= SLACK] = np.nan  # without tension there is no friction
+    reversed_ = reversed_contacts(path)
     items: list[Item] = []
     for order, tendon in enumerate(tendons):
         named: set[str] = set()
@@ -87,7 +91,7 @@ def front_panel(path: Path) -> Panel:
             which = f", tendon {tendon + 1}" if len(tendons) > 1 else ""
             items.append(
                 Line(
-                    np.stack([x[part], front[part, tendon]], axis=1),
+                    np.stack([x[part], reversed_[part, tendon]], axis=1),
                     COLOUR[way],
                     LINE[way],
                     marker="os^D"[order % 4],
@@ -100,16 +104,39 @@ def front_panel(path: Path) -> Panel:
             named.add(way)
     # From where the other curves begin, although nothing rubs without tension.
     room = 0.05 * float(np.ptp(x))
-    most = max(spans_of(path, tendon) for tendon in tendons)
+    most = max(spans_of(path, tendon) - 1 for tendon in tendons)
     return Panel(
         items,
         label,
-        r"friction front $m + (1 - \eta)/2$, contact",
-        legend=INSIDE,
+        "reversed contacts [number]",
+        title=f"contacts whose friction has reversed, of {most}",
+        legend=BESIDE,
         x_range=(float(x.min()) - room, float(x.max()) + room),
-        y_range=(0.5, most + 0.5),
+        y_range=(-0.03 * most, 1.03 * most),
         whole_y=True,
     )
+
+
+def reversed_contacts(path: Path) -> NDArray[np.float64]:
+    """Return at how many contacts the friction has reversed, (S, tendons); NaN without tension."""
+    m, eta = (np.asarray(part, float) for part in path.front)
+    # eta falls from 1 to -1 while the friction of one contact reverses.
+    reversed_ = m - 1.0 + 0.5 * (1.0 - np.where(np.isnan(eta), 1.0, eta))
+    reversed_[~np.asarray(path.converged)] = np.nan
+    reversed_[path.tension <= SLACK] = np.nan
+    return reversed_
+
+
+def reverses_step_by_step(path: Path) -> bool:
+    """Tell whether the friction of a tendon reverses over several steps: whether to draw it."""
+    if not has_friction(path):
+        return False
+    between = [
+        {round(float(value), 6) for value in column if 0.0 < value < spans_of(path, tendon) - 1}
+        for tendon in pulled_tendons(path)
+        for column in [reversed_contacts(path)[:, tendon]]
+    ]
+    return max(map(len, between), default=0) >= _FEWEST
 
 
 def has_friction(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -27,8 +28,12 @@ MOST_FRAMES = 48
 """Steps of a long path that are shown."""
 
 DOTS_PER_INCH = 80
-FRAMES_A_SECOND = 10
-_STANDING = 8  # frames that the last picture stays
+
+SECONDS, STANDING_SECONDS = 4.2, 0.9
+"""How long it takes at least, and how long its first and its last picture stay at least [s]."""
+
+_SHORTEST, _LONGEST = 0.1, 0.4
+"""Seconds that a frame stays: the longer the fewer there are."""
 
 
 def save_animation(
@@ -39,6 +44,8 @@ def save_animation(
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """Write a path as a GIF: the robot moves, and a dot goes along its loop.
+
+    It takes four seconds or more: its first and its last picture stay for a while.
 
     Args:
         path: Solved path; of a long one some steps are shown, spread evenly.
@@ -75,7 +82,10 @@ def save_animation(
         axes.plot(x, y, "o", color=colour, markersize=5.0, zorder=9)[0]
         for axes, (x, y, colour) in zip(curves, _dots(path, steps[0]), strict=True)
     ]
-    writer = PillowWriter(fps=FRAMES_A_SECOND)
+    frame = min(max(_SHORTEST, SECONDS / 1.5 / len(steps)), _LONGEST)
+    rest = SECONDS - (len(steps) - 2) * frame
+    standing = math.ceil(max(STANDING_SECONDS, rest / 2.0) / frame)
+    writer = PillowWriter(fps=1.0 / frame)  # pyright: ignore[reportArgumentType]
     with (
         replacing(target) as temporary,
         house_style(),
@@ -87,7 +97,7 @@ def save_animation(
             _limit(robot, limits)
             for dot, (x, y, _) in zip(dots, _dots(path, step), strict=True):
                 dot.set_data(x, y)
-            for _ in range(_STANDING if number == len(steps) - 1 else 1):
+            for _ in range(standing if number in (0, len(steps) - 1) else 1):
                 writer.grab_frame()
             if progress is not None:
                 progress(number + 1, len(steps))

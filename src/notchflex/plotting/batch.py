@@ -22,7 +22,11 @@ _LEFT_OUT = ("converged", "reason", "iterations", "tip_position", "stable")
 
 
 def batch_picture(
-    batch: Batch, *, against: ArrayLike | None = None, label: str = "row", title: str = "batch"
+    batch: Batch,
+    *,
+    against: ArrayLike | None = None,
+    label: str = "row [number]",
+    title: str = "batch",
 ) -> Picture:
     """Describe what a batch returned.
 

@@ -13,7 +13,7 @@ from notchflex.plotting.comparison import MODEL_COLOURS
 from notchflex.plotting.curves import LINE, failures, solved_only
 from notchflex.plotting.drive import LETTING_GO, PULLING, abscissa, branches, drive, way_of
 from notchflex.plotting.path import plane_of, shape_panel
-from notchflex.plotting.sheet import Cell, Colour, Item, Line, Note, Panel, Picture
+from notchflex.plotting.sheet import BELOW, Cell, Colour, Item, Line, Note, Panel, Picture
 from notchflex.plotting.style import GREY, rgb
 from notchflex.plotting.wrist import telling_steps
 from notchflex.results.quantities import QUANTITIES
@@ -33,8 +33,8 @@ def beside_picture(paths: Mapping[str, Path], *, title: str = "") -> Picture:
 
     Every robot to scale at a few loads, in the colour that it has in the curves too: total angle
     and travel of the tip over the loads, and at the most bent state of each the angle of every
-    notch and the tension along the first pulled tendon. Solid lines are pulling, dashed ones
-    letting go.
+    notch and the tension along the first pulled tendon. Solid lines are loading, dashed ones
+    unloading.
 
     Args:
         paths: Label to path, two to five of them.
@@ -62,7 +62,7 @@ def beside_picture(paths: Mapping[str, Path], *, title: str = "") -> Picture:
     for column, (label, path) in enumerate(paths.items()):
         steps = telling_steps(path, most=_SHAPES)
         shades = [_pale(colours[label], part) for part in np.linspace(0.55, 0.0, len(steps))]
-        panel = shape_panel(path, steps, plane_of(path), label, shades)
+        panel = shape_panel(path, steps, plane_of(path), label, shades, BELOW)
         cells.append(Cell(panel, (0, 2), (column, column + 1)))
     curves = [_angles(paths, colours), _notches(paths, colours)]
     curves += [_travel(paths, colours), _tensions(paths, colours)]
@@ -134,7 +134,7 @@ def _notches(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
         items.append(_dots(points, colours, label, size=2.5))
     return Panel(
         items or [Note("no step was solved")],
-        "notch, 1 at the base",
+        "notch [number], 1 at the base",
         quantity.label,
         title="where bent most" if items else "",
         y_range=(0.0, None) if least >= 0.0 and items else None,
@@ -155,7 +155,7 @@ def _tensions(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel
         items.append(_dots(points, colours, label, size=1.8))
     return Panel(
         items or [Note("no tendon is pulled")],
-        "span of first pulled tendon, 0 at the base",
+        "span [number], first pulled tendon",
         quantity.label,
         title="where bent most" if items else "",
         y_range=(0.0, None) if items else None,

@@ -47,8 +47,8 @@ def profile_panel(found: Calibration, name: str) -> Panel:
     unit = found.units[name]
     return Panel(
         items,
-        _short(name) + (f" [{unit}]" if unit else ""),
-        "rise of 2 x misfit",
+        f"{_short(name)} [{unit or '-'}]",
+        "rise of 2 x misfit [-]",
         title=f"profile of constant {found.names.index(name) + 1}, dotted: 95 %",
         y_range=(-0.03 * line, min(max(1.6 * line, 1.1 * most), 3.0 * line)),
         most_x=5,

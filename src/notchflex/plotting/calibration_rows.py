@@ -115,7 +115,7 @@ def residual_panel(found: Calibration, label: str) -> Panel:
     return Panel(
         items,
         _abscissa(found, label)[1],
-        "residual / its noise",
+        "residual / its noise [-]",
         title=f"{label}: {title}" if len(found.given) > 1 else title,
     )
 
@@ -227,7 +227,7 @@ def _abscissa(found: Calibration, label: str) -> tuple[NDArray[np.float64], str]
     for number, _ in mine:
         there = residuals.sample == number
         x[there] = residuals.row[there] + 1
-    return x, "row"
+    return x, "row [number]"
 
 
 def _kind(quantity: str) -> str:

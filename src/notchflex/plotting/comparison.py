@@ -223,7 +223,11 @@ def _errors(models: Mapping[str, Comparison]) -> Panel:
     colours = [MODEL_COLOURS[index % 5] for index in range(len(values))]
     most = 1.2 * max((value for value in values if value > 0.0), default=1.0)
     return Panel(
-        [Bars(values, list(models), colours)], "mm", "", title="tip error, rms", x_range=(0.0, most)
+        [Bars(values, list(models), colours)],
+        "tip error [mm]",
+        "",
+        title="tip error, rms",
+        x_range=(0.0, most),
     )
 
 

@@ -13,7 +13,8 @@ from notchflex.results.quantities import QUANTITIES
 if TYPE_CHECKING:
     from notchflex.statics import Path
 
-PULLING, LETTING_GO = "pulling", "letting go"
+PULLING, LETTING_GO = "loading", "unloading"
+"""What the two branches of a loop are called."""
 
 
 def abscissa(path: Path) -> tuple[NDArray[np.float64], str]:
@@ -29,7 +30,7 @@ def abscissa(path: Path) -> tuple[NDArray[np.float64], str]:
     together = len(changing) > 0 and all(_in_step(path, changing[0], one) for one in changing)
     if together or (len(path) == 1 and not len(changing)):
         index = int(changing[0]) if len(changing) else 0
-        name = "stroke" if _by_stroke(path, index) else "tension"
+        name = "stroke" if by_stroke(path, index) else "tension"
         quantity = QUANTITIES[name]
         values = getattr(path, name)
         if values.shape[1] == 1:
@@ -37,7 +38,7 @@ def abscissa(path: Path) -> tuple[NDArray[np.float64], str]:
         title = quantity.title.removeprefix("tendon ")
         which = f"{title} of tendon {index + 1}"
         return values[:, index], quantity.label.replace(quantity.title, which)
-    return np.arange(1.0, len(path) + 1.0), "step"
+    return np.arange(1.0, len(path) + 1.0), "step [number]"
 
 
 def drive(path: Path) -> NDArray[np.float64]:
@@ -47,7 +48,7 @@ def drive(path: Path) -> NDArray[np.float64]:
     """
     total = np.zeros(len(path))
     for index in _changing(path):
-        values = (path.stroke if _by_stroke(path, int(index)) else path.tension)[:, index]
+        values = (path.stroke if by_stroke(path, int(index)) else path.tension)[:, index]
         largest = float(np.nanmax(np.abs(values), initial=0.0))
         total = total + values / (largest or 1.0)
     return total
@@ -80,8 +81,18 @@ def branches(x: NDArray[np.float64]) -> Iterator[tuple[slice, bool]]:
     yield slice(start, len(x)), bool(direction >= 0)
 
 
+def by_stroke(path: Path, tendon: int) -> bool:
+    """Tell whether the stroke of a tendon (from 0) is commanded, and not its tension."""
+    return bool(np.isfinite(np.asarray(path.commanded_stroke, float)[:, tendon]).any())
+
+
+def driven_by_stroke(path: Path) -> list[int]:
+    """Return the tendons (from 0) that are drawn by changing strokes."""
+    return [int(tendon) for tendon in _changing(path) if by_stroke(path, int(tendon))]
+
+
 def way_of(path: Path) -> dict[str, list[int]]:
-    """Return the converged steps of pulling and of letting go, each where there is any."""
+    """Return the converged steps of loading and of unloading, each where there is any."""
     good = np.asarray(path.converged)
     found: dict[str, list[int]] = {}
     for part, growing in branches(drive(path)):
@@ -96,8 +107,8 @@ def _changing(path: Path) -> NDArray[np.intp]:
     spread = np.zeros(path.tension.shape[1])
     if good.any():
         spread = np.ptp(path.tension[good], axis=0)
-        by_stroke = [_by_stroke(path, index) for index in range(len(spread))]
-        spread = np.where(by_stroke, np.ptp(path.stroke[good], axis=0), spread)
+        drawn = [by_stroke(path, index) for index in range(len(spread))]
+        spread = np.where(drawn, np.ptp(path.stroke[good], axis=0), spread)
         commanded = np.isfinite([path.commanded_tension, path.commanded_stroke]).any(axis=(0, 1))
         spread = np.where(commanded, spread, 0.0)
     return np.flatnonzero(spread > 1e-12)
@@ -107,14 +118,10 @@ def _in_step(path: Path, first: int, other: int) -> bool:
     """Tell whether what drives two tendons changes in proportion."""
     good = np.asarray(path.converged)
     pair = [
-        (path.stroke if _by_stroke(path, int(one)) else path.tension)[good, one]
+        (path.stroke if by_stroke(path, int(one)) else path.tension)[good, one]
         for one in (first, other)
     ]
     change = [values - values[0] for values in pair]
     largest = int(np.argmax(np.abs(change[0])))
     ratio = change[1][largest] / change[0][largest]
     return bool(np.allclose(change[1], ratio * change[0], atol=1e-9 * np.ptp(pair[1])))
-
-
-def _by_stroke(path: Path, tendon: int) -> bool:
-    return bool(np.isfinite(np.asarray(path.commanded_stroke, float)[:, tendon]).any())

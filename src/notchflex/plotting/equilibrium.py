@@ -70,7 +70,7 @@ def notch_bars(path: Path, step: int) -> Panel:
     """Return the angle of every notch in one state, base to tip."""
     quantity = QUANTITIES["notch_angle"]
     if not path.converged[step]:
-        return Panel([Note("not converged")], "notch, 1 at the base", quantity.label)
+        return Panel([Note("not converged")], "notch [number], 1 at the base", quantity.label)
     angle = path.notch_angle[step] * quantity.scale
     number = np.arange(1, len(angle) + 1)
     points = np.stack([number, angle], axis=1)
@@ -87,7 +87,7 @@ def notch_bars(path: Path, step: int) -> Panel:
         items.append(Line(points[closed], VERMILLION, name="closed notch", **mark))
     return Panel(
         items,
-        "notch, 1 at the base",
+        "notch [number], 1 at the base",
         quantity.label,
         legend=BESIDE if closed.any() else "",
         x_range=(0.5, len(angle) + 0.5),
@@ -98,7 +98,7 @@ def notch_bars(path: Path, step: int) -> Panel:
 def tension_along(path: Path, step: int) -> Panel:
     """Return the tension of every pulled tendon from span to span in one state."""
     quantity = QUANTITIES["span_tension"]
-    x_label = "span of tendon, 0 at the base"
+    x_label = "span of tendon [number], 0 at the base"
     if not path.converged[step]:
         return Panel([Note("not converged")], x_label, quantity.label)
     pulled = [int(i) for i in np.flatnonzero(path.tension[step] > SLACK)][:MOST_TENDONS]

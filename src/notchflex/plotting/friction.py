@@ -57,7 +57,7 @@ def friction_picture(rig: FrictionRig) -> Picture:
     if test.enough is False:
         over_turn += _other_model(rig, turn, test.by_turn / DEGREES)
         over_load += _other_model(rig, load, test.by_load, logarithmic=True)
-    label = r"coefficient of friction $\mu$"
+    label = r"coefficient of friction $\mu$ [-]"
     left = Panel(over_turn, "turn over both edges [deg]", label, shared_y=True)
     right = Panel(over_load, "weight 1 [g]", label, legend=BESIDE, shared_y=True)
     cells = [Cell(left, (0, 1), (0, 1)), Cell(right, (0, 1), (1, 2))]

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from notchflex.plotting.bent import HELD, Bent
 from notchflex.robot import Robot
 
+_CLAMP = 1.7  # half the width of what holds the tube, in outer radii
+
 
 @dataclass(frozen=True)
 class Outline:
@@ -28,7 +30,7 @@ class Outline:
         tendons: Line of every tendon.
         lips: Point between the lips of every notch, where it closes.
         centre_line: The tube axis from base to tip.
-        held: Line across the base where the tube is held.
+        held: What holds the tube, from the base downward.
     """
 
     bodies: list[NDArray[np.float64]]
@@ -79,7 +81,8 @@ def outline(shape: Bent, view: float) -> Outline:
         for sign, wall in zip((1.0, -1.0), _sides(shape, body, view), strict=True):
             if wall is not None:
                 bores.append(place([(sign * inner, at) for at in wall]))
-    foot = np.array([0.0, 0.0, -HELD * outer])
+    below = np.array([0.0, 0.0, -HELD * outer])
+    clamp = [side * _CLAMP * outer * across for side in (-1.0, 1.0)]
     flexures = [
         np.concatenate([flat(one.fibre(-one.spine)), flat(one.fibre(one.near))[::-1]])
         for one in shape.flexures
@@ -91,7 +94,7 @@ def outline(shape: Bent, view: float) -> Outline:
         tendons=[flat(shape.tendon(number)) for number in range(len(shape.robot.tendon))],
         lips=[flat(shape.lips(notch)) for notch in range(len(shape.flexures))],
         centre_line=flat(_centre_line(shape)),
-        held=flat(shape.on_body(0, [side * across + foot for side in (-outer, outer)])),
+        held=flat(shape.on_body(0, [*clamp, clamp[1] + below, clamp[0] + below])),
     )
 
 

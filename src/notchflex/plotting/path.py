@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from notchflex.plotting.acting import out_of_plane
-from notchflex.plotting.along import front_panel, has_friction, profile_panel, pulled_tendons
+from notchflex.plotting.along import (
+    front_panel,
+    profile_panel,
+    pulled_tendons,
+    reverses_step_by_step,
+)
 from notchflex.plotting.bent import bent_at
-from notchflex.plotting.curves import notches_panel, total_panel
-from notchflex.plotting.drive import LETTING_GO, PULLING, way_of
+from notchflex.plotting.curves import notches_panel, strain_panel, stroke_panel, total_panel
+from notchflex.plotting.drive import LETTING_GO, PULLING, driven_by_stroke, way_of
 from notchflex.plotting.outline import bending_plane
-from notchflex.plotting.sheet import Cell, Colour, Panel, Picture
+from notchflex.plotting.sheet import BESIDE, Cell, Colour, Panel, Picture
 from notchflex.plotting.space import space_panel
 from notchflex.plotting.wrist import telling_steps, wrist_panel
 
@@ -21,7 +26,10 @@ if TYPE_CHECKING:
     from notchflex.statics import Path
 
 MOST_PROFILES = 2
-"""Tendons whose tension is drawn from span to span."""
+"""Tendons whose tension is drawn over the stroke, and from span to span."""
+
+_TWO_ROWS = 4
+"""More curves than this are drawn three to a column."""
 
 
 def path_figure(path: Path, *, title: str | None = None) -> Figure:
@@ -48,10 +56,11 @@ def path_picture(path: Path, *, title: str | None = None) -> Picture:
     """Describe the picture of a solved path, for paper and for a browser.
 
     First the robot to scale at up to five loads: in its plane of bending, or in space where it
-    bends in several planes or a load leaves the plane. Arrows are loads from outside. One state
-    has nothing else. More steps have curves: the total angle, as a loop where the tendons are let
-    go again, and every notch. A path with pulling and letting go shows the shapes of both, the
-    tension along the tendon, and how far the friction has turned.
+    bends in several planes or a load leaves the plane. Arrows are external loads. One state
+    has nothing else. More steps have curves: the total angle, the angle and the peak strain of
+    every notch with the allowed strain, and where strokes drive, the tension over the stroke. A
+    path with loading and unloading shows the shapes of both, the tension along the tendon, and,
+    where it takes several steps, how far the friction has reversed.
 
     Args:
         path: Solved path.
@@ -62,16 +71,21 @@ def path_picture(path: Path, *, title: str | None = None) -> Picture:
     """
     ways = way_of(path)
     view = plane_of(path)
-    # What is drawn in a column of its own, beside the curves two to a column.
     shapes = [shape_panel(path, steps, view, name) for name, steps in _shapes(path, ways).items()]
-    cells = [Cell(panel, (0, 2), (column, column + 1)) for column, panel in enumerate(shapes)]
     panels = _panels(path, ways)
+    # The shapes one above the other in the first column, the curves in two or three rows.
+    rows = 3 if len(panels) > _TWO_ROWS else 2
+    high = 2 * rows // len(shapes)
+    cells = [
+        Cell(panel, (high * index, high * (index + 1)), (0, 1))
+        for index, panel in enumerate(shapes)
+    ]
     for index, panel in enumerate(panels):
-        row, column = index % 2, len(shapes) + index // 2
-        cells.append(Cell(panel, (row, row + 1), (column, column + 1)))
-    columns = len(shapes) + -(-len(panels) // 2)
+        row, column = 2 * (index % rows), 1 + index // rows
+        cells.append(Cell(panel, (row, row + 2), (column, column + 1)))
+    columns = 1 + -(-len(panels) // rows)
     heading = path.robot.name if title is None else title
-    return Picture(heading, 1.6 + 4.0 * columns, 6.4, cells)
+    return Picture(heading, 2.6 + 4.0 * columns, 0.8 + 2.9 * rows, cells)
 
 
 def shape_panel(
@@ -80,11 +94,13 @@ def shape_panel(
     view: float | None,
     title: str = "",
     colours: Sequence[Colour] | None = None,
+    legend: str = BESIDE,
 ) -> Panel:
     """Return a robot at several steps: across its plane where it has one, otherwise in space."""
+    look: dict[str, Any] = {"title": title, "colours": colours, "legend": legend}
     if view is None and steps:
-        return space_panel(path, steps, title=title, colours=colours)
-    return wrist_panel(path, steps, view or 0.0, title=title, colours=colours)
+        return space_panel(path, steps, **look)
+    return wrist_panel(path, steps, view or 0.0, **look)
 
 
 def plane_of(path: Path) -> float | None:
@@ -98,7 +114,7 @@ def plane_of(path: Path) -> float | None:
 
 
 def _shapes(path: Path, ways: dict[str, list[int]]) -> dict[str, list[int]]:
-    """Return the steps to draw: of pulling and of letting go apart, where there are both."""
+    """Return the steps to draw: of loading and of unloading apart, where there are both."""
     if len(ways) < 2:
         return {"": telling_steps(path)}
     return {way: telling_steps(path, among=ways[way]) for way in (PULLING, LETTING_GO)}
@@ -109,8 +125,10 @@ def _panels(path: Path, ways: dict[str, list[int]]) -> list[Panel]:
     if len(path) == 1:
         return []
     panels = [total_panel(path), notches_panel(path)]
+    panels += [stroke_panel(path, tendon) for tendon in driven_by_stroke(path)[:MOST_PROFILES]]
+    panels.append(strain_panel(path))
     if len(ways) > 1 and pulled_tendons(path):
         panels += [profile_panel(path, tendon) for tendon in pulled_tendons(path)[:MOST_PROFILES]]
-        if has_friction(path):
+        if reverses_step_by_step(path):
             panels.append(front_panel(path))
     return panels

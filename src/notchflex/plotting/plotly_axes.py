@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.plotly_marks import POINT, html
+from notchflex.plotting.plotly_marks import POINT
 from notchflex.plotting.sheet import (
+    BELOW,
     INSIDE,
     Area,
     Arrow,
@@ -26,23 +27,33 @@ from notchflex.plotting.sheet import (
 FONT = 12.5
 """Height of letters in pixels."""
 
+LABELS = 46.0
+"""Pixels that the numbers and the name of a horizontal axis take."""
+
+_ENTRY = 18.0
+
 Ranges = tuple[list[float] | None, list[float] | None]
 """From where to where the axes of a panel go, across and upward; None is left to plotly."""
 
 
 class Place:
-    """Where a panel stands, in parts of the whole; and what a legend beside it takes."""
+    """Where a panel stands, in parts of the whole; its foot is below its labels."""
 
-    def __init__(self, left: float, right: float, bottom: float, top: float) -> None:
+    def __init__(
+        self, left: float, right: float, bottom: float, top: float, foot: float = 0.0
+    ) -> None:
         self.left, self.right, self.bottom, self.top = left, right, bottom, top
+        self.foot = foot
 
 
 def legend_of(panel: Panel, place: Place) -> dict[str, Any]:
-    """Return where the legend of a panel stands: beside it, or in its emptiest corner."""
+    """Return where the legend of a panel stands: beside or below it, or in its emptiest corner."""
     look: dict[str, Any] = {
         "font": {"size": FONT - 2.0}, "bgcolor": "rgba(255,255,255,0.7)",
         "tracegroupgap": 0, "indentation": -4,
     }  # fmt: skip
+    if panel.legend == BELOW:
+        return look | {"x": place.left, "xanchor": "left", "y": place.foot, "yanchor": "top"}
     if panel.legend != INSIDE:
         return look | {"x": place.right, "xanchor": "left", "y": place.top, "yanchor": "top"}
     right, top = _emptiest_corner(panel)
@@ -52,6 +63,12 @@ def legend_of(panel: Panel, place: Place) -> dict[str, Any]:
         "y": place.top if top else place.bottom,
         "yanchor": "top" if top else "bottom",
     }
+
+
+def legend_height(panel: Panel) -> float:
+    """Return what a legend below a panel takes of the height, in pixels."""
+    names = dict.fromkeys(name for item in panel.items if (name := getattr(item, "name", "")))
+    return _ENTRY * len(names) + 8.0
 
 
 def _emptiest_corner(panel: Panel) -> tuple[bool, bool]:
@@ -184,10 +201,10 @@ def axes_of(
             across |= square | {"range": [-0.5, count - 0.5]}
             across["ticktext"] = [str(number + 1) for number in range(count)]
             upward |= square | {"range": [count - 0.5, -0.5], "scaleanchor": x}
-            upward["ticktext"] = [html(one) for one in item.rows]
+            upward["ticktext"] = list(item.rows)
     return across, upward
 
 
 def axis_title(label: str) -> dict[str, Any]:
     """Return what stands at an axis."""
-    return {"text": html(label), "font": {"size": FONT}}
+    return {"text": label, "font": {"size": FONT}}

@@ -1,10 +1,11 @@
-"""What a panel in the plane shows, as traces, shapes and annotations of plotly."""
+"""What a panel in the plane shows, as traces, shapes and annotations of plotly.
+
+Its texts are HTML already (`labels.py`).
+"""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ def draw_item(
         case Bars():
             yield {
                 "type": "bar", "orientation": "h", "x": list(item.values),
-                "y": [html(name) for name in item.names],
+                "y": list(item.names),
                 "marker": {"color": [css(colour) for colour in item.colours]},
                 "text": [format(value, item.form) for value in item.values],
                 "textposition": "outside", "cliponaxis": False, "showlegend": False,
@@ -65,7 +66,7 @@ def draw_item(
                 place = {"x": 0.03, "y": 0.95, "xanchor": "left", "yanchor": "top"}
             layout["annotations"].append(
                 {
-                    "text": html(item.text), "showarrow": False, **place,
+                    "text": item.text, "showarrow": False, **place,
                     "font": {"color": css(item.colour)},
                     "xref": f"{where['xaxis']} domain", "yref": f"{where['yaxis']} domain",
                 }
@@ -111,8 +112,8 @@ def line_trace(item: Line, panel: Panel | None) -> dict[str, Any]:
     if item.told and panel is not None:
         trace["hoverinfo"] = "all"
         trace["hovertemplate"] = (
-            f"{html(item.name or item.group)}<br>{html(panel.x_label)}: %{{x:.4g}}"
-            f"<br>{html(panel.y_label)}: %{{y:.4g}}{give_or_take}<extra></extra>"
+            f"{item.name or item.group}<br>{panel.x_label}: %{{x:.4g}}"
+            f"<br>{panel.y_label}: %{{y:.4g}}{give_or_take}<extra></extra>"
         )
     return trace
 
@@ -195,7 +196,7 @@ def _correlations(item: Correlations) -> dict[str, Any]:
         "colorscale": [[i / 20, css(colour)] for i, colour in enumerate(colours)],
         "showscale": False, "text": item.texts, "texttemplate": "%{text}",
         "textfont": {"size": POINT * item.letters},
-        "customdata": [[f"{html(one)}<br>{html(other)}" for other in item.names]
+        "customdata": [[f"{one}<br>{other}" for other in item.names]
                        for one in item.names],
         "hovertemplate": "%{customdata}<br>%{text}<extra></extra>",
     }  # fmt: skip
@@ -204,7 +205,7 @@ def _correlations(item: Correlations) -> dict[str, Any]:
 def named(item: Any) -> dict[str, Any]:
     """Return what a legend calls an item, and with what it is shown and hidden."""
     group = getattr(item, "group", "")
-    named = {"name": html(item.name or group), "showlegend": bool(item.name)}
+    named = {"name": item.name or group, "showlegend": bool(item.name)}
     return named | ({"legendgroup": group} if group else {})
 
 
@@ -217,32 +218,7 @@ def _dashes(dash: tuple[float, ...], width: float) -> str:
     return ",".join(f"{POINT * width * one:.1f}px" for one in dash)
 
 
-def html(label: str) -> str:
-    r"""Return a label with mathtext in it as HTML.
-
-    Example:
-        >>> html(r"notch angle $\theta_j$ [deg]")
-        'notch angle θ<sub><i>j</i></sub> [deg]'
-    """
-    plain = escape(label, quote=False).replace("\n", "<br>")
-    return re.sub(r"\$([^$]*)\$", lambda found: _symbol(found[1]), plain)
-
-
 def css(colour: Any, opacity: float = 1.0) -> str:
     """Return a colour as a browser takes it."""
     red, green, blue = (round(255 * part) for part in rgb(colour))
     return f"rgba({red},{green},{blue},{opacity:g})"
-
-
-_GREEK = {
-    "theta": "θ", "psi": "ψ", "varepsilon": "ε", "eta": "η", "beta": "β", "lambda": "λ",
-    "mu": "μ",
-}  # fmt: skip
-
-
-def _symbol(text: str) -> str:
-    text = re.sub(r"\\mathrm\{(\w+)\}", r"\1", text)
-    text = re.sub(r"\\([a-z]+)", lambda found: _GREEK[found[1]], text)
-    text = re.sub(r"_\{?(\w+)\}?", r"<sub>\1</sub>", text)
-    text = re.sub(r"(?<![<\w/])([A-Za-z])(?![\w>])", r"<i>\1</i>", text)
-    return text.replace(" - ", " − ")

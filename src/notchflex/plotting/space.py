@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from notchflex.plotting.acting import COLOUR, Acting, acting_at
 from notchflex.plotting.bent import Bent, Sections, bent_at
-from notchflex.plotting.sheet import BELOW, Arrow, Colour, Faces, Item, Line, Note, Panel
+from notchflex.plotting.sheet import BESIDE, Arrow, Colour, Faces, Item, Line, Note, Panel
 from notchflex.plotting.style import GREY, ORANGE, VERMILLION, rgb, sequence_colours
 from notchflex.plotting.wrist import ARROW, arrow_of, extent_of, load_label
 
@@ -29,6 +29,7 @@ def space_panel(
     *,
     title: str = "",
     colours: Sequence[Colour] | None = None,
+    legend: str = BESIDE,
 ) -> Panel:
     """Return a robot at several steps of a path in space, with its loads.
 
@@ -37,6 +38,7 @@ def space_panel(
         steps: Which of its steps.
         title: What stands above it.
         colours: One for each step; from dark to light if None.
+        legend: Where its legend stands.
     """
     items: list[Item] = []
     closed: list[NDArray[np.float64]] = []
@@ -68,7 +70,7 @@ def space_panel(
         "y [mm]",
         "z, along the base [mm]",
         title=title,
-        legend=BELOW if steps else "",
+        legend=legend if steps else "",
     )
 
 

@@ -11,6 +11,7 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
+from notchflex.plotting.labels import for_paper, heading_lines, translated
 from notchflex.plotting.sheet import (
     BELOW,
     BESIDE,
@@ -34,8 +35,11 @@ ELEVATION, AZIMUTH = 18.0, -60.0
 
 def figure_of(picture: Picture) -> Figure:
     """Return a picture as a figure of matplotlib."""
+    heading = heading_lines(picture.title, picture.width)
+    picture = translated(picture, for_paper)
     with house_style():
-        figure = new_figure(picture.width, picture.height, picture.title)
+        title = "\n".join(map(for_paper, heading))
+        figure = new_figure(picture.width, picture.height, title)
         grid = figure.add_gridspec(*picture.shape)
         scales: dict[str, list[Axes]] = {}
         shared: dict[str, Axes] = {}
@@ -48,7 +52,7 @@ def figure_of(picture: Picture) -> Figure:
             axes: Any = figure.add_subplot(place, **options)
             for name in sharing:
                 shared.setdefault(name, axes)
-            draw_panel(axes, panel)
+            _draw_panel(axes, panel)
             if panel.scale:
                 scales.setdefault(panel.scale, []).append(axes)
         # matplotlib shares no axes of equal scale, so that each learns what the others show.
@@ -81,6 +85,10 @@ def _columns(names: list[str], width: float) -> int:
 
 def draw_panel(axes: Any, panel: Panel) -> None:
     """Draw a panel into axes of matplotlib, of three dimensions where it is in space."""
+    _draw_panel(axes, translated(panel, for_paper))
+
+
+def _draw_panel(axes: Any, panel: Panel) -> None:
     faces = [item for item in panel.items if isinstance(item, Faces)]
     if faces:
         _draw_faces(axes, faces)
@@ -89,7 +97,7 @@ def draw_panel(axes: Any, panel: Panel) -> None:
     if panel.in_space:
         _equal_in_space(axes, panel)
         axes.view_init(elev=ELEVATION, azim=AZIMUTH)
-        axes.set_zlabel(panel.z_label, labelpad=9.0)
+        axes.set_zlabel(panel.z_label, labelpad=12.0)
     else:
         axes.autoscale_view()
     if panel.equal:
@@ -111,7 +119,9 @@ def draw_panel(axes: Any, panel: Panel) -> None:
     if panel.legend == BELOW:  # axes of three dimensions have no empty corner
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2)
     elif panel.legend == BESIDE:
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
+        # In space the numbers and the name of the upright axis stand there too.
+        at = (1.25, 1.0) if panel.in_space else (1.0, 1.0)
+        axes.legend(loc="upper left", bbox_to_anchor=at, borderaxespad=0.2)
     elif panel.legend:
         axes.legend(loc="best")
 

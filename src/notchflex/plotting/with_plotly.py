@@ -10,19 +10,31 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from notchflex._extras import need
-from notchflex.plotting.plotly_axes import FONT, Place, axes_of, legend_of, ranges_of
-from notchflex.plotting.plotly_marks import area_trace, draw_item, html, line_trace
+from notchflex.plotting.labels import for_browser, heading_lines, translated
+from notchflex.plotting.plotly_axes import (
+    FONT,
+    LABELS,
+    Place,
+    axes_of,
+    legend_height,
+    legend_of,
+    ranges_of,
+)
+from notchflex.plotting.plotly_marks import area_trace, draw_item, line_trace
 from notchflex.plotting.plotly_space import draw_in_space, scene_of
 from notchflex.plotting.sheet import BELOW, BESIDE, Area, Bars, Correlations, Panel, Picture
 from notchflex.results.files import write_text
 
-INCH = 72.0
-"""Pixels of a browser for an inch of the paper."""
+INCH = 64.0
+"""Pixels of a browser for an inch of the paper, where the window is as wide as the picture."""
 
+NARROWEST = 0.75
+"""A picture follows the width of its window down to this part of its own; then it is scrolled."""
+
+# notation: room in pixels round the panels, beside and between them, and a line of text.
 _ABOVE, _BELOW, _LEFT, _RIGHT = 70.0, 64.0, 76.0, 20.0
-_LEGEND = 150.0
-_BETWEEN = 78.0
-_LETTER = 7.0
+_BESIDE, _BETWEEN = 150.0, 78.0
+_LETTER, _HEADING_LINE = 7.0, 22.0
 
 
 def interactive_of(picture: Picture) -> Any:
@@ -34,6 +46,9 @@ def interactive_of(picture: Picture) -> Any:
     need("plotly", "plot", "an interactive picture")
     import plotly.graph_objects as go
 
+    places, width, height = _places(picture)
+    heading = heading_lines(picture.title, width / INCH)
+    picture = translated(picture, for_browser)
     figure = go.Figure()
     layout: dict[str, Any] = {
         "font": {"size": FONT, "family": "DejaVu Sans, Verdana, sans-serif", "color": "#222"},
@@ -45,10 +60,11 @@ def interactive_of(picture: Picture) -> Any:
         "annotations": [],
         "shapes": [],
     }
-    places, layout["width"], layout["height"] = _places(picture)
+    # The width is that of the window; `meta` tells the one that the places are made for.
+    layout |= {"autosize": True, "height": height, "meta": {"width": width}}
     layout["title"] = {
-        "text": html(picture.title), "x": 0.5, "font": {"size": 17}, "yref": "container",
-        "y": 1.0 - 24.0 / layout["height"], "yanchor": "middle",
+        "text": "<br>".join(map(for_browser, heading)), "x": 0.5, "font": {"size": 17},
+        "yref": "container", "y": 1.0 - 12.0 / height, "yanchor": "top",
     }  # fmt: skip
     ranges = ranges_of(picture)
     shared: dict[str, str] = {}
@@ -78,7 +94,7 @@ def interactive_of(picture: Picture) -> Any:
         if panel.title:
             layout["annotations"].append(
                 {
-                    "text": html(panel.title), "x": place.left, "xref": "paper", "xanchor": "left",
+                    "text": panel.title, "x": place.left, "xref": "paper", "xanchor": "left",
                     "y": place.top, "yref": "paper", "yanchor": "bottom", "showarrow": False,
                     "font": {"size": FONT + 0.5},
                 }
@@ -97,7 +113,7 @@ def interactive_of(picture: Picture) -> Any:
     if picture.legend:
         layout["legend"] = {
             "orientation": "h", "x": 0.5, "xanchor": "center", "yanchor": "bottom",
-            "y": 4.0 / layout["height"], "yref": "container",
+            "y": 4.0 / height, "yref": "container",
         }  # fmt: skip
         for entry in picture.legend:
             trace = area_trace(entry) if isinstance(entry, Area) else line_trace(entry, None)
@@ -112,13 +128,21 @@ def save_html(picture: Picture, target: str | FilePath) -> None:
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
     """
-    text = interactive_of(picture).to_html(
+    figure = interactive_of(picture)
+    text = figure.to_html(
         include_plotlyjs=True,
         full_html=True,
+        default_width="100%",
         div_id="notchflex",  # the same picture gives the same file
-        config={"displaylogo": False, "toImageButtonOptions": {"format": "svg"}},
+        config={
+            "displaylogo": False,
+            "responsive": True,
+            "toImageButtonOptions": {"format": "svg"},
+        },
     )
+    narrowest = round(NARROWEST * figure.layout.meta["width"])
     head = f"<head><title>{escape(picture.title)}</title>"
+    head += f"<style>#notchflex {{min-width: {narrowest}px}}</style>"
     write_text(target, text.replace("<head>", head, 1))
 
 
@@ -126,15 +150,16 @@ def _places(picture: Picture) -> tuple[list[Place], float, float]:
     """Where every panel stands, and width and height of the whole in pixels."""
     rows, columns = picture.shape
     beside = [
-        _LEGEND
-        if any(
-            c.panel.legend in (BESIDE, BELOW) and c.columns[1] == column + 1 for c in picture.cells
-        )
+        _BESIDE
+        if any(c.panel.legend == BESIDE and c.columns[1] == column + 1 for c in picture.cells)
         else 0.0
         for column in range(columns)
     ]
     width = INCH * picture.width / columns
-    height = INCH * picture.height / rows
+    # A column may divide its height into other rows than its neighbour.
+    lines = max(sum(c.columns[0] == column for c in picture.cells) for column in range(columns))
+    body = INCH * picture.height + (lines - 1) * _BETWEEN
+    height = (body - (rows - 1) * _BETWEEN) / rows
     before = [
         max((_names_before(c.panel) for c in picture.cells if c.columns[0] == column), default=0.0)
         for column in range(columns)
@@ -144,14 +169,18 @@ def _places(picture: Picture) -> tuple[list[Place], float, float]:
         for column in range(columns)
     ]
     whole = starts[-1] + width + beside[-1] + _RIGHT
-    tall = _ABOVE + rows * height + (rows - 1) * _BETWEEN + _BELOW
+    above = _ABOVE + _HEADING_LINE * (len(heading_lines(picture.title, whole / INCH)) - 1)
+    tall = above + rows * height + (rows - 1) * _BETWEEN + _BELOW
     tall += 40.0 if picture.legend else 0.0
     places: list[Place] = []
     for cell in picture.cells:
-        top = tall - _ABOVE - cell.rows[0] * (height + _BETWEEN)
-        bottom = tall - _ABOVE - cell.rows[1] * (height + _BETWEEN) + _BETWEEN
+        top = tall - above - cell.rows[0] * (height + _BETWEEN)
+        bottom = tall - above - cell.rows[1] * (height + _BETWEEN) + _BETWEEN
+        if cell.panel.legend == BELOW:
+            bottom += legend_height(cell.panel)
         left, right = starts[cell.columns[0]], starts[cell.columns[1] - 1] + width
-        places.append(Place(left / whole, right / whole, bottom / tall, top / tall))
+        foot = bottom - LABELS
+        places.append(Place(left / whole, right / whole, bottom / tall, top / tall, foot / tall))
     return places, whole, tall
 
 

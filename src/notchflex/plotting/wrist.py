@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from notchflex.plotting.acting import COLOUR, Acting, acting_at
 from notchflex.plotting.bent import bent_at
+from notchflex.plotting.drive import by_stroke, driven_by_stroke
 from notchflex.plotting.outline import Outline, outline
-from notchflex.plotting.sheet import FINE, INSIDE, Area, Arrow, Colour, Item, Line, Note, Panel
+from notchflex.plotting.sheet import BESIDE, FINE, Area, Arrow, Colour, Item, Line, Note, Panel
 from notchflex.plotting.style import GREY, ORANGE, VERMILLION, rgb, sequence_colours
 
 if TYPE_CHECKING:
@@ -22,6 +23,9 @@ MOST_SHAPES = 5
 
 ARROW = 0.18
 """Length of the arrow of the largest force, in lengths of the robot."""
+
+_NOTHING = 1e-6
+"""A tension [N] or stroke [mm] less than this is written as 0."""
 
 SHORTEST = 0.25
 """Length of the shortest arrow, in lengths of the longest."""
@@ -65,6 +69,7 @@ def wrist_panel(
     title: str = "",
     scale: str = "shape",
     colours: Sequence[Colour] | None = None,
+    legend: str = BESIDE,
 ) -> Panel:
     """Return a robot at several steps of a path, on axes of equal scale, with its loads.
 
@@ -75,6 +80,7 @@ def wrist_panel(
         title: What stands above it.
         scale: Panels of one name show the same part of the plane.
         colours: One for each step; from dark to light if None.
+        legend: Where its legend stands.
     """
     items: list[Item] = []
     closed_points: list[NDArray[np.float64]] = []
@@ -83,6 +89,8 @@ def wrist_panel(
     for order, (step, colour) in enumerate(zip(steps, colours, strict=True)):
         bent = bent_at(path, step)
         shape = outline(bent, view)
+        if not order:  # what holds the robot stands still: it is drawn once
+            items.append(Area([shape.held], GREY, GREY, 0.5, layer=1))
         items += _robot(shape, colour, load_label(path, step), level=3 * order)
         closed_points += [shape.lips[notch] for notch in np.flatnonzero(path.closed[step])]
         loads += acting_at(path, step, bent)
@@ -105,7 +113,7 @@ def wrist_panel(
         f"across the base, {across_name(view)} [mm]",
         "along the base, z [mm]",
         title=title,
-        legend=INSIDE if steps else "",
+        legend=legend if steps else "",
         equal=True,
         scale=scale,
     )
@@ -167,10 +175,22 @@ def load_arrows(
 
 
 def load_label(path: Path, step: int) -> str:
-    """Return what tells a step apart in a legend: its tensions and its total angle."""
-    tensions = ", ".join(f"{value:.3g}" for value in path.tension[step])
+    """Return what tells a step apart in a legend: what drives it, and its total angle.
+
+    The strokes of tendons that strokes drive, and the tensions where there are none.
+    """
     angle = round(float(np.degrees(path.total_angle[step])), 1) + 0.0  # no minus before a zero
-    return f"{tensions} N, {angle:.1f}°"
+    drawn = driven_by_stroke(path) or [
+        tendon for tendon in range(path.tension.shape[1]) if by_stroke(path, tendon)
+    ]
+    if not drawn:
+        return f"{', '.join(_short(value) for value in path.tension[step])} N, {angle:.1f}°"
+    return f"{', '.join(_short(path.stroke[step, one]) for one in drawn)} mm, {angle:.1f}°"
+
+
+def _short(value: float) -> str:
+    """Write a load with three digits; what rounding left of nothing is nothing."""
+    return f"{0.0 if abs(value) < _NOTHING else value:.3g}"
 
 
 def _robot(shape: Outline, colour: Colour, label: str, level: int) -> Iterator[Item]:
@@ -183,7 +203,6 @@ def _robot(shape: Outline, colour: Colour, label: str, level: int) -> Iterator[I
     yield Line(bores, colour, FINE, 0.5, group=label, layer=3 + level)
     for line in shape.tendons:
         yield Line(line, ORANGE, width=1.0, group=label, layer=4 + level)
-    yield Line(shape.held, GREY, width=4.0, blunt=True)
 
 
 def _apart(line: NDArray[np.float64]) -> NDArray[np.float64]:

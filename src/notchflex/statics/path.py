@@ -142,7 +142,8 @@ class EquilibriumPath(PathQuantities, Displayed):
         chain = self.chain
         if solved.applied is not None and chain.frame is not None:
             solved = solved._replace(applied=out_of_frame(solved.applied, chain.frame))
-        return State(self.robot.name, solved, chain.level, chain.loaded, chain.refinement)
+        name = self.robot.name
+        return State(name, solved, chain.level, chain.loaded, chain.refinement, self.robot)
 
     @property
     def state(self) -> State:

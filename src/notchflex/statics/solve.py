@@ -16,7 +16,7 @@ from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import run
-from notchflex.statics.state import SavedState, State, fitted
+from notchflex.statics.state import SavedState, State, check_robot, fitted
 
 MOST_REFINEMENT = 3
 
@@ -53,11 +53,8 @@ def simulate(
         True
     """
     load = load_path(loads, robot.number_of_tendons)
-    if from_state is not None and from_state.robot != robot.name:
-        raise InputError(
-            f"the state belongs to robot {from_state.robot!r}, this one is {robot.name!r}; "
-            "continue from a state of the same robot"
-        )
+    if from_state is not None:
+        check_robot(from_state, robot)
     ready = prepared_for(robot, load, from_state, refinement)
     start = None if from_state is None else fitted(from_state, ready.chain)
     commands = command(load, robot, ready.chain)

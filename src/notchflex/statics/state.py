@@ -14,7 +14,9 @@ from notchflex._summary import Displayed, Summary
 from notchflex.chain import Chain
 from notchflex.errors import InputError
 from notchflex.flexure import LEVELS
+from notchflex.robot import Robot
 from notchflex.statics.applied import in_frame, out_of_frame
+from notchflex.statics.same_robot import mismatch
 from notchflex.statics.stepping import Solved, at_rest
 
 _MODES = ".point.unknowns.modes"
@@ -33,6 +35,7 @@ class State(Displayed):
         level: For which loads its chain was assembled.
         loaded: Whether loads other than the tendons' act in it.
         refinement: How many more modes its chain has than for usual loads.
+        description: The robot it belongs to; None if that is not known.
     """
 
     robot: str
@@ -40,6 +43,7 @@ class State(Displayed):
     level: str
     loaded: bool
     refinement: int
+    description: Robot | None = None
 
     def save(self, path: str | FilePath) -> None:
         """Write the state to a JSON file.
@@ -58,6 +62,10 @@ class State(Displayed):
             "refinement": self.refinement,
             "arrays": {name: array.tolist() for name, array in self.arrays.items()},
         }
+        if self.description is not None:
+            from notchflex.robot.writing import robot_text
+
+            content["description"] = robot_text(self.description)
         text = json.dumps(content, indent=1) + "\n"
         try:
             FilePath(path).write_text(text, encoding="utf-8")
@@ -115,12 +123,24 @@ class State(Displayed):
         refinement = content.get("refinement")
         if level not in LEVELS or not isinstance(loaded, bool) or not isinstance(refinement, int):
             raise _damaged(path, "what loads it is for is missing")
-        return SavedState(robot, arrays, level, loaded, refinement, str(path))
+        description = content.get("description")
+        if description is not None:
+            from notchflex.robot.reading import robot_from_text
+
+            try:
+                description = robot_from_text(str(description))
+            except InputError:
+                raise _damaged(path, "the description of its robot cannot be read") from None
+        return SavedState(robot, arrays, level, loaded, refinement, str(path), description)
 
 
 @dataclass(frozen=True)
 class SavedState:
-    """A state as read from a file, not yet fitted to a robot."""
+    """A state as read from a file, not yet fitted to a robot.
+
+    Its `description` is None where an older version wrote the file: nothing then shows whether
+    the robot has changed since.
+    """
 
     robot: str
     arrays: Any
@@ -128,6 +148,7 @@ class SavedState:
     loaded: bool
     refinement: int
     source: str
+    description: Robot | None = None
 
     @property
     def follows(self) -> bool:
@@ -158,6 +179,26 @@ class SavedState:
 
 def _damaged(source: str | FilePath, what: str) -> InputError:
     return InputError(f"the state file {source} is damaged: {what}; save the state again")
+
+
+def check_robot(state: State | SavedState, robot: Robot) -> None:
+    """Check that a state belongs to a robot.
+
+    Raises:
+        InputError: It belongs to another one; the message names the values that differ.
+    """
+    if state.robot != robot.name:
+        raise InputError(
+            f"the state belongs to robot {state.robot!r}, this one is {robot.name!r}; "
+            "continue from a state of the same robot"
+        )
+    differs = "" if state.description is None else mismatch(robot, state.description)
+    if differs:
+        source = f"{state.source} holds" if isinstance(state, SavedState) else "this is"
+        raise InputError(
+            f"{source} a state of {robot.name!r} with other values: this robot has {differs}. "
+            "Continue with the values of the state, or start from rest."
+        )
 
 
 def fitted(state: State | SavedState | None, chain: Chain) -> Solved:

@@ -1,0 +1,122 @@
+"""What is typed as a reading: numbers, sums of numbers, one for each notch, words."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable
+
+from notchflex.errors import InputError
+
+_OPERATIONS: dict[type, Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+
+
+def reading(
+    text: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = None,
+) -> float:
+    """Return a number from what was typed; sums such as `1.62-0.22` are worked out.
+
+    Args:
+        text: A number, or numbers joined by + - * /.
+        above: The number must be greater.
+        at_least: The number must not be less.
+        below: The number must be less.
+        at_most: The number must not be greater.
+
+    Raises:
+        InputError: Not a number, not finite, or outside its bounds.
+
+    Example:
+        >>> round(reading("1.62-0.22", above=0, below=1.62), 9)
+        1.4
+    """
+    try:
+        value = _evaluate(ast.parse(text.replace("−", "-"), mode="eval").body)
+    except (ValueError, SyntaxError, ZeroDivisionError, OverflowError, RecursionError, MemoryError):
+        got = repr(text) if text else "nothing"
+        raise InputError(f"got {got}; give a number such as 1.62, or a sum: 1.62-0.22.") from None
+    bounds = [
+        (above, operator.gt, "greater than"),
+        (at_least, operator.ge, "at least"),
+        (below, operator.lt, "less than"),
+        (at_most, operator.le, "at most"),
+    ]
+    allowed = " and ".join(f"{words} {bound:g}" for bound, _, words in bounds if bound is not None)
+    wanted = f"a finite number {allowed}".strip()
+    if not math.isfinite(value) or any(
+        bound is not None and not holds(value, bound) for bound, holds, _ in bounds
+    ):
+        raise InputError(f"got {value:g}; give {wanted}.")
+    # Nobody reads callipers to a nanometre; this drops the noise of 1.62-0.22.
+    return round(value, 9)
+
+
+def readings(text: str, count: int, **bounds: float) -> list[float]:
+    """Return one number for each of `count` notches; a single one holds for all.
+
+    Raises:
+        InputError: As `reading`, or another number of numbers.
+    """
+    values = [reading(part.strip(), **bounds) for part in text.split(",")]
+    if len(values) not in (1, count):
+        raise InputError(
+            f"got {len(values)} numbers; give one for all, or {count} joined by commas, "
+            "base to tip."
+        )
+    return values * count if len(values) == 1 else values
+
+
+def choice(text: str, allowed: tuple[str, ...]) -> str:
+    """Return one of the allowed words; its beginning is enough.
+
+    Raises:
+        InputError: Not one of them, or the beginning of several.
+    """
+    found = [word for word in allowed if word == text] or [
+        word for word in allowed if text and word.startswith(text.lower())
+    ]
+    if len(found) != 1:
+        got = repr(text) if text else "nothing"
+        raise InputError(f"got {got}; give {' or '.join(allowed)}.")
+    return found[0]
+
+
+def whole(text: str, *, at_least: int, at_most: int) -> int:
+    """Return a whole number within bounds.
+
+    Raises:
+        InputError: Not a whole number, or outside its bounds.
+    """
+    try:
+        value = int(text)
+    except ValueError:
+        got = repr(text) if text else "nothing"
+        raise InputError(f"got {got}; give a whole number.") from None
+    if not at_least <= value <= at_most:
+        raise InputError(f"got {value}; give {at_least} to {at_most}.")
+    return value
+
+
+def _evaluate(node: ast.expr) -> float:
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            return float(value)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return -_evaluate(operand)
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return _evaluate(operand)
+        case ast.BinOp(left=left, op=operation, right=right) if type(operation) in _OPERATIONS:
+            return _OPERATIONS[type(operation)](_evaluate(left), _evaluate(right))
+        case _:
+            raise ValueError("not a sum of numbers")

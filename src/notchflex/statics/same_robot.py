@@ -1,0 +1,82 @@
+"""Whether a saved state belongs to a robot: compares the values that the mechanics depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from notchflex.robot import Robot
+from notchflex.robot.robot import to_table
+
+# What a robot is called and when a strain is warned of has no effect on its states.
+_NO_EFFECT = ("name", "material.allowed_strain")
+_MOST = 3
+
+
+def differences(robot: Robot, other: Robot) -> list[str]:
+    """List the values in which two robots differ, by their names in a robot file.
+
+    Args:
+        robot: The robot whose values are given first.
+        other: The robot that it is compared with.
+
+    Returns:
+        One text for each value, such as `notch.depth = 1.38 instead of 1.4`; a value that differs
+        in all notches in the same way is listed once.
+
+    Example:
+        >>> from notchflex.robot import load_robot
+        >>> wrist = load_robot("pacheco2021-a")
+        >>> differences(wrist.with_value("notch.depth", 1.38), wrist)
+        ['notch.depth = 1.38 instead of 1.4']
+    """
+    first, second = _values(robot), _values(other)
+    changes: dict[str, dict[tuple[Any, Any], list[str]]] = {}
+    for name in dict.fromkeys([*first, *second]):
+        pair = first.get(name), second.get(name)
+        if pair[0] != pair[1]:
+            changes.setdefault(_general(name), {}).setdefault(pair, []).append(name)
+    found: list[str] = []
+    for general, pairs in changes.items():
+        for (mine, its), names in pairs.items():
+            everywhere = len(names) == sum(_general(one) == general for one in first)
+            shown = [general] if everywhere else names
+            found += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
+    return found
+
+
+def mismatch(robot: Robot, other: Robot) -> str:
+    """Describe in a few words how a robot differs from another one; "" where it does not."""
+    found = differences(robot, other)
+    more = len(found) - _MOST
+    return ", ".join(found[:_MOST]) + (f" and {more} more" if more > 0 else "")
+
+
+def _values(robot: Robot) -> dict[str, Any]:
+    """Every value of a robot by its name, notch by notch."""
+    table = to_table(robot.replace(notch=robot.notches))
+    values: dict[str, Any] = {}
+    for section, part in table.items():
+        if isinstance(part, Mapping):
+            parts = {section: part}
+        elif isinstance(part, list):
+            parts = {f"{section}[{number}]": one for number, one in enumerate(part, start=1)}
+        else:
+            values[section] = part
+            continue
+        values |= {
+            f"{name}.{key}": value for name, one in parts.items() for key, value in one.items()
+        }
+    return {name: value for name, value in values.items() if name not in _NO_EFFECT}
+
+
+def _general(name: str) -> str:
+    """The name that means a value of all notches or tendons."""
+    section, _, key = name.partition(".")
+    return f"{section.partition('[')[0]}.{key}"
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "none"
+    return f"{value:g}" if isinstance(value, float) else str(value)
