@@ -67,7 +67,6 @@ _HOME = {
         "notchflex.statics",
     ),
     **dict.fromkeys(
-        # not `calibrate`: the folder has that name
         (
             "Calibration",
             "Constant",
@@ -77,19 +76,21 @@ _HOME = {
             "Measurements",
             "SumOfDistances",
             "SumOfRobotErrors",
+            "calibrate",
             "friction_rig",
             "leave_out",
             "next_measurement",
-            "posterior",
+            "sample_posterior",
             "read_friction_rig",
             "read_measurements",
-            "synthetic",
-            "verdict",
+            "simulate_measurements",
+            "diagnose",
             "write_fitted",
             "write_measurements",
         ),
         "notchflex.fit",
     ),
+    **dict.fromkeys(("Comparison", "compare"), "notchflex.comparison"),
 }
 
 __all__ = [*sorted(_HOME), "__version__"]  # pyright: ignore[reportUnsupportedDunderAll]

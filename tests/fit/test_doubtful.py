@@ -10,12 +10,12 @@ from notchflex.fit import (
     LeastSquares,
     Measurements,
     calibrate,
+    diagnose,
     leave_out,
     next_measurement,
-    posterior,
     read_measurements,
-    synthetic,
-    verdict,
+    sample_posterior,
+    simulate_measurements,
     write_fitted,
 )
 from notchflex.fit.problem import Problem
@@ -26,7 +26,7 @@ FRICTION, MODULUS = NAMES
 
 
 def said_of(found):
-    return " ".join(verdict(found))
+    return " ".join(diagnose(found))
 
 
 def untold(seen):
@@ -48,7 +48,7 @@ def test_a_fit_through_every_number_does_not_tell_how_far_to_trust_it(tmp_path):
     assert found.allows(MODULUS, 1.01 * found.values[MODULUS])
     (file,) = write_fitted(found, tmp_path / "fitted")
     assert "nothing tells the noise" in file.read_text(encoding="utf-8")
-    for ask in (posterior, lambda fit: next_measurement(fit, nf.pull(0.2, 1.0, steps=2))):
+    for ask in (sample_posterior, lambda fit: next_measurement(fit, nf.pull(0.2, 1.0, steps=2))):
         with pytest.raises(nf.InputError, match="nothing tells the noise"):
             ask(found)
 
@@ -57,7 +57,9 @@ def test_coordinates_may_be_missing_one_by_one_also_on_a_turned_base(tmp_path):
     load = nf.pull(0.4, 1.4, steps=3)
     turned = nf.LoadPath(load.tension, load.stroke, np.array([0.3, -0.2, 0.5]))
     noise = {"tip_position": 0.05}
-    whole = synthetic(WRIST, turned, observed=("tip_position",), deviation=noise, seed=1)
+    whole = simulate_measurements(
+        WRIST, turned, observed=("tip_position",), deviation=noise, seed=1
+    )
     whole.deviation["tip_position"][:, 2] = 5.0  # in the world, where it was measured
     some = whole.observed["tip_position"].copy()
     some[:, 2] = np.nan
@@ -68,7 +70,7 @@ def test_coordinates_may_be_missing_one_by_one_also_on_a_turned_base(tmp_path):
     # What is hardly known counts as little as what was not measured at all.
     hardly = calibrate(WRIST, whole, FRICTION, starts=1, intervals=False)
     assert found.values[FRICTION] == pytest.approx(hardly.values[FRICTION], abs=2e-4)
-    at = synthetic(found.robots[WRIST.name], turned, observed=("tip_position",))
+    at = simulate_measurements(found.robots[WRIST.name], turned, observed=("tip_position",))
     left = at.observed["tip_position"][:, :2] - some[:, :2]
     np.testing.assert_allclose(found.residuals.values, left.ravel(), atol=1e-7)
 
@@ -119,7 +121,9 @@ def test_angles_about_0_are_not_called_loose_for_being_small():
 
 def test_a_way_up_and_down_taken_as_pulls_from_rest_is_asked_about():
     load = nf.pull(0.4, 1.6, steps=4).release()
-    seen = synthetic(WRIST, load, observed=OBSERVED, deviation=DEVIATION, from_rest=False)
+    seen = simulate_measurements(
+        WRIST, load, observed=OBSERVED, deviation=DEVIATION, from_rest=False
+    )
     wrong = Measurements("loop", load, seen.pull, True, seen.observed, seen.deviation)
     found = calibrate(WRIST, wrong, MODULUS, starts=1, intervals=False)
     assert "Pull 1 of loop goes up and down again" in said_of(found)
@@ -149,7 +153,7 @@ def test_whether_a_model_misses_is_judged_by_numbers_of_known_noise_alone():
         (lambda: calibrate(WRIST, measured(), Constant("tube.inner_diameter", 5.0, 9.0)), "1.62"),
         (lambda: leave_out(fitted(), by="pull", seed=-1), "seed 0 or more"),
         (lambda: leave_out(fitted(), by="pull", starts=0), "starts must be 1 or more"),
-        (lambda: posterior(fitted(), draws=3), "draws must be 4 or more"),
+        (lambda: sample_posterior(fitted(), draws=3), "draws must be 4 or more"),
         (
             lambda: next_measurement(fitted(), nf.pull(0.2, 1, steps=2), deviation={"x": 0.0}),
             "above 0",

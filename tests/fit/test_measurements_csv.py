@@ -14,7 +14,7 @@ from notchflex.fit import (
     Measurements,
     read_measurements,
     repeats_of_each,
-    synthetic,
+    simulate_measurements,
     write_measurements,
 )
 from notchflex.fit.measurements_writing import exactly_in_degrees
@@ -151,7 +151,7 @@ def test_gravity_needs_something_to_act_on(read, robot):
 
 
 def everything(robot: nf.Robot, path: nf.LoadPath, **options) -> Measurements:
-    return synthetic(
+    return simulate_measurements(
         robot,
         path,
         observed=(

@@ -21,8 +21,8 @@ _ROWS = 16
 
 def print_calibration(found: Calibration) -> None:
     """Print constants, how far to trust them, and the errors of every part."""
+    from notchflex.fit.diagnosis import diagnose
     from notchflex.fit.documents import data_of
-    from notchflex.fit.verdict import verdict
 
     console = terminal.output()
     for label in found.given:
@@ -40,7 +40,7 @@ def print_calibration(found: Calibration) -> None:
     console.print()
     _print_constants(console, found)
     console.print()
-    for sentence in verdict(found) or ("Nothing speaks against these constants.",):
+    for sentence in diagnose(found) or ("Nothing speaks against these constants.",):
         console.print(sentence)
     console.print()
     _print_errors(console, found)

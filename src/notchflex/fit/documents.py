@@ -9,13 +9,13 @@ import numpy as np
 
 from notchflex import __version__
 from notchflex.fit.calibration import Calibration
+from notchflex.fit.diagnosis import diagnose
 from notchflex.fit.errors_of_parts import edge, errors_of_parts
 from notchflex.fit.folds import LeftOut
 from notchflex.fit.measurements import OBSERVED
 from notchflex.fit.next_measurement import NextMeasurement
 from notchflex.fit.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
 from notchflex.fit.posterior import Posterior
-from notchflex.fit.verdict import verdict
 from notchflex.results.json import plain
 from notchflex.results.quantities import QUANTITIES
 from notchflex.robot.robot import to_table
@@ -55,7 +55,7 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         "intervals_widened_by": found.widened,
         "constants": _constants(found),
         "correlation": [[_finite(one) for one in row] for row in found.correlation],
-        "verdict": list(verdict(found)),
+        "verdict": list(diagnose(found)),
         "noise": _noise(found),
         "errors": [
             {

@@ -59,7 +59,7 @@ class Posterior:
         return {name: (lower, upper) for name, lower, upper in every}
 
 
-def posterior(
+def sample_posterior(
     found: Calibration,
     *,
     draws: int = 500,
@@ -174,4 +174,4 @@ class _Target:
         return np.concatenate([[cost.value], self._spread.T @ cost.gradient]) / self._temper
 
 
-__all__ = ["LEAST_DRAWS", "Posterior", "posterior"]
+__all__ = ["LEAST_DRAWS", "Posterior", "sample_posterior"]

@@ -6,9 +6,14 @@ import math
 
 import numpy as np
 
+from notchflex.fit.branch_residuals import (
+    BRANCH_QUANTITIES,
+    branch_difference,
+    branch_words,
+    off_by_row,
+)
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.intervals import NO_SOLUTION, Interval
-from notchflex.fit.repeats import gone_back
 from notchflex.fit.rows import SENSOR
 
 # A half-width of more than this part of the value is loose; constants more alike than that cannot
@@ -20,7 +25,7 @@ _UNLIKE_PRIOR = 3.0
 _AT_LIMIT = 1e-6
 
 
-def verdict(found: Calibration) -> tuple[str, ...]:
+def diagnose(found: Calibration) -> tuple[str, ...]:
     """What a user should know before trusting the constants, the gravest first.
 
     Args:
@@ -32,13 +37,13 @@ def verdict(found: Calibration) -> tuple[str, ...]:
     said: list[str] = []
     if not found.converged:
         said.append(f"The search did not settle: {found.reason}.")
+    said += _branches(found)
     said += _limits(found)
     said += _far(found)
     for name, interval in found.intervals.items():
         said += _loose(found, name, interval)
     said += _alike(found)
     said += _noise(found)
-    said += _ways_back(found)
     return tuple(said)
 
 
@@ -169,19 +174,19 @@ def _noise(found: Calibration) -> list[str]:
     return said
 
 
-def _ways_back(found: Calibration) -> list[str]:
-    """Pulls up and down again that were taken as pulls from rest, where the fit does not speak."""
-    if found.noise.is_known and not found.misses:
-        return []
+def _branches(found: Calibration) -> list[str]:
+    """Tables whose unloading rows the model misses otherwise than their loading rows."""
     said: list[str] = []
-    for sample in found.problem.samples.every:
-        pulls = gone_back(sample.measured) if sample.measured.from_rest else ()
-        if pulls:
-            said.append(
-                f"Pull {pulls[0]} of {sample.measured.source} goes up and down again, and each row "
-                "is taken as a pull from rest. If it was one way, say so: --path, or from_rest 0."
-            )
+    for number, sample in enumerate(found.problem.samples.every):
+        measured = sample.measured
+        for name in BRANCH_QUANTITIES:
+            off = off_by_row(found.residuals, number, name, len(measured))
+            difference = branch_difference(-off, measured.branches)
+            if difference is not None:
+                said.append(branch_words(difference, name, measured))
+            if np.isfinite(off).any():
+                break
     return said
 
 
-__all__ = ["verdict", "with_unit"]
+__all__ = ["diagnose", "with_unit"]
