@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numpy.typing import NDArray
 
 from notchflex._jax import constant
 from notchflex.errors import InputError
@@ -71,9 +72,9 @@ class Comparison:
     @cached_property
     def measured_total_angle(self) -> Float[np.ndarray, " p"]:
         """Measured total angle [rad], (P,): its own column, or else the sum of all notches."""
-        added = self.measured_notch_angle.sum(axis=1)
-        own = self.measured.observed.get("total_angle", added)
-        return np.where(np.isnan(own), added, own)
+        added = np.sum(self.measured_notch_angle, axis=1)
+        own = self.measured.observed.get("total_angle")
+        return added if own is None else np.where(np.isnan(own), added, own)
 
     @cached_property
     def measured_tip(self) -> Float[np.ndarray, "p 3"]:
@@ -85,11 +86,11 @@ class Comparison:
         angles = self.measured_notch_angle
         whole = np.isfinite(angles).all(axis=1)
         if whole.any():
-            tip, _ = tip_from_angles(self.robot, angles[whole])
-            found[whole] = np.asarray(tip) @ _base(self.measured).T
-        own = self.measured.observed.get("tip_position", np.full(self.tip.shape, np.nan))
-        seen = np.isfinite(own).any(axis=1)
-        found[seen] = own[seen]
+            found[whole] = _tip_in_world(self.robot, self.measured, angles[whole])
+        own = self.measured.observed.get("tip_position")
+        if own is not None:
+            seen = np.isfinite(own).any(axis=1)
+            found[seen] = own[seen]
         return found
 
     @property
@@ -127,7 +128,7 @@ class Comparison:
             return ()
         return (branch_words(difference, "total_angle", self.measured),)
 
-    def _rms(self, errors: Float[np.ndarray, p * c]) -> Float[np.ndarray, "*c"]:
+    def _rms(self, errors: NDArray[np.float64]) -> NDArray[np.float64]:
         known = np.isfinite(errors) & self.converged.reshape(-1, *(1,) * (errors.ndim - 1))
         count = known.sum(axis=0)
         total = np.sum(np.where(known, errors, 0.0) ** 2, axis=0)
@@ -190,7 +191,7 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
         stroke=model["stroke"],
         notch_angle=model["notch_angle"],
         total_angle=model["total_angle"],
-        tip=model["tip_position"] @ _base(measurements).T,
+        tip=model["tip_position"],
         converged=model["converged"],
         reason=tuple(str(one) for one in model["reason"]),
         others={name: _error(name, measurements, model) for name in observed},
@@ -223,7 +224,6 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
     stroke = np.where(given, comparison.measured.load.stroke[:, 0], comparison.stroke[:, 0])
     shared = equal_stroke(robot, stroke)
     angles = shared.notch_angle
-    tip, _ = tip_from_angles(robot, angles)
     # A stroke past the last closing has no equilibrium, but here it is the closed shape.
     solved = comparison.converged | given
     return replace(
@@ -231,7 +231,7 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
         stroke=stroke[:, None],
         notch_angle=angles,
         total_angle=angles.sum(axis=1),
-        tip=np.asarray(tip) @ _base(comparison.measured).T,
+        tip=_tip_in_world(robot, comparison.measured, angles),
         converged=solved,
         others={},
         stroke_lost=shared.stroke_lost,
@@ -255,9 +255,12 @@ def _check(robot: Robot, measurements: Measurements) -> None:
         )
 
 
-def _base(measured: Measurements) -> Float[np.ndarray, "3 3"]:
-    """Rotation of the base in the world."""
-    return np.asarray(rotation_about(constant(measured.load.base_rotation)))
+def _tip_in_world(
+    robot: Robot, measured: Measurements, angles: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Forward kinematics of notch angles, on the base as it was turned."""
+    tip, _ = tip_from_angles(robot, angles)
+    return np.asarray(tip) @ np.asarray(rotation_about(constant(measured.load.base_rotation))).T
 
 
 def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
@@ -268,7 +271,10 @@ def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
     values = {one: model[one][rows] for one in outputs_for((name,))}
     slopes = {one: np.zeros((0, *value.shape)) for one, value in values.items()}
     predicted = Predicted(values, np.ones(len(rows), bool), slopes)
-    off = misfit(name, measured.taken(rows), predicted).values
+    part = measured.taken(rows)
+    # States of a path are in the world already, as what was measured.
+    part = replace(part, load=replace(part.load, base_rotation=np.zeros(3)))
+    off = misfit(name, part, predicted).values
     coordinates = 1 if name == "tip_tension" else 3
     squares = off.reshape(len(rows), -1, coordinates) ** 2
     known = np.isfinite(squares).any(axis=2)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.stats import ttest_ind
+from scipy.stats import mannwhitneyu
+from scipy.stats import t as student
 
 from notchflex.fit.measurements import OBSERVED, Measurements
 from notchflex.fit.residuals import Residuals
@@ -17,6 +18,8 @@ BRANCH_QUANTITIES = ("total_angle", "notch_angle")
 
 # Branches whose means differ by chance with this probability differ; so few rows tell nothing.
 _UNLIKELY, _ROWS = 0.01, 3
+# A scatter below this part of the difference is rounding.
+_EXACT = 1e-9
 
 
 class BranchDifference(NamedTuple):
@@ -29,7 +32,9 @@ class BranchDifference(NamedTuple):
 def branch_difference(
     off: Float[np.ndarray, " p"], branch: Int[np.ndarray, " p"]
 ) -> BranchDifference | None:
-    """Compare both branches by the test of Welch (1947).
+    """Compare both branches by the tests of Welch (1947) and of Mann and Whitney (1947).
+
+    The first is sharper for few rows, the second where hysteresis is large in some rows only.
 
     Args:
         off: Measurement less model of every row; NaN where nothing was measured.
@@ -47,12 +52,14 @@ def branch_difference(
     if min(len(up), len(down)) < _ROWS:
         return None
     means = BranchDifference(float(np.mean(up)), float(np.mean(down)))
-    spread = float(np.ptp(up) + np.ptp(down))
-    if spread <= 1e-9 * abs(means.unloading - means.loading):
-        return means
-    if spread == 0.0 or float(ttest_ind(up, down, equal_var=False).pvalue) > _UNLIKELY:
-        return None
-    return means
+    parts = np.array([np.var(one, ddof=1) / len(one) for one in (up, down)])
+    difference, variance = means.unloading - means.loading, float(parts.sum())
+    if variance <= (_EXACT * difference) ** 2:
+        return means if difference else None
+    freedom = variance**2 / float(np.sum(parts**2 / [len(up) - 1, len(down) - 1]))
+    chance = 2.0 * float(student.sf(abs(difference) / np.sqrt(variance), freedom))
+    ranks: Any = mannwhitneyu(up, down)
+    return means if min(chance, float(ranks.pvalue)) < _UNLIKELY else None
 
 
 def branch_words(difference: BranchDifference, quantity: str, measured: Measurements) -> str:

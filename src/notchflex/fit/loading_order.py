@@ -124,9 +124,9 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
     words = ""
     if begins and pull is None:
         words = (
-            f"the {commands[0][0]} begins again {len(begins)} time{'s' * (len(begins) > 1)}, so the "
-            f"rows are taken as {count} pulls, each row loaded from rest; give --path if they are "
-            "one loading path"
+            f"the {commands[0][0]} begins again {len(begins)} time{'s' * (len(begins) > 1)}, so "
+            f"the rows are taken as {count} pulls, each row loaded from rest; give --path if they "
+            "are one loading path"
         )
     return Order(True, labels, words=words)
 
