@@ -5,6 +5,7 @@ import pytest
 
 import notchflex as nf
 from fitted import DEVIATION, NAMES, OBSERVED, ROBOT, fitted, measured
+from notchflex.cli.calibrate_tables import print_calibration
 from notchflex.fit import (
     Constant,
     LeastSquares,
@@ -18,8 +19,11 @@ from notchflex.fit import (
     simulate_measurements,
     write_fitted,
 )
+from notchflex.fit.documents import calibration_document
 from notchflex.fit.problem import Problem
 from notchflex.fit.samples import Samples
+from notchflex.plotting.calibration_rows import residual_panel
+from notchflex.plotting.sheet import Line
 
 WRIST = nf.load_robot(ROBOT)
 FRICTION, MODULUS = NAMES
@@ -119,15 +123,114 @@ def test_angles_about_0_are_not_called_loose_for_being_small():
     assert not said_of(found)
 
 
-def test_a_way_up_and_down_taken_as_pulls_from_rest_is_asked_about():
-    load = nf.pull(0.4, 1.6, steps=4).release()
-    seen = simulate_measurements(
-        WRIST, load, observed=OBSERVED, deviation=DEVIATION, from_rest=False
+def looped(**options):
+    """Loading and unloading of a wrist with known constants and noise, as one path."""
+    load = nf.pull(0.2, 1.6, steps=8).release()
+    return simulate_measurements(
+        WRIST, load, observed=OBSERVED, deviation=DEVIATION, from_rest=False, **options
     )
-    wrong = Measurements("loop", load, seen.pull, True, seen.observed, seen.deviation)
-    found = calibrate(WRIST, wrong, MODULUS, starts=1, intervals=False)
-    assert "Pull 1 of loop goes up and down again" in said_of(found)
-    assert "up and down" not in said_of(calibrate(WRIST, untold(measured()), MODULUS, starts=1))
+
+
+def test_unloading_taken_as_pulls_from_rest_is_doubted():
+    loop = looped(seed=2)
+    wrong = Measurements("loop", loop.load, loop.pull, True, loop.observed, loop.deviation)
+    found = calibrate(WRIST, wrong, NAMES, starts=1, intervals=False)
+    (said,) = [one for one in diagnose(found) if "Unloading" in one]
+    residuals = found.residuals
+    total = residuals.values[residuals.quantity == 1]
+    assert f"Unloading rows of loop are {-np.degrees(total[8:].mean()):.2g} deg above" in said
+    assert f"loading rows {np.degrees(total[:8].mean()):.2g} deg below" in said
+    assert "--path" in said
+    right = calibrate(WRIST, loop, NAMES, starts=1)
+    assert not diagnose(right)
+    for name, value in zip(NAMES, (0.13, 10_000.0), strict=True):
+        assert right.intervals[name].lower < value < right.intervals[name].upper
+    assert "Unloading" not in said_of(fitted())
+
+
+@pytest.fixture(scope="module")
+def uneven():
+    """Three pulls, each by a wrist of another modulus: rows of a pull err together."""
+    load = nf.pull(0.3, 1.2, steps=6)
+    pulls = [
+        simulate_measurements(
+            WRIST.with_value(MODULUS, modulus), load, observed=OBSERVED, deviation=DEVIATION,
+            seed=seed, pull=[str(seed)] * 6,
+        )
+        for seed, modulus in enumerate((9_700.0, 10_050.0, 10_250.0))
+    ]  # fmt: skip
+    observed, deviation = (
+        {name: np.concatenate([getattr(one, held)[name] for one in pulls]) for name in OBSERVED}
+        for held in ("observed", "deviation")
+    )
+    labels = tuple(label for one in pulls for label in one.pull)
+    loads = load.then(load).then(load)
+    return calibrate(
+        WRIST, Measurements("uneven", loads, labels, True, observed, deviation), MODULUS, starts=1
+    )
+
+
+def test_intervals_are_by_whole_pulls_where_these_differ(uneven, tmp_path):
+    wider = uneven.by_pulls.wider[0]
+    assert wider > 1.73  # F of 2 and infinitely many degrees of freedom, 5 %
+    interval = uneven.intervals[MODULUS]
+    spread = float(np.sqrt(uneven.covariance_by_rows[0, 0])) * wider
+    half = 0.5 * (interval.upper - interval.lower)
+    assert half == pytest.approx(4.303 * spread, rel=0.1)  # Student's t, three pulls
+    assert uneven.deviations[MODULUS] == pytest.approx(spread)
+    assert uneven.allows(MODULUS, interval.lower + 0.02 * half)
+    assert not uneven.allows(MODULUS, interval.lower - 0.02 * half)
+    said = said_of(uneven)
+    assert "Residuals within a pull are correlated: judged by whole pulls (3)" in said
+    assert f"up to {uneven.by_pulls.wider.max():.2g} times less certain" in said
+    document = calibration_document(uneven)
+    assert document["constants"][0]["interval_by"] == "pulls"
+    assert document["constants"][0]["interval_95"] == [interval.lower, interval.upper]
+    (file,) = write_fitted(uneven, tmp_path / "fitted")
+    note = f"{interval.lower:.5g} to {interval.upper:.5g} MPa (95 %, by 3 whole pulls)"
+    assert note in file.read_text(encoding="utf-8")
+    assert uneven.half_width(np.ones((1, 1)))[0] == pytest.approx(4.303 * spread, rel=1e-3)
+    # pulls that repeat each other are judged by rows
+    assert fitted().by_pulls.wider.tolist() == [1.0, 1.0]
+    assert "by_pulls" not in said_of(fitted())
+
+
+def test_spread_of_pulls_is_that_of_fits_to_each(uneven):
+    """In a straight-line view: the deviation of the mean of constants fitted to single pulls."""
+    whole = uneven.problem.samples.every[0].measured
+    each = [
+        calibrate(WRIST, whole.of_pulls([label]), MODULUS, starts=1, intervals=False).values
+        for label in whole.pulls
+    ]
+    spread = np.std([one[MODULUS] for one in each], ddof=1) / np.sqrt(3.0)
+    assert np.sqrt(uneven.by_pulls.covariance[0, 0]) == pytest.approx(spread, rel=0.1)
+
+
+def test_totals_that_are_sums_are_not_counted(capsys):
+    seen = measured()
+    sums = {**seen.observed, "total_angle": seen.observed["notch_angle"].sum(axis=1)}
+    added = Measurements("sums", seen.load, seen.pull, True, sums)
+    found = calibrate(WRIST, added, NAMES, starts=1, intervals=False)
+    assert (len(found.residuals), found.counted) == (36, 30)
+    document = calibration_document(found)
+    assert (document["numbers_measured"], document["numbers_counted"]) == (36, 30)
+    print_calibration(found)
+    assert "30 numbers measured (and 6 total angles, the sum of the notches)" in (
+        capsys.readouterr().out
+    )
+    panel = residual_panel(found, WRIST.name)
+    drawn = sum(len(one.rows) for one in panel.items if isinstance(one, Line))
+    assert drawn == 30
+
+
+def test_a_fit_prints_its_constants_and_what_is_doubted(uneven):
+    text = repr(uneven)
+    interval = uneven.intervals[MODULUS]
+    assert f"95 %: {interval.lower:.5g} to {interval.upper:.5g} MPa" in text
+    assert diagnose(uneven)[-1] in text
+    assert len(text.splitlines()) == 3 + len(diagnose(uneven))
+    assert repr(fitted()).endswith("No problems found.")
+    assert fitted()._repr_html_().startswith("<pre>Pacheco 2021, wrist A: 36 numbers")
 
 
 def test_whether_a_model_misses_is_judged_by_numbers_of_known_noise_alone():

@@ -17,12 +17,16 @@ from notchflex.fit.intervals import NO_SOLUTION, Interval
 from notchflex.fit.rows import SENSOR
 
 # A half-width of more than this part of the value is loose; constants more alike than that cannot
-# be told apart; pulls that differ by so many times more than their rows say so.
-_LOOSE, _ALIKE, _UNLIKE_PULLS = 0.5, 0.95, 1.5
+# be told apart.
+_LOOSE, _ALIKE = 0.5, 0.95
 # So many standard deviations from its prior a constant and what was known of it disagree.
 _UNLIKE_PRIOR = 3.0
 # As near to a limit as this part of where a search starts from.
 _AT_LIMIT = 1e-6
+
+
+NO_PROBLEMS = "No problems found."
+"""What is said where `diagnose` finds nothing."""
 
 
 def diagnose(found: Calibration) -> tuple[str, ...]:
@@ -159,17 +163,16 @@ def _noise(found: Calibration) -> list[str]:
             "deviations): what the fit leaves is taken for it, as if the model were right."
         )
     if found.problem.objective.is_likelihood:
-        by_pulls = np.sqrt(np.diag(found.covariance_by_pulls))
-        by_rows = np.sqrt(np.diag(found.covariance))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            ratio = by_pulls / by_rows
-        wide = [n for n, one in zip(found.names, ratio, strict=True) if one > _UNLIKE_PULLS]
-        if wide:
-            worst = float(np.nanmax(ratio[np.isfinite(ratio)]))
+        wider = found.by_pulls.wider
+        wide = [name for name, one in zip(found.names, wider, strict=True) if one > 1.0]
+        if wide and not found.tells_no_noise:
+            pulls = int(found.by_pulls.pulls.max())
             said.append(
-                f"Pulls differ from each other by more than their rows do: judged by whole pulls, "
-                f"{', '.join(wide)} {'is' if len(wide) == 1 else 'are'} up to {worst:.2g} times "
-                "less certain than the intervals say. More pulls would help more than more rows."
+                f"Residuals within a pull are correlated: judged by whole pulls ({pulls}), "
+                f"{', '.join(wide)} {'is' if len(wide) == 1 else 'are'} up to "
+                f"{float(np.max(wider)):.2g} times less certain than independent rows would say. "
+                f"The {'interval is' if len(wide) == 1 else 'intervals are'} by pulls. More pulls "
+                "would help more than more rows."
             )
     return said
 
@@ -189,4 +192,4 @@ def _branches(found: Calibration) -> list[str]:
     return said
 
 
-__all__ = ["diagnose", "with_unit"]
+__all__ = ["NO_PROBLEMS", "diagnose", "with_unit"]

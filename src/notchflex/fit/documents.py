@@ -31,8 +31,10 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         found: The fit.
 
     Returns:
-        `converged`, `reason`, `objective`, `cost`, `reduced_chi_squared`, `constants` (each with
-        value, unit, 95 % interval, standard deviations, limits), `correlation`, `verdict`, `noise`,
+        `converged`, `reason`, `objective`, `cost`, `numbers_measured` (`numbers_counted` without
+        totals that are sums of the notches), `reduced_chi_squared`, `constants` (each with value,
+        unit, 95 % interval and whether it is by rows or by whole pulls, standard deviations,
+        limits), `correlation`, `verdict` (the sentences of `diagnose`), `noise`,
         `errors` (root mean squares of every notch, beside the repeats), `searches`, `solves` (rows
         that were solved) and `robots` (their data, and their descriptions with the constants that
         were found). Constants are in the units of the robot file; None stands where there is no
@@ -50,6 +52,7 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         "cost": found.cost,
         "cost_unit": _UNIT_OF_COST.get(type(objective), ""),
         "numbers_measured": len(found.residuals),
+        "numbers_counted": found.counted,
         "degrees_of_freedom": found.freedom,
         "reduced_chi_squared": _finite(found.reduced_chi_squared),
         "intervals_widened_by": found.widened,
@@ -207,7 +210,8 @@ def _head() -> dict[str, Any]:
 
 
 def _constants(found: Calibration) -> list[dict[str, Any]]:
-    by_pulls = np.sqrt(np.diag(found.covariance_by_pulls))
+    by_pulls = np.sqrt(np.diag(found.by_pulls.covariance))
+    by_rows = np.sqrt(np.diag(found.covariance_by_rows))
     rows: list[dict[str, Any]] = []
     for number, unknown in enumerate(found.problem.unknowns):
         interval = found.intervals.get(unknown.name)
@@ -221,6 +225,9 @@ def _constants(found: Calibration) -> list[dict[str, Any]]:
                 "interval_reason": "" if interval is None else interval.reason,
                 "standard_deviation": _finite(found.deviations[unknown.name]),
                 "standard_deviation_by_pulls": _finite(by_pulls[number]),
+                "standard_deviation_by_rows": _finite(by_rows[number]),
+                "interval_by": "pulls" if found.by_pulls.wider[number] > 1.0 else "rows",
+                "pulls": int(found.by_pulls.pulls[number]),
                 "before": unknown.start,
                 "limits": [_finite(unknown.lower), _finite(unknown.upper)],
                 "prior": None if unknown.prior is None else list(unknown.prior),

@@ -203,7 +203,7 @@ def _intervals(found: Calibration, progress: Progress | None) -> dict[str, Inter
             number,
             problem.lower,
             problem.upper,
-            rise=found.allowed_rise,
+            rise=found.allowed_rise(unknown.name),
             scale=unknown.scale,
         )
         if progress is not None:
