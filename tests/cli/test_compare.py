@@ -74,7 +74,7 @@ def test_an_order_that_may_mean_two_things_is_refused(call, tmp_path):
     code, out, err = call("compare", "pacheco2021-b", "d.csv")
     assert (code, out) == (2, "")
     words = " ".join(err.split())
-    assert "d.csv, line 4: the force falls at once from 1.5 to 1" in words
+    assert "d.csv, line 4: the force falls from 1.5 to 1" in words
     assert "--from-rest" in words
     assert "--path" in words
     assert call("compare", "pacheco2021-b", "d.csv", "--from-rest")[0] == 0

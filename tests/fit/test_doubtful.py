@@ -172,7 +172,7 @@ def uneven():
 
 def test_intervals_are_by_whole_pulls_where_these_differ(uneven, tmp_path):
     wider = uneven.by_pulls.wider[0]
-    assert wider > 1.73  # F of 2 and infinitely many degrees of freedom, 5 %
+    assert wider > 1.73  # root of chi squared over its 2 degrees of freedom, 5 %
     interval = uneven.intervals[MODULUS]
     spread = float(np.sqrt(uneven.covariance_by_rows[0, 0])) * wider
     half = 0.5 * (interval.upper - interval.lower)

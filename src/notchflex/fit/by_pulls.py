@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.stats import f
+from scipy.stats import chi2
 
 from notchflex.fit.curvature import inverse_of
 from notchflex.fit.intervals import allowed_rise
@@ -74,7 +74,8 @@ def by_pulls(
     with np.errstate(invalid="ignore", divide="ignore"):
         covariance = inverse @ (shares.T @ shares) @ inverse * np.outer(correction, correction)
         ratio = np.sqrt(np.diag(covariance) / np.diag(by_rows))
-    limit = f.ppf(1.0 - _UNLIKELY, np.maximum(pulls - 1, 1), np.inf)
+    freedom = np.maximum(pulls - 1, 1)
+    limit = chi2.ppf(1.0 - _UNLIKELY, freedom) / freedom
     differ = (pulls > 1) & np.isfinite(ratio) & (ratio**2 > limit)
     return ByPulls(covariance, pulls, np.where(differ, ratio, 1.0))
 

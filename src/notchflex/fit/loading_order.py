@@ -21,6 +21,8 @@ _FALL, _JUMP = 0.05, 0.1
 # A reading lies between two others if it is farther than this part of their difference from both;
 # a pull begins again if a command comes back this near to where it began (part of its range).
 _BETWEEN, _AGAIN = 0.1, 0.15
+# More branches than that, of fewer steps in the mean, are readings in no order.
+_BRANCHES, _STEPS = 4, 2
 
 
 class Fall(NamedTuple):
@@ -31,7 +33,8 @@ class Fall(NamedTuple):
         start: The first row near the lowest value.
         bottom: The row of the lowest value.
         kind: "unloading" if readings lie between the two; in one step "restart" if the next pull
-            begins there, "unloaded" if nothing is commanded there, else "unclear".
+            begins there, "unloaded" if nothing is commanded there; else, and where a pull turns at
+            nearly every row, "unclear".
     """
 
     top: int
@@ -189,6 +192,7 @@ def _falls_of_pulls(
 
 def _falls(values: Float[np.ndarray, " n"], reach: float) -> Iterator[Fall]:
     points = [0, *turning_points(values, TURN * reach), len(values) - 1]
+    shuffled = len(points) > _BRANCHES and len(values) - 1 < _STEPS * (len(points) - 1)
     began = 0  # where the present pull began
     for number, (top, bottom) in enumerate(pairwise(points)):
         depth = values[top] - values[bottom]
@@ -197,7 +201,7 @@ def _falls(values: Float[np.ndarray, " n"], reach: float) -> Iterator[Fall]:
         near = values[top : bottom + 1] <= values[bottom] + _BETWEEN * depth
         start = top + int(np.argmax(near))
         if _has_between(values[top : bottom + 1]):
-            yield Fall(top, start, bottom, "unloading")
+            yield Fall(top, start, bottom, "unclear" if shuffled else "unloading")
         elif depth >= _JUMP * reach:
             again = values[start] <= values[began] + _AGAIN * reach
             rise = (

@@ -109,8 +109,9 @@ def _order(
         return order
     row, name, top, bottom = order.unclear
     raise InputError(
-        f"{table.at(row)}: the {name} falls at once from {top:g} to {bottom:g}, so the order of "
-        "the rows does not tell how the robot was loaded. Say so: --from-rest (a column from_rest "
+        f"{table.at(row)}: the {name} falls from {top:g} to {bottom:g} neither step by step nor "
+        "to where the pull began, so the order of the rows does not tell how the robot was loaded. "
+        "Say so: --from-rest (a column from_rest "
         "of 1) if every row was loaded from rest, --path (0) if the rows of each pull are one "
         "loading path; a column trial separates pulls."
     )
