@@ -65,7 +65,7 @@ def test_the_table_says_how_the_rows_were_loaded(call, loop):
     assert code == 0
     assert "18 points of 1 trial, each trial one loading path" in out
     out = call("compare", "pacheco2021-b", loop, "--from-rest")[1]
-    assert "18 points of 1 trial, each row from rest" in out
+    assert "18 points of 1 trial, each pulled from rest" in out
     assert "Unloading rows of b.csv are" in out
 
 

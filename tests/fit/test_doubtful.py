@@ -22,7 +22,7 @@ from notchflex.fit import (
 from notchflex.fit.documents import calibration_document
 from notchflex.fit.problem import Problem
 from notchflex.fit.samples import Samples
-from notchflex.plotting.calibration_rows import residual_panel
+from notchflex.plotting.calibration_rows import Part, data_panel, residual_panel
 from notchflex.plotting.sheet import Line
 
 WRIST = nf.load_robot(ROBOT)
@@ -77,6 +77,10 @@ def test_coordinates_may_be_missing_one_by_one_also_on_a_turned_base(tmp_path):
     at = simulate_measurements(found.robots[WRIST.name], turned, observed=("tip_position",))
     left = at.observed["tip_position"][:, :2] - some[:, :2]
     np.testing.assert_allclose(found.residuals.values, left.ravel(), atol=1e-7)
+    # drawn in the world too, as it was measured
+    drawn = data_panel(found, Part(WRIST.name, "tip_position", 0, "x")).items
+    marks = next(one for one in drawn if isinstance(one, Line) and one.hollow)
+    np.testing.assert_allclose(marks.rows[:, 1], some[:, 0])
 
 
 def test_a_robot_of_which_nothing_is_fitted_counts_but_moves_nothing():

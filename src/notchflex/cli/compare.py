@@ -158,7 +158,7 @@ def _print(comparison: Comparison, others: dict[str, Comparison]) -> None:
     console.print(f"{comparison.robot.name}, {measured.source}", soft_wrap=True)
     console.print(
         f"{comparison.points} points of {trials} trial{'s' if trials > 1 else ''}, each "
-        f"{'row from rest' if measured.from_rest else 'trial one loading path'}"
+        f"{'pulled from rest' if measured.from_rest else 'trial one loading path'}"
     )
     models = {"model": comparison, **others}
     columns = _columns(models)

@@ -18,8 +18,9 @@ BRANCH_QUANTITIES = ("total_angle", "notch_angle")
 
 # Branches whose means differ by chance with this probability differ; so few rows tell nothing.
 _UNLIKELY, _ROWS = 0.01, 3
-# A scatter below this part of the difference is rounding.
-_EXACT = 1e-9
+# A scatter below this part of the difference is rounding; a difference below this part of all
+# residuals is not what the model misses.
+_EXACT, _SHARE = 1e-9, 0.5
 
 
 class BranchDifference(NamedTuple):
@@ -32,9 +33,11 @@ class BranchDifference(NamedTuple):
 def branch_difference(
     off: Float[np.ndarray, " p"], branch: Int[np.ndarray, " p"]
 ) -> BranchDifference | None:
-    """Compare both branches by the tests of Welch (1947) and of Mann and Whitney (1947).
+    """Compare the means of both branches.
 
-    The first is sharper for few rows, the second where hysteresis is large in some rows only.
+    They differ if neighbouring rows scatter by much less (Student's t with the scatter of second
+    differences, von Neumann 1941), or if ranks say so (Mann and Whitney 1947) where the hysteresis
+    is large in some rows only; and by no less than half of what the model misses in all.
 
     Args:
         off: Measurement less model of every row; NaN where nothing was measured.
@@ -52,12 +55,14 @@ def branch_difference(
     if min(len(up), len(down)) < _ROWS:
         return None
     means = BranchDifference(float(np.mean(up)), float(np.mean(down)))
-    parts = np.array([np.var(one, ddof=1) / len(one) for one in (up, down)])
-    difference, variance = means.unloading - means.loading, float(parts.sum())
-    if variance <= (_EXACT * difference) ** 2:
-        return means if difference else None
-    freedom = variance**2 / float(np.sum(parts**2 / [len(up) - 1, len(down) - 1]))
-    chance = 2.0 * float(student.sf(abs(difference) / np.sqrt(variance), freedom))
+    difference = means.unloading - means.loading
+    both = np.concatenate([up, down])
+    if abs(difference) <= _SHARE * float(np.sqrt(np.mean(both**2))):
+        return None
+    error = np.sqrt(sum(np.mean(np.diff(one, 2) ** 2) / 6.0 / len(one) for one in (up, down)))
+    if error <= _EXACT * abs(difference):
+        return means
+    chance = 2.0 * float(student.sf(abs(difference) / error, max(0.5 * len(both) - 2.0, 1.0)))
     ranks: Any = mannwhitneyu(up, down)
     return means if min(chance, float(ranks.pvalue)) < _UNLIKELY else None
 
