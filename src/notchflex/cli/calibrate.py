@@ -153,6 +153,8 @@ def calibrate(
         ]
         for label, files in given.data.items()
     }
+    for one in (one for every in measured.values() for one in every):
+        note_table(one)
     constants = [fitting.Constant(*one) for one in wanted]
     aim = _objective(objective, huber)
     told: NextMeasurement | None = None
@@ -281,8 +283,6 @@ def _print(
 def _say_what_matters(found: Calibration) -> int:
     from notchflex.cli.app import DONE, NOT_CONVERGED
 
-    for sample in found.problem.samples.every:
-        note_table(sample.measured)
     if found.converged:
         return DONE
     terminal.error(f"not converged: {found.reason}. Try --starts or --bounds.")
