@@ -167,7 +167,7 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
         >>> angle = {"total_angle": np.radians([13.3, 27.1])}
         >>> seen = Measurements("by hand", pull(0.25, 0.5, steps=2), ("1", "1"), True, angle)
         >>> round(float(np.degrees(compare(robot, seen).rmse_total)), 2)
-        0.97
+        0.54
     """
     _check(robot, measurements)
     observed = tuple(name for name in _OTHERS if name in measurements.observed)

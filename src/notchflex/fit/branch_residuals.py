@@ -47,9 +47,9 @@ def branch_difference(
         Both means; None where they differ by no more than chance, or a branch has too few rows.
 
     Example:
-        >>> off = np.array([-1.0, -1.1, -0.9, 1.0, 1.2, 0.9])
-        >>> round(branch_difference(off, np.array([1, 1, 1, -1, -1, -1])).unloading, 2)
-        1.03
+        >>> off = np.array([-1.0, -1.1, -0.9, -1.0, -1.1, 1.0, 1.2, 0.9, 1.0, 1.1])
+        >>> round(branch_difference(off, np.repeat([1, -1], 5)).unloading, 2)
+        1.04
     """
     up, down = (off[(branch == way) & np.isfinite(off)] for way in (1, -1))
     if min(len(up), len(down)) < _ROWS:
