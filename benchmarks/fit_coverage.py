@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.fit import calibrate, synthetic
+from notchflex.fit import calibrate, simulate_measurements
 from notchflex.robot.paths import number_at
 from notchflex.statics import LoadPath
 
@@ -59,7 +59,7 @@ def covered(case, count: int):
     estimates, holds = [], []
     began = time.perf_counter()
     for number in range(count):
-        seen = synthetic(
+        seen = simulate_measurements(
             robot,
             load,
             observed=tuple(noise),

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.fit import Measurements, SumOfDistances, calibrate, synthetic
+from notchflex.fit import Measurements, SumOfDistances, calibrate, simulate_measurements
 from notchflex.statics import axis_points
 
 NOISE = 0.1  # mm
@@ -67,7 +67,7 @@ def shape(
     robot: nf.Robot, load: nf.LoadPath, random: np.random.Generator, *, from_rest: bool = True
 ) -> Measurements:
     """A photographed shape: points along the axis, with noise."""
-    return synthetic(
+    return simulate_measurements(
         robot,
         load,
         observed=("axis_points",),

@@ -15,7 +15,7 @@ import dataclasses
 import numpy as np
 
 import notchflex as nf
-from notchflex.fit import FrictionReadings, calibrate, friction_rig, synthetic
+from notchflex.fit import FrictionReadings, calibrate, friction_rig, simulate_measurements
 from notchflex.fit.two_weights import weight_held
 
 TRUE_FRICTION, TRUE_MODULUS = 0.2, 1000.406
@@ -41,7 +41,7 @@ def main() -> None:
     )
     load = nf.pull(1.0, 9.0, steps=9)
     samples = [
-        synthetic(single, load, deviation={"notch_angle": ANGLE_NOISE}, seed=random)
+        simulate_measurements(single, load, deviation={"notch_angle": ANGLE_NOISE}, seed=random)
         for _ in range(3)
     ]
     start = single.with_values(

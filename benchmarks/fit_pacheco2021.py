@@ -26,9 +26,9 @@ from notchflex.fit import (
     LeastSquares,
     SumOfRobotErrors,
     calibrate,
+    diagnose,
     leave_out,
     read_measurements,
-    verdict,
 )
 
 PAPERS_TRIALS = 2_800
@@ -117,7 +117,7 @@ def linear(robots, data):
     for label, these, fit in (("i", plain, (modulus, bounded)), ("ii", slick, (modulus,))):
         found = calibrate(these, data, fit, objective=SumOfRobotErrors(), starts=3)
         print(f"linear model ({label}): {found.cost:.4f} deg at {_text(found)}")
-        for sentence in verdict(found):
+        for sentence in diagnose(found):
             print(f"  {sentence}")
         told[label] = {"values": found.values, "cost": found.cost}
     return told
@@ -132,7 +132,7 @@ def least_squares(robots, data):
         ends = (interval.lower, interval.upper)
         print(f"  {name}: {found.values[name]:.6g}, 95 % {ends[0]:.6g} to {ends[1]:.6g}")
         told[name] = {"value": found.values[name], "interval": ends}
-    for sentence in verdict(found):
+    for sentence in diagnose(found):
         print(f"  {sentence}")
     return told
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.fit import calibrate, posterior, read_measurements
+from notchflex.fit import calibrate, read_measurements, sample_posterior
 
 THREE = ("material.elastic_modulus", "material.superelastic_modulus", "friction.coefficient")
 
@@ -31,7 +31,7 @@ def main() -> None:
     seen = read_measurements(given.folder / "pacheco2021_wrist_B_measured.csv", robot)
     found = calibrate(robot, seen, THREE, starts=2)
     began = time.perf_counter()
-    drawn = posterior(found, draws=given.draws, chains=given.chains)
+    drawn = sample_posterior(found, draws=given.draws, chains=given.chains)
     seconds = time.perf_counter() - began
     print(f"{given.chains} x {given.draws} draws in {seconds:.0f} s, {drawn.divergent} divergent")
     for name in found.names:

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.comparison import compare, read_measured
 
 # What you would have in a file: tension at the base, angle of each notch, base to tip.
 MEASURED = """\
@@ -21,10 +20,10 @@ wrist = nf.load_robot("pacheco2021-a")
 with tempfile.TemporaryDirectory() as folder:
     file = Path(folder, "measured.csv")
     file.write_text(MEASURED, encoding="utf-8")
-    measured = read_measured(file, wrist)
+    measured = nf.read_measurements(file, wrist)
 
 for mu in (0.13, 0.20, 0.27):
-    found = compare(wrist.with_value("friction.coefficient", mu), measured)
+    found = nf.compare(wrist.with_value("friction.coefficient", mu), measured)
     notches = " ".join(f"{one:.2f}" for one in np.degrees(found.rmse_notches))
     total = np.degrees(found.rmse_total)
     print(f"mu {mu:.2f}: total off by {total:.2f} deg, notches {notches} deg")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 
 import notchflex as nf
-from notchflex.fit import Calibration, Measurements, calibrate, synthetic
+from notchflex.fit import Calibration, Measurements, calibrate, simulate_measurements
 
 ROBOT = "pacheco2021-a"
 NAMES = ("friction.coefficient", "material.elastic_modulus")
@@ -19,7 +19,9 @@ def measured(seed: int = 1) -> Measurements:
     wrist = nf.load_robot(ROBOT)
     pulls = ("a", "a", "a", "b", "b", "b")
     load = [nf.Load(tension=force) for force in (0.4, 1.0, 1.6, 0.4, 1.0, 1.6)]
-    return synthetic(wrist, load, observed=OBSERVED, deviation=DEVIATION, seed=seed, pull=pulls)
+    return simulate_measurements(
+        wrist, load, observed=OBSERVED, deviation=DEVIATION, seed=seed, pull=pulls
+    )
 
 
 @functools.cache

@@ -29,7 +29,8 @@ NAMES = [
     "FrictionReadings", "FrictionRig", "friction_rig", "read_friction_rig",
     "Measurements", "read_measurements", "write_measurements",
     "Calibration", "Constant", "LeastSquares", "SumOfDistances", "SumOfRobotErrors", "leave_out",
-    "next_measurement", "posterior", "synthetic", "verdict", "write_fitted",
+    "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
+    "write_fitted", "calibrate", "compare", "Comparison",
 ]
 # fmt: on
 

@@ -22,8 +22,7 @@ from pathlib import Path
 from notchflex.cli import run
 
 DOCS = Path(__file__).resolve().parents[1]
-# Examples and the notebook are run, and written, by themselves; how often a calibration solves
-# hangs on rounding.
+# Examples and the notebook are run, and written, by themselves; calibrate.md by its own test.
 BY_THEMSELVES = ("examples.md", "calibrate.md", "notebook.md")
 PAGES = tuple(sorted(page.name for page in DOCS.glob("*.md") if page.name not in BY_THEMSELVES))
 BLOCK = re.compile(

@@ -12,7 +12,7 @@ import numpy as np
 from page import main, table
 
 import notchflex as nf
-from notchflex.comparison import Comparison, compare, read_measured
+from notchflex.comparison import Comparison
 
 PAGE = "pacheco2021.md"
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -113,7 +113,7 @@ def _compared(one: nf.Robot, name: str) -> Comparison:
     path = DATA / f"pacheco2021_wrist_{name}_measured.csv"
     if not path.is_file():
         raise FileNotFoundError(f"no measured data at {path}")
-    return compare(one, read_measured(path, one))
+    return nf.compare(one, nf.read_measurements(path, one))
 
 
 if __name__ == "__main__":

@@ -68,7 +68,6 @@ _HOME = {
         "notchflex.statics",
     ),
     **dict.fromkeys(
-        # not `calibrate`: the folder has that name
         (
             "Calibration",
             "Constant",
@@ -78,19 +77,21 @@ _HOME = {
             "Measurements",
             "SumOfDistances",
             "SumOfRobotErrors",
+            "calibrate",
             "friction_rig",
             "leave_out",
             "next_measurement",
-            "posterior",
+            "sample_posterior",
             "read_friction_rig",
             "read_measurements",
-            "synthetic",
-            "verdict",
+            "simulate_measurements",
+            "diagnose",
             "write_fitted",
             "write_measurements",
         ),
         "notchflex.fit",
     ),
+    **dict.fromkeys(("Comparison", "compare"), "notchflex.comparison"),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

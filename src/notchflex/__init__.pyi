@@ -1,4 +1,6 @@
 from notchflex._plot import plot as plot
+from notchflex.comparison import Comparison as Comparison
+from notchflex.comparison import compare as compare
 from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.fit import Calibration as Calibration
@@ -9,14 +11,15 @@ from notchflex.fit import LeastSquares as LeastSquares
 from notchflex.fit import Measurements as Measurements
 from notchflex.fit import SumOfDistances as SumOfDistances
 from notchflex.fit import SumOfRobotErrors as SumOfRobotErrors
+from notchflex.fit import calibrate as calibrate
+from notchflex.fit import diagnose as diagnose
 from notchflex.fit import friction_rig as friction_rig
 from notchflex.fit import leave_out as leave_out
 from notchflex.fit import next_measurement as next_measurement
-from notchflex.fit import posterior as posterior
 from notchflex.fit import read_friction_rig as read_friction_rig
 from notchflex.fit import read_measurements as read_measurements
-from notchflex.fit import synthetic as synthetic
-from notchflex.fit import verdict as verdict
+from notchflex.fit import sample_posterior as sample_posterior
+from notchflex.fit import simulate_measurements as simulate_measurements
 from notchflex.fit import write_fitted as write_fitted
 from notchflex.fit import write_measurements as write_measurements
 from notchflex.flexure import Elastica as Elastica

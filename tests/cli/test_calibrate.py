@@ -10,7 +10,7 @@ import pytest
 
 import notchflex as nf
 import notchflex.fit as fitting
-from fitted import NAMES, ROBOT, fitted, measured
+from fitted import NAMES, OBSERVED, ROBOT, fitted, measured
 from notchflex.cli import calibrate_tables, run
 from notchflex.cli.calibrate_words import parse_fit, parse_pairs, robots_of
 from notchflex.fit import Fold, LeftOut, Posterior
@@ -63,6 +63,38 @@ def test_from_csv_to_fitted_robot(call, data, tmp_path):
     assert note in (tmp_path / "fitted" / "A.toml").read_text(encoding="utf-8")
     picture = (tmp_path / "fit.html").read_text(encoding="utf-8")
     assert "95 % band of the model" in picture
+
+
+def test_a_loop_without_any_hint_gives_the_constants_that_made_it(call, tmp_path):
+    """Loading and unloading of a known wrist, photographed with 0.6 deg of noise."""
+    wrist = nf.load_robot(ROBOT)
+    noise = {name: np.radians(0.6) for name in OBSERVED}
+    load = nf.pull(0.2, 1.8, steps=9).release()
+    seen = nf.simulate_measurements(
+        wrist, load, observed=OBSERVED, deviation=noise, seed=5, from_rest=False
+    )
+    angles = np.degrees(seen.observed["notch_angle"])
+    header = ["tendon_force_N", *(f"notch_{n}_deg" for n in range(1, 6)), "total_deg"]
+    rows = np.column_stack([load.tension, angles, np.degrees(seen.observed["total_angle"])])
+    np.savetxt(
+        tmp_path / "loop.csv", rows, fmt="%.2f", delimiter=",", header=",".join(header), comments=""
+    )
+    nf.save_robot(wrist, tmp_path / "my.toml")
+    code, out, err = call("w=my.toml=loop.csv", *FIT, "--json", "fit.json")
+    assert code == 0
+    document = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
+    for one, true in zip(document["constants"], (0.13, 10_000.0), strict=True):
+        low, high = one["interval_95"]
+        assert low < true < high
+        assert high - low < 0.1 * true
+    assert "Unloading" not in out
+    assert "loop.csv: the force falls within a pull" in " ".join(err.split())
+    code, out, err = call("w=my.toml=loop.csv", *FIT, "--from-rest")
+    assert code == 0
+    assert "Unloading rows of loop.csv are" in out
+    assert "No problems found" not in out
+    found = nf.calibrate(wrist, nf.read_measurements("loop.csv", wrist), NAMES, starts=1)
+    assert found.values[NAMES[0]] == pytest.approx(document["constants"][0]["value"], rel=1e-6)
 
 
 def test_a_search_that_does_not_settle_is_told(call, data, monkeypatch):

@@ -25,7 +25,7 @@ def call(tmp_path, monkeypatch, capsys):
 def loop(call):
     """A computed loop, written as a table that `compare` reads."""
     assert (
-        call("simulate", "pacheco2021-b", "--tension", "0:1.5:4,1.5:0:4", "--csv", "b.csv")[0] == 0
+        call("simulate", "pacheco2021-b", "--tension", "0:1.5:9,1.5:0:9", "--csv", "b.csv")[0] == 0
     )
     return "b.csv"
 
@@ -34,7 +34,7 @@ def test_path_compared_with_itself_has_no_error(call, loop):
     code, out, _ = call("compare", "pacheco2021-b", loop, "--path", "--json", "-")
     assert code == 0
     found = json.loads(out)
-    assert found["points"] == 8
+    assert found["points"] == 18
     assert found["rmse_deg"]["notches"] == pytest.approx([0.0] * 5, abs=1e-7)
     assert found["rmse_deg"]["total"] == pytest.approx(0.0, abs=1e-7)
     assert found["tip_rmse_mm"] == pytest.approx(0.0, abs=1e-8)
@@ -42,9 +42,75 @@ def test_path_compared_with_itself_has_no_error(call, loop):
 
 
 def test_pulls_from_rest_do_not_know_the_way_back(call, loop):
-    found = json.loads(call("compare", "pacheco2021-b", loop, "--json", "-")[1])
+    found = json.loads(call("compare", "pacheco2021-b", loop, "--from-rest", "--json", "-")[1])
     assert found["from_rest"] is True
+    assert found["order"] == ""
     assert found["rmse_deg"]["total"] > 1.0
+    assert "Unloading rows of b.csv are" in found["diagnosis"][0]
+
+
+def test_a_loop_is_a_path_unless_told_otherwise(call, loop):
+    code, out, err = call("compare", "pacheco2021-b", loop, "--json", "-")
+    found = json.loads(out)
+    assert code == 0
+    assert found["from_rest"] is False
+    assert found["rmse_deg"]["total"] == pytest.approx(0.0, abs=1e-7)
+    assert found["diagnosis"] == []
+    assert "the force falls within a pull" in " ".join(err.split())
+    assert "--from-rest" in err
+
+
+def test_the_table_says_how_the_rows_were_loaded(call, loop):
+    code, out, _ = call("compare", "pacheco2021-b", loop)
+    assert code == 0
+    assert "18 points of 1 trial, each trial one loading path" in out
+    out = call("compare", "pacheco2021-b", loop, "--from-rest")[1]
+    assert "18 points of 1 trial, each pulled from rest" in out
+    assert "Unloading rows of b.csv are" in out
+
+
+def test_an_order_that_may_mean_two_things_is_refused(call, tmp_path):
+    (tmp_path / "d.csv").write_text("tendon_force_N,total_deg\n0.5,13\n1.5,70\n1.0,27\n1.2,40\n")
+    code, out, err = call("compare", "pacheco2021-b", "d.csv")
+    assert (code, out) == (2, "")
+    words = " ".join(err.split())
+    assert "d.csv, line 4: the force falls from 1.5 to 1" in words
+    assert "--from-rest" in words
+    assert "--path" in words
+    assert call("compare", "pacheco2021-b", "d.csv", "--from-rest")[0] == 0
+    assert call("compare", "pacheco2021-b", "d.csv", "--path")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "heads"),
+    [
+        ("tendon_force_N,total_deg\n0.5,13\n1.0,25\n", "total"),
+        ("tendon_displacement_mm,total_deg\n0.5,20\n1.0,41\n", "total"),
+        ("tendon_force_N,tip_x_mm,tip_z_mm\n0.5,1.1,9.8\n1.0,2.2,9.4\n", "tip"),
+        ("tendon_force_N,notch_2_deg\n0.5,3\n1.0,5\n", "n2"),
+        ("tendon_force_N;total_deg\n0,5;13,2\n1,0;25\n", "total"),
+    ],
+)
+def test_whatever_calibrate_reads_is_compared(call, tmp_path, text, heads):
+    (tmp_path / "m.csv").write_text(text)
+    files = ("--csv", "points.csv", "--plot", "m.svg", "--beside", "kinematics")
+    code, out, _ = call("compare", "pacheco2021-b", "m.csv", *files)
+    assert code == 0
+    assert out.splitlines()[2].split() == ["root-mean-square", "error", heads]
+    table = list(csv.DictReader((tmp_path / "points.csv").read_text().splitlines()))
+    assert len(table) == 2
+    assert "total_deg_model" in table[0]
+    assert (tmp_path / "m.svg").exists()
+
+
+def test_kinematics_says_whose_total_angle_it_has(call, loop):
+    options = ("pacheco2021-b", loop, "--beside", "kinematics")
+    _, out, err = call("compare", *options)
+    rows = [line.split() for line in out.splitlines() if line.startswith(("model", "kinematics"))]
+    assert rows[0][-2] == rows[1][-2]  # the error of the total angle
+    assert "that of the model by construction" in " ".join(err.split())
+    _, out, _ = call("compare", *options, "--json", "-")
+    assert json.loads(out)["beside"]["kinematics"]["stroke_from"] == "model"
 
 
 def test_errors_are_those_of_the_rows(call, tmp_path):

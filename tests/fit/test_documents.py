@@ -17,12 +17,12 @@ from notchflex.fit import (
     NextMeasurement,
     Posterior,
     calibration_document,
+    diagnose,
     errors_of_parts,
     left_out_document,
     next_measurement_document,
     posterior_document,
     repeats_of_each,
-    verdict,
 )
 from notchflex.results.json import json_text
 
@@ -55,7 +55,7 @@ def test_constants_are_those_of_the_fit():
     np.testing.assert_allclose(document["correlation"], found.correlation)
     assert document["cost"] == found.cost
     assert document["solves"] == found.solves
-    assert document["verdict"] == list(verdict(found))
+    assert document["verdict"] == list(diagnose(found))
     assert document["searches"][0]["cost"] == pytest.approx(found.cost)
     told = document["robots"]["Pacheco 2021, wrist A"]
     assert told["data"] == ["synthetic"]

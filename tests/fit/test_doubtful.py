@@ -5,28 +5,32 @@ import pytest
 
 import notchflex as nf
 from fitted import DEVIATION, NAMES, OBSERVED, ROBOT, fitted, measured
+from notchflex.cli.calibrate_tables import print_calibration
 from notchflex.fit import (
     Constant,
     LeastSquares,
     Measurements,
     calibrate,
+    diagnose,
     leave_out,
     next_measurement,
-    posterior,
     read_measurements,
-    synthetic,
-    verdict,
+    sample_posterior,
+    simulate_measurements,
     write_fitted,
 )
+from notchflex.fit.documents import calibration_document
 from notchflex.fit.problem import Problem
 from notchflex.fit.samples import Samples
+from notchflex.plotting.calibration_rows import Part, data_panel, residual_panel
+from notchflex.plotting.sheet import Line
 
 WRIST = nf.load_robot(ROBOT)
 FRICTION, MODULUS = NAMES
 
 
 def said_of(found):
-    return " ".join(verdict(found))
+    return " ".join(diagnose(found))
 
 
 def untold(seen):
@@ -48,7 +52,7 @@ def test_a_fit_through_every_number_does_not_tell_how_far_to_trust_it(tmp_path):
     assert found.allows(MODULUS, 1.01 * found.values[MODULUS])
     (file,) = write_fitted(found, tmp_path / "fitted")
     assert "nothing tells the noise" in file.read_text(encoding="utf-8")
-    for ask in (posterior, lambda fit: next_measurement(fit, nf.pull(0.2, 1.0, steps=2))):
+    for ask in (sample_posterior, lambda fit: next_measurement(fit, nf.pull(0.2, 1.0, steps=2))):
         with pytest.raises(nf.InputError, match="nothing tells the noise"):
             ask(found)
 
@@ -57,7 +61,9 @@ def test_coordinates_may_be_missing_one_by_one_also_on_a_turned_base(tmp_path):
     load = nf.pull(0.4, 1.4, steps=3)
     turned = nf.LoadPath(load.tension, load.stroke, np.array([0.3, -0.2, 0.5]))
     noise = {"tip_position": 0.05}
-    whole = synthetic(WRIST, turned, observed=("tip_position",), deviation=noise, seed=1)
+    whole = simulate_measurements(
+        WRIST, turned, observed=("tip_position",), deviation=noise, seed=1
+    )
     whole.deviation["tip_position"][:, 2] = 5.0  # in the world, where it was measured
     some = whole.observed["tip_position"].copy()
     some[:, 2] = np.nan
@@ -68,9 +74,13 @@ def test_coordinates_may_be_missing_one_by_one_also_on_a_turned_base(tmp_path):
     # What is hardly known counts as little as what was not measured at all.
     hardly = calibrate(WRIST, whole, FRICTION, starts=1, intervals=False)
     assert found.values[FRICTION] == pytest.approx(hardly.values[FRICTION], abs=2e-4)
-    at = synthetic(found.robots[WRIST.name], turned, observed=("tip_position",))
+    at = simulate_measurements(found.robots[WRIST.name], turned, observed=("tip_position",))
     left = at.observed["tip_position"][:, :2] - some[:, :2]
     np.testing.assert_allclose(found.residuals.values, left.ravel(), atol=1e-7)
+    # drawn in the world too, as it was measured
+    drawn = data_panel(found, Part(WRIST.name, "tip_position", 0, "x")).items
+    marks = next(one for one in drawn if isinstance(one, Line) and one.hollow)
+    np.testing.assert_allclose(marks.rows[:, 1], some[:, 0])
 
 
 def test_a_robot_of_which_nothing_is_fitted_counts_but_moves_nothing():
@@ -117,13 +127,114 @@ def test_angles_about_0_are_not_called_loose_for_being_small():
     assert not said_of(found)
 
 
-def test_a_way_up_and_down_taken_as_pulls_from_rest_is_asked_about():
-    load = nf.pull(0.4, 1.6, steps=4).release()
-    seen = synthetic(WRIST, load, observed=OBSERVED, deviation=DEVIATION, from_rest=False)
-    wrong = Measurements("loop", load, seen.pull, True, seen.observed, seen.deviation)
-    found = calibrate(WRIST, wrong, MODULUS, starts=1, intervals=False)
-    assert "Pull 1 of loop goes up and down again" in said_of(found)
-    assert "up and down" not in said_of(calibrate(WRIST, untold(measured()), MODULUS, starts=1))
+def looped(**options):
+    """Loading and unloading of a wrist with known constants and noise, as one path."""
+    load = nf.pull(0.2, 1.6, steps=8).release()
+    return simulate_measurements(
+        WRIST, load, observed=OBSERVED, deviation=DEVIATION, from_rest=False, **options
+    )
+
+
+def test_unloading_taken_as_pulls_from_rest_is_doubted():
+    loop = looped(seed=2)
+    wrong = Measurements("loop", loop.load, loop.pull, True, loop.observed, loop.deviation)
+    found = calibrate(WRIST, wrong, NAMES, starts=1, intervals=False)
+    (said,) = [one for one in diagnose(found) if "Unloading" in one]
+    residuals = found.residuals
+    total = residuals.values[residuals.quantity == 1]
+    assert f"Unloading rows of loop are {-np.degrees(total[8:].mean()):.2g} deg above" in said
+    assert f"loading rows {np.degrees(total[:8].mean()):.2g} deg below" in said
+    assert "--path" in said
+    right = calibrate(WRIST, loop, NAMES, starts=1)
+    assert not diagnose(right)
+    for name, value in zip(NAMES, (0.13, 10_000.0), strict=True):
+        assert right.intervals[name].lower < value < right.intervals[name].upper
+    assert "Unloading" not in said_of(fitted())
+
+
+@pytest.fixture(scope="module")
+def uneven():
+    """Three pulls, each by a wrist of another modulus: rows of a pull err together."""
+    load = nf.pull(0.3, 1.2, steps=6)
+    pulls = [
+        simulate_measurements(
+            WRIST.with_value(MODULUS, modulus), load, observed=OBSERVED, deviation=DEVIATION,
+            seed=seed, pull=[str(seed)] * 6,
+        )
+        for seed, modulus in enumerate((9_700.0, 10_050.0, 10_250.0))
+    ]  # fmt: skip
+    observed, deviation = (
+        {name: np.concatenate([getattr(one, held)[name] for one in pulls]) for name in OBSERVED}
+        for held in ("observed", "deviation")
+    )
+    labels = tuple(label for one in pulls for label in one.pull)
+    loads = load.then(load).then(load)
+    return calibrate(
+        WRIST, Measurements("uneven", loads, labels, True, observed, deviation), MODULUS, starts=1
+    )
+
+
+def test_intervals_are_by_whole_pulls_where_these_differ(uneven, tmp_path):
+    wider = uneven.by_pulls.wider[0]
+    assert wider > 1.73  # root of chi squared over its 2 degrees of freedom, 5 %
+    interval = uneven.intervals[MODULUS]
+    spread = float(np.sqrt(uneven.covariance_by_rows[0, 0])) * wider
+    half = 0.5 * (interval.upper - interval.lower)
+    assert half == pytest.approx(4.303 * spread, rel=0.1)  # Student's t, three pulls
+    assert uneven.deviations[MODULUS] == pytest.approx(spread)
+    assert uneven.allows(MODULUS, interval.lower + 0.02 * half)
+    assert not uneven.allows(MODULUS, interval.lower - 0.02 * half)
+    said = said_of(uneven)
+    assert "Residuals within a pull are correlated: judged by whole pulls (3)" in said
+    assert f"up to {uneven.by_pulls.wider.max():.2g} times less certain" in said
+    document = calibration_document(uneven)
+    assert document["constants"][0]["interval_by"] == "pulls"
+    assert document["constants"][0]["interval_95"] == [interval.lower, interval.upper]
+    (file,) = write_fitted(uneven, tmp_path / "fitted")
+    note = f"{interval.lower:.5g} to {interval.upper:.5g} MPa (95 %, by 3 whole pulls)"
+    assert note in file.read_text(encoding="utf-8")
+    assert uneven.half_width(np.ones((1, 1)))[0] == pytest.approx(4.303 * spread, rel=1e-3)
+    # pulls that repeat each other are judged by rows
+    assert fitted().by_pulls.wider.tolist() == [1.0, 1.0]
+    assert "by_pulls" not in said_of(fitted())
+
+
+def test_spread_of_pulls_is_that_of_fits_to_each(uneven):
+    """In a straight-line view: the deviation of the mean of constants fitted to single pulls."""
+    whole = uneven.problem.samples.every[0].measured
+    each = [
+        calibrate(WRIST, whole.of_pulls([label]), MODULUS, starts=1, intervals=False).values
+        for label in whole.pulls
+    ]
+    spread = np.std([one[MODULUS] for one in each], ddof=1) / np.sqrt(3.0)
+    assert np.sqrt(uneven.by_pulls.covariance[0, 0]) == pytest.approx(spread, rel=0.1)
+
+
+def test_totals_that_are_sums_are_not_counted(capsys):
+    seen = measured()
+    sums = {**seen.observed, "total_angle": seen.observed["notch_angle"].sum(axis=1)}
+    added = Measurements("sums", seen.load, seen.pull, True, sums)
+    found = calibrate(WRIST, added, NAMES, starts=1, intervals=False)
+    assert (len(found.residuals), found.counted) == (36, 30)
+    document = calibration_document(found)
+    assert (document["numbers_measured"], document["numbers_counted"]) == (36, 30)
+    print_calibration(found)
+    assert "30 numbers measured (and 6 total angles, the sum of the notches)" in (
+        capsys.readouterr().out
+    )
+    panel = residual_panel(found, WRIST.name)
+    drawn = sum(len(one.rows) for one in panel.items if isinstance(one, Line))
+    assert drawn == 30
+
+
+def test_a_fit_prints_its_constants_and_what_is_doubted(uneven):
+    text = repr(uneven)
+    interval = uneven.intervals[MODULUS]
+    assert f"95 %: {interval.lower:.5g} to {interval.upper:.5g} MPa" in text
+    assert diagnose(uneven)[-1] in text
+    assert len(text.splitlines()) == 3 + len(diagnose(uneven))
+    assert repr(fitted()).endswith("No problems found.")
+    assert fitted()._repr_html_().startswith("<pre>Pacheco 2021, wrist A: 36 numbers")
 
 
 def test_whether_a_model_misses_is_judged_by_numbers_of_known_noise_alone():
@@ -149,7 +260,7 @@ def test_whether_a_model_misses_is_judged_by_numbers_of_known_noise_alone():
         (lambda: calibrate(WRIST, measured(), Constant("tube.inner_diameter", 5.0, 9.0)), "1.62"),
         (lambda: leave_out(fitted(), by="pull", seed=-1), "seed 0 or more"),
         (lambda: leave_out(fitted(), by="pull", starts=0), "starts must be 1 or more"),
-        (lambda: posterior(fitted(), draws=3), "draws must be 4 or more"),
+        (lambda: sample_posterior(fitted(), draws=3), "draws must be 4 or more"),
         (
             lambda: next_measurement(fitted(), nf.pull(0.2, 1, steps=2), deviation={"x": 0.0}),
             "above 0",

@@ -11,11 +11,11 @@ from notchflex.fit import (
     SumOfDistances,
     SumOfRobotErrors,
     calibrate,
+    diagnose,
     leave_out,
     next_measurement,
     read_measurements,
-    synthetic,
-    verdict,
+    simulate_measurements,
 )
 from notchflex.fit.constants import unknowns
 from notchflex.fit.problem import Problem
@@ -37,11 +37,13 @@ TRUE = {name: number_at(WRIST, name) for name in FOUR}
 
 @pytest.fixture(scope="module")
 def noisy():
-    return calibrate(WRIST, synthetic(WRIST, UP, deviation=NOISE, seed=1), FOUR, starts=1)
+    return calibrate(
+        WRIST, simulate_measurements(WRIST, UP, deviation=NOISE, seed=1), FOUR, starts=1
+    )
 
 
 def test_constants_are_found_again_without_noise():
-    seen = synthetic(WRIST, UP)
+    seen = simulate_measurements(WRIST, UP)
     softer = WRIST.with_values({name: 0.8 * value for name, value in TRUE.items()})
     found = calibrate(softer, seen, FOUR, starts=1, intervals=False)
     assert found.converged
@@ -74,14 +76,14 @@ def test_ends_of_an_interval_are_where_the_misfit_has_risen_by_chi_squared(noisy
     for end in (interval.lower, interval.upper):
         held = WRIST.with_values({**noisy.values, name: end})
         others = [one for one in FOUR if one != name]
-        seen = synthetic(WRIST, UP, deviation=NOISE, seed=1)
+        seen = simulate_measurements(WRIST, UP, deviation=NOISE, seed=1)
         again = calibrate(held, seen, others, starts=1, intervals=False)
         assert 2.0 * (again.cost - noisy.cost) == pytest.approx(3.8415, rel=0.02)
 
 
 @pytest.mark.parametrize("objective", [LeastSquares(), LeastSquares(1.0), SumOfRobotErrors()])
 def test_slope_of_the_misfit_is_that_of_differences(objective):
-    seen = synthetic(WRIST, UP, deviation=NOISE, seed=1)
+    seen = simulate_measurements(WRIST, UP, deviation=NOISE, seed=1)
     data = {"A": (seen,)}
     problem = Problem(Samples.of({"A": WRIST}, data, unknowns({"A": WRIST}, FOUR)), objective)
     at = np.array([1.07 * TRUE[name] for name in FOUR])
@@ -97,13 +99,13 @@ def test_slope_of_the_misfit_is_that_of_differences(objective):
 
 def test_data_that_cannot_tell_a_constant_say_so():
     slick = WRIST.with_value("friction.coefficient", 0.0)
-    seen = synthetic(slick, nf.pull(0.2, 0.6, steps=4), deviation=NOISE, seed=1)
+    seen = simulate_measurements(slick, nf.pull(0.2, 0.6, steps=4), deviation=NOISE, seed=1)
     names = ("friction.coefficient", "material.superelastic_modulus")
     found = calibrate(WRIST, seen, names, starts=1)
     friction, modulus = (found.intervals[name] for name in names)
     assert friction.lower is None
     assert modulus.lower is modulus.upper is None
-    said = " ".join(verdict(found))
+    said = " ".join(diagnose(found))
     assert "cannot tell material.superelastic_modulus" in said
     assert "friction.coefficient is at most" in said
 
@@ -117,10 +119,12 @@ def test_a_path_with_memory_points_poses_tensions_and_the_sensor_itself():
         "axis_points": 0.05,
         "total_angle": 0.01,
     }
-    exact = synthetic(WRIST, load, observed=tuple(noise), axis_at=[1.0, 5.0, 9.0], from_rest=False)
+    exact = simulate_measurements(
+        WRIST, load, observed=tuple(noise), axis_at=[1.0, 5.0, 9.0], from_rest=False
+    )
     deviation = {name: np.full(one.shape, noise[name]) for name, one in exact.observed.items()}
     offset = 0.04  # what the gauge shows too much: the robot had that much less
-    truth = synthetic(
+    truth = simulate_measurements(
         WRIST,
         nf.LoadPath(np.maximum(load.tension - offset, 0.0), load.stroke),
         observed=tuple(noise),
@@ -137,16 +141,18 @@ def test_a_path_with_memory_points_poses_tensions_and_the_sensor_itself():
 
 
 def test_noise_that_nobody_told_is_what_the_fit_leaves():
-    exact = synthetic(WRIST, UP, deviation=NOISE, seed=3)
+    exact = simulate_measurements(WRIST, UP, deviation=NOISE, seed=3)
     untold = Measurements("untold", UP, exact.pull, True, exact.observed)
     found = calibrate(WRIST, untold, "friction.coefficient", starts=1)
     left = np.sqrt(np.sum(found.residuals.values**2) / found.freedom)
     assert found.noise.deviation == pytest.approx(left, rel=1e-3)
-    assert "Nothing tells the noise" in " ".join(verdict(found))
+    assert "Nothing tells the noise" in " ".join(diagnose(found))
 
 
 def test_a_total_that_is_the_sum_of_the_notches_counts_once():
-    both = synthetic(WRIST, UP, observed=("notch_angle", "total_angle"), deviation=NOISE, seed=1)
+    both = simulate_measurements(
+        WRIST, UP, observed=("notch_angle", "total_angle"), deviation=NOISE, seed=1
+    )
     sums = {**both.observed, "total_angle": both.observed["notch_angle"].sum(axis=1)}
     both = Measurements("both", UP, both.pull, True, sums, {"notch_angle": np.full((8, 5), 0.01)})
     found = calibrate(WRIST, both, "friction.coefficient", starts=1, intervals=False)
@@ -154,7 +160,7 @@ def test_a_total_that_is_the_sum_of_the_notches_counts_once():
 
 
 def test_a_prior_pulls_as_a_measurement_would():
-    seen = synthetic(WRIST, UP, deviation=NOISE, seed=1)
+    seen = simulate_measurements(WRIST, UP, deviation=NOISE, seed=1)
     name = "friction.coefficient"
     free = calibrate(WRIST, seen, name, starts=1, intervals=False)
     other = free.values[name] + free.deviations[name]
@@ -167,10 +173,10 @@ def test_a_prior_pulls_as_a_measurement_would():
 def test_the_next_measurement_narrows_as_much_as_it_says(noisy):
     told = next_measurement(noisy, nf.pull(0.3, 1.8, steps=4), narrow=["friction.coefficient"])
     load = nf.Load(tension=float(told.loads.tension[told.best, 0]))
-    more = synthetic(WRIST, load, deviation=NOISE)
-    exact = synthetic(WRIST.with_values(noisy.values), load)
+    more = simulate_measurements(WRIST, load, deviation=NOISE)
+    exact = simulate_measurements(WRIST.with_values(noisy.values), load)
     more = Measurements("more", more.load, ("2",), True, exact.observed, more.deviation)
-    first = synthetic(WRIST, UP, deviation=NOISE, seed=1)
+    first = simulate_measurements(WRIST, UP, deviation=NOISE, seed=1)
     after = calibrate(WRIST, [first, more], FOUR, starts=1, intervals=False)
     name = "friction.coefficient"
     assert after.deviations[name] / noisy.deviations[name] == pytest.approx(
@@ -180,8 +186,8 @@ def test_the_next_measurement_narrows_as_much_as_it_says(noisy):
 
 def test_a_pull_left_out_is_judged_by_constants_that_never_saw_it():
     rough = WRIST.with_value("friction.coefficient", 0.3)
-    bad = synthetic(rough, UP, deviation=NOISE, seed=2, pull=["bad"] * 8)
-    good = synthetic(WRIST, UP, deviation=NOISE, seed=1, pull=["good"] * 8)
+    bad = simulate_measurements(rough, UP, deviation=NOISE, seed=2, pull=["bad"] * 8)
+    good = simulate_measurements(WRIST, UP, deviation=NOISE, seed=1, pull=["good"] * 8)
     whole = calibrate(WRIST, [good, bad], "friction.coefficient", starts=1, intervals=False)
     tested = leave_out(whole, by="pull")
     assert [fold.label.rsplit(" ", 1)[1] for fold in tested.folds] == ["good", "bad"]
@@ -192,7 +198,7 @@ def test_a_pull_left_out_is_judged_by_constants_that_never_saw_it():
 
 def test_a_robot_with_a_constant_of_its_own_cannot_be_left_out():
     robots = {"a": WRIST, "b": WRIST}
-    seen = dict.fromkeys(robots, synthetic(WRIST, UP, deviation=NOISE, seed=1))
+    seen = dict.fromkeys(robots, simulate_measurements(WRIST, UP, deviation=NOISE, seed=1))
     own = ("a:friction.coefficient", "material.elastic_modulus")
     whole = calibrate(robots, seen, own, starts=1, intervals=False)
     with pytest.raises(nf.InputError, match=r"`a:friction\.coefficient` belongs to a alone"):
@@ -200,7 +206,7 @@ def test_a_robot_with_a_constant_of_its_own_cannot_be_left_out():
 
 
 def test_distances_of_points_are_made_small():
-    seen = synthetic(WRIST, UP, observed=("axis_points",), axis_at=[4.0, 9.0])
+    seen = simulate_measurements(WRIST, UP, observed=("axis_points",), axis_at=[4.0, 9.0])
     stiff = WRIST.with_value("friction.coefficient", 0.2)
     found = calibrate(stiff, seen, "friction.coefficient", objective=SumOfDistances(), starts=1)
     assert found.values["friction.coefficient"] == pytest.approx(0.13, abs=1e-6)
@@ -217,7 +223,7 @@ def test_distances_of_points_are_made_small():
 )
 def test_what_does_not_belong_together_is_refused(change, says):
     given = {
-        "measurements": synthetic(WRIST, UP),
+        "measurements": simulate_measurements(WRIST, UP),
         "fit": "friction.coefficient",
         "objective": SumOfRobotErrors(),
     } | change

@@ -14,7 +14,7 @@ from notchflex.fit import (
     Measurements,
     read_measurements,
     repeats_of_each,
-    synthetic,
+    simulate_measurements,
     write_measurements,
 )
 from notchflex.fit.measurements_writing import exactly_in_degrees
@@ -90,6 +90,29 @@ def test_every_kind_of_column(read):
     assert set(data.deviation) == {"notch_angle", "tip_position", "axis_points"}
 
 
+def test_spreadsheet_habits_are_taken(tmp_path, robot):
+    text = f"# pulled by hand\n{HEADER}\r\n\r\n 0.5 , 1,2\r\n,,\r\n"
+    (tmp_path / "data.csv").write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert len(read_measurements(tmp_path / "data.csv", robot)) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.5,1.25,2\n1,2,",
+        "0,5;1,25;2\n1;2;",
+        "0.5;1.25;2\n1;2;",
+        ";;\n0,5;1,25;2\n1;2;",
+        "5e-1;1,25;2\n1;2;",
+    ],
+)
+def test_semicolons_and_decimal_commas_are_read(read, text):
+    header = HEADER.replace(",", ";") if ";" in text else HEADER
+    data = read(f"# Messung, Wrist 7\n{header}\n{text}\n")
+    np.testing.assert_array_equal(data.load.tension[:, 0], [0.5, 1.0])
+    np.testing.assert_allclose(np.degrees(data.observed["notch_angle"][:, 0]), [1.25, 2.0])
+
+
 def test_tension_in_some_rows_and_stroke_in_others(read):
     data = read("tendon_force_N,tendon_displacement_mm,total_deg\n0.5,,9\n,0.2,9\n0.7,0.3,9\n")
     np.testing.assert_array_equal(data.load.tension[:, 0], [0.5, np.nan, 0.7])
@@ -108,7 +131,19 @@ def test_a_hung_weight_needs_no_tendon(read):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        ("", "is empty"),
+        ("\n\n", "is empty"),
         (f"{HEADER}\n", "a header and no rows"),
+        (f"{HEADER}\n1,1\n", "line 2: 2 entries for 3 columns"),
+        (f"{HEADER},notch_1_deg\n1,1,2,1\n", "notch_1_deg is there more than once"),
+        (f"{HEADER}\ninf,1,2\n", "tendon_force_N is inf"),
+        (f"{HEADER}\n1,1e308,2\n", "notch_1_deg is 1e308; give at most 1e\\+06"),
+        (HEADER.replace(",", "\t") + "\n1\t1\t2\n", "tabs"),
+        (
+            HEADER.replace(",", ";") + "\n0,5;1;2\n1.5;1;2\n",
+            "0,5 in line 2 and 1.5 in line 3 have different decimal separators",
+        ),
+        (HEADER.replace(",", ";") + "\n0,5,5;1;2\n", "tendon_force_N is '0,5,5'"),
         ("force,notch_1_deg\n1,2\n", "no column tendon_force_N or tendon_displacement_mm"),
         (f"{HEADER}\n0.5,1,2\n,1,2\n", "line 3: tendon_force_N is nothing; say what was done"),
         (
@@ -151,7 +186,7 @@ def test_gravity_needs_something_to_act_on(read, robot):
 
 
 def everything(robot: nf.Robot, path: nf.LoadPath, **options) -> Measurements:
-    return synthetic(
+    return simulate_measurements(
         robot,
         path,
         observed=(

@@ -15,7 +15,7 @@ from fake_path import fake_path
 from fitted import DEVIATION, NAMES, OBSERVED
 from notchflex.cli import run
 from notchflex.comparison import Measured, compare
-from notchflex.fit import calibrate, synthetic
+from notchflex.fit import calibrate, simulate_measurements
 from notchflex.plotting import (
     beside_picture,
     calibration_picture,
@@ -50,7 +50,9 @@ def nasty_calibration():
     robot = nf.load_robot(WRIST).replace(name=NASTY)
     loads = [nf.Load(tension=force) for force in (0.4, 1.0, 1.6, 0.4, 1.0, 1.6)]
     pulls = (NASTY,) * 3 + ("_b",) * 3
-    seen = synthetic(robot, loads, observed=OBSERVED, deviation=DEVIATION, seed=1, pull=pulls)
+    seen = simulate_measurements(
+        robot, loads, observed=OBSERVED, deviation=DEVIATION, seed=1, pull=pulls
+    )
     found = calibrate({NASTY: robot}, {NASTY: seen}, NAMES, starts=1, intervals=False)
     return calibration_picture(found)
 

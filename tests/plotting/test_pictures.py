@@ -8,7 +8,7 @@ import pytest
 
 import notchflex as nf
 from fake_path import fake_path
-from notchflex.comparison import Measured, compare
+from notchflex.comparison import compare
 from notchflex.errors import InputError
 from notchflex.fit import weight_held
 from notchflex.plotting import (
@@ -45,9 +45,8 @@ def a_batch():
 def a_comparison():
     robot = nf.load_robot("pacheco2021-a")
     angles = np.radians([[5.0, 5.0, 5.0, 4.0, 4.0], [9.0, 9.0, 8.0, 8.0, 8.0]])
-    none = np.full((2, 1), np.nan)
-    tension = np.array([[0.5], [0.9]])
-    return compare(robot, Measured("m", tension, none, angles, angles.sum(1), ("1", "1")))
+    load = nf.pull(0.5, 0.9, steps=2)
+    return compare(robot, nf.Measurements("m", load, ("1", "1"), True, {"notch_angle": angles}))
 
 
 def a_rig():

@@ -20,6 +20,7 @@ from notchflex.cli.calibrate_words import (
     parse_pairs,
     robots_of,
 )
+from notchflex.cli.measured import OnePath, from_rest, note_table
 from notchflex.cli.options import OUTPUT, JsonFile, PlotFile, Settings, robot_files
 from notchflex.cli.spec import load_columns
 from notchflex.errors import InputError
@@ -34,7 +35,6 @@ from notchflex.results.files import (
 if TYPE_CHECKING:
     from notchflex.fit import Calibration, LeftOut, NextMeasurement, Posterior
     from notchflex.fit.objective import FitObjective
-    from notchflex.robot import Robot
 
 MORE = Group("Beyond the fit", sort_key=8)
 
@@ -78,14 +78,7 @@ def calibrate(
     ] = None,
     starts: Annotated[int, Parameter(help="From how many places to search.")] = 4,
     seed: Annotated[int, Parameter(help="Of the places.")] = 0,
-    path: Annotated[
-        bool,
-        Parameter(
-            negative=(),
-            help="Take the rows of each pull as one path with memory of friction; without it as "
-            "the file says, and each from rest where it says nothing.",
-        ),
-    ] = False,
+    path: OnePath = None,
     leave_out: Annotated[
         Literal["pull", "robot"] | None,
         Parameter(group=MORE, help="Also fit without each pull or robot, and try that on it."),
@@ -155,11 +148,13 @@ def calibrate(
     check_sensor([one.name for one in wanted])
     measured = {
         label: [
-            fitting.read_measurements(file, robots[label], from_rest=False if path else None)
+            fitting.read_measurements(file, robots[label], from_rest=from_rest(path))
             for file in files
         ]
         for label, files in given.data.items()
     }
+    for one in (one for every in measured.values() for one in every):
+        note_table(one)
     constants = [fitting.Constant(*one) for one in wanted]
     aim = _objective(objective, huber)
     told: NextMeasurement | None = None
@@ -179,11 +174,11 @@ def calibrate(
                 told = fitting.next_measurement(found, loads, robot=next_robot, narrow=narrow)
         if posterior:
             with _noting(undone, "--posterior"):
-                drawn = fitting.posterior(found, draws=draws, seed=seed, progress=progress)
+                drawn = fitting.sample_posterior(found, draws=draws, seed=seed, progress=progress)
     _write(found, left, told, drawn, inputs, output=output, json=json, plot=plot)
     if json != STANDARD_OUTPUT:
         _print(found, left, told, drawn)
-    code = _say_what_matters(found, robots)
+    code = _say_what_matters(found)
     if not undone:
         return code
     from notchflex.cli.app import BAD_INPUT
@@ -285,19 +280,9 @@ def _print(
         tables.print_posterior(drawn)
 
 
-def _say_what_matters(found: Calibration, robots: dict[str, Robot]) -> int:
+def _say_what_matters(found: Calibration) -> int:
     from notchflex.cli.app import DONE, NOT_CONVERGED
 
-    for sample in found.problem.samples.every:
-        measured = sample.measured
-        if measured.ignored:
-            terminal.note(f"ignored columns of {measured.source}: {', '.join(measured.ignored)}.")
-        if measured.negative_forces:
-            count = measured.negative_forces
-            terminal.note(
-                f"{measured.source}: {count} measured force{'s are' if count > 1 else ' is'} "
-                "negative (sensor offset); the model is given 0 N."
-            )
     if found.converged:
         return DONE
     terminal.error(f"not converged: {found.reason}. Try --starts or --bounds.")

@@ -21,26 +21,22 @@ _ROWS = 16
 
 def print_calibration(found: Calibration) -> None:
     """Print constants, how far to trust them, and the errors of every part."""
+    from notchflex.fit.diagnosis import NO_PROBLEMS, diagnose
     from notchflex.fit.documents import data_of
-    from notchflex.fit.verdict import verdict
 
     console = terminal.output()
     for label in found.given:
         console.print(f"{label}: {', '.join(data_of(found, label))}", soft_wrap=True)
     kind = type(found.problem.objective).__name__
     count = len(found.searches)
-    numbers = len(found.residuals)
-    console.print(
-        f"{numbers} number{'s' if numbers > 1 else ''} measured; "
-        f"{count} search{'es' if count > 1 else ''}, {found.solves} rows solved"
-    )
+    console.print(f"{_numbers(found)}; {count} search{'es' if count > 1 else ''}")
     chi = found.reduced_chi_squared
     told = f"; reduced chi squared {chi:.3g} (about 1: as noise)" if math.isfinite(chi) else ""
     console.print(f"{kind} {found.cost:.6g}{told}")
     console.print()
     _print_constants(console, found)
     console.print()
-    for sentence in verdict(found) or ("Nothing speaks against these constants.",):
+    for sentence in diagnose(found) or (NO_PROBLEMS,):
         console.print(sentence)
     console.print()
     _print_errors(console, found)
@@ -128,6 +124,16 @@ def _print_errors(console: Console, found: Calibration) -> None:
         cells = _plain(one.error), _plain(one.repeats)
         table.add_row(one.robot, one.title, *cells, one.unit)
     console.print(table)
+
+
+def _numbers(found: Calibration) -> str:
+    """How many numbers count, and how many do not."""
+    counted = found.counted
+    words = f"{counted} number{'s' * (counted > 1)} measured"
+    rest = len(found.residuals) - counted
+    if not rest:
+        return words
+    return f"{words} (and {rest} total angle{'s' * (rest > 1)}, the sum of the notches)"
 
 
 def _interval(interval: Interval) -> str:

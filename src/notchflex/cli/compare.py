@@ -8,6 +8,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.measured import OnePath, from_rest, note_table
 from notchflex.cli.options import (
     CsvFile,
     JsonFile,
@@ -30,8 +31,8 @@ from notchflex.results.quantities import DEGREES
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison
 
-MOST_COLUMNS = 6
-"""Notches of a robot side by side in one table; more of them go below."""
+MOST_COLUMNS = 8
+"""Numbers side by side in one table; more of them go below."""
 
 
 def compare(
@@ -39,21 +40,14 @@ def compare(
     data: Annotated[
         str,
         Parameter(
-            help="CSV with `tendon_force_N` or `tendon_displacement_mm` and `notch_1_deg`, "
-            "`notch_2_deg`, ... base to tip; if wanted `trial` and `total_deg`."
+            help="CSV of measurements: `tendon_force_N` or `tendon_displacement_mm`, with some of "
+            "`notch_1_deg`, `notch_2_deg`, ... base to tip, `total_deg` and `tip_x_mm`; if wanted "
+            "`trial`. All columns that `notchflex.read_measurements` reads."
         ),
     ],
     /,
     *,
-    path: Annotated[
-        bool,
-        Parameter(
-            name="--path",
-            negative=(),
-            help="Take the rows of each trial as one path with memory of friction, in their "
-            "order. Without it every row is a pull from rest.",
-        ),
-    ] = False,
+    path: OnePath = None,
     beside: Annotated[
         tuple[str, ...],
         Parameter(
@@ -71,11 +65,12 @@ def compare(
     plot: PlotFile = None,
     quiet: Quiet = False,
 ) -> int:
-    """Compare a robot with measured notch angles.
+    """Compare a robot with measured angles or tip positions.
 
-    Prints the root-mean-square error of every notch, of the total angle and of the tip. The
-    measured tip is the forward kinematics of the measured angles. A negative force is the offset
-    of a sensor: it stays in the table, and the model is given 0 N.
+    Prints the root-mean-square error of every notch, of the total angle and of the tip, as far as
+    they were measured. Where the tip was not measured it is the forward kinematics of the measured
+    angles. A negative force is the offset of a sensor: it stays in the table, and the model is
+    given 0 N.
     """
     terminal.be_quiet(quiet)
     inputs = [*robot_files(robot), data]
@@ -88,32 +83,32 @@ def compare(
     chosen = chosen_robot(robot, settings)
     variants = [_variant(text) for text in beside]
 
-    from notchflex.comparison.measured import read_measured
+    from notchflex.fit.measurements_csv import read_measurements
 
-    measured = read_measured(data, chosen)
+    measured = read_measurements(data, chosen, from_rest=from_rest(path))
     robots = {
         label: chosen if values is None else chosen.with_values(values)
         for label, values in variants
     }
-    with terminal.counting(f"solving {len(measured)} points of {chosen.name}") as counted:
+    with terminal.counting(f"solving {len(measured)} rows of {chosen.name}") as counted:
         from notchflex.cli.compile_cache import use_compile_cache
 
         use_compile_cache()
         from notchflex import comparison as comparing
 
-        comparison = comparing.compare(chosen, measured, from_rest=not path)
+        comparison = comparing.compare(chosen, measured)
         others: dict[str, Comparison] = {}
         for number, (label, values) in enumerate(variants, 1):
             counted(number, 1 + len(variants))
             others[label] = (
                 comparing.compare_kinematics(comparison)
                 if values is None
-                else comparing.compare(robots[label], measured, from_rest=not path)
+                else comparing.compare(robots[label], measured)
             )
     _write(comparison, others, json=json, csv=csv, plot=plot)
     if STANDARD_OUTPUT not in (json, csv) and not quiet:
         _print(comparison, others)
-    return _say_what_matters(comparison)
+    return _say_what_matters(comparison, others)
 
 
 def _variant(text: str) -> tuple[str, list[tuple[str, object]] | None]:
@@ -155,43 +150,64 @@ def _write(
 def _print(comparison: Comparison, others: dict[str, Comparison]) -> None:
     from rich.table import Table
 
+    from notchflex.fit.errors_of_parts import edge
+
     console = terminal.output()
     measured = comparison.measured
-    trials = len(set(measured.trial))
+    trials = len(measured.pulls)
     console.print(f"{comparison.robot.name}, {measured.source}", soft_wrap=True)
     console.print(
         f"{comparison.points} points of {trials} trial{'s' if trials > 1 else ''}, each "
-        f"{'pulled from rest' if comparison.from_rest else 'trial one path with memory'}"
+        f"{'pulled from rest' if measured.from_rest else 'trial one loading path'}"
     )
     models = {"model": comparison, **others}
-    notches = comparison.robot.number_of_notches
-    for first in range(0, notches, MOST_COLUMNS):  # a wide robot in parts, each of 80 columns
-        last = min(first + MOST_COLUMNS, notches)
+    columns = _columns(models)
+    for first in range(0, len(columns), MOST_COLUMNS):  # a wide robot in parts, each of 80 columns
         table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
         table.add_column("root-mean-square error\n", no_wrap=True, max_width=24)
-        for notch in range(first, last):
-            table.add_column(f"n{notch + 1}\ndeg", justify="right")
-        if last == notches:
-            table.add_column("total\ndeg", justify="right")
-            table.add_column("tip\nmm", justify="right")
-        for label, one in models.items():
-            cells = [f"{number:.2f}" for number in one.rmse_notches[first:last] * DEGREES]
-            if last == notches:
-                cells += [f"{one.rmse_total * DEGREES:.2f}", f"{one.tip_rmse:.3f}"]
-            table.add_row(label, *cells)
+        some = columns[first : first + MOST_COLUMNS]
+        for head, _ in some:
+            table.add_column(head, justify="right")
+        for number, label in enumerate(models):
+            table.add_row(label, *(cells[number] for _, cells in some))
         console.print(table)
+    for name, error in comparison.others.items():
+        title, unit, scale = edge(name)
+        console.print(f"{title}: {error * scale:.3f} {unit}")
+    for sentence in comparison.diagnosis:
+        console.print(sentence)
 
 
-def _say_what_matters(comparison: Comparison) -> int:
+def _columns(models: dict[str, Comparison]) -> list[tuple[str, list[str]]]:
+    """Head and one number for each model, of every notch, the total and the tip if measured."""
+    first = next(iter(models.values()))
+    notches = first.robot.number_of_notches
+    columns = [
+        (f"n{n + 1}\ndeg", [f"{one.rmse_notches[n] * DEGREES:.2f}" for one in models.values()])
+        for n in range(notches)
+        if np.isfinite(first.measured_notch_angle[:, n]).any()
+    ]
+    if np.isfinite(first.measured_total_angle).any():
+        numbers = [f"{one.rmse_total * DEGREES:.2f}" for one in models.values()]
+        columns.append(("total\ndeg", numbers))
+    if np.isfinite(first.measured_tip).any():
+        columns.append(("tip\nmm", [f"{one.tip_rmse:.3f}" for one in models.values()]))
+    return columns
+
+
+def _say_what_matters(comparison: Comparison, others: dict[str, Comparison]) -> int:
     from notchflex.cli.app import DONE, NOT_CONVERGED
+    from notchflex.comparison.tables import takes_stroke_of_model
 
     measured = comparison.measured
-    if measured.ignored:
-        terminal.note(f"ignored columns: {', '.join(measured.ignored)}.")
-    if measured.negative_forces:
-        count = measured.negative_forces
-        are = "force is" if count == 1 else "forces are"
-        terminal.note(f"{count} measured {are} negative (sensor offset); the model is given 0 N.")
+    note_table(measured)
+    kinematics = next((one for one in others.values() if one.stroke_lost is not None), None)
+    if kinematics is not None and takes_stroke_of_model(kinematics):
+        terminal.note(
+            "kinematics: only forces were measured, so it takes the stroke of the model. The total "
+            "angle, and so its error, is that of the model by construction; compare the notches "
+            "and the tip."
+        )
     failed = np.flatnonzero(~comparison.converged)
     if not len(failed):
         return DONE

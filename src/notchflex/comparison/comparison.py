@@ -1,116 +1,200 @@
-"""The model at every measured point, and how far it is from the measurement."""
+"""The model at every measured row, and how far it is from the measurement."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Bool, Float
 from numpy.typing import NDArray
 
-import notchflex as nf
-from notchflex.comparison.measured import Measured
+from notchflex._jax import constant
 from notchflex.errors import InputError
+from notchflex.fit.branch_residuals import branch_difference, branch_words
+from notchflex.fit.measurements import Measurements
+from notchflex.fit.residuals import misfit, outputs_for
+from notchflex.fit.rows import Predicted
+from notchflex.fit.solved_rows import solved_rows
+from notchflex.motion import rotation_about
 from notchflex.robot import Robot
+from notchflex.statics import axis_points, equal_stroke, tip_from_angles
+
+if TYPE_CHECKING:
+    from notchflex.statics import Path
+
+_COLUMNS = ("tension", "stroke", "notch_angle", "total_angle", "tip_position", "converged")
+# What has no column of its own in a comparison: only its error is told.
+_OTHERS = ("tip_rotation", "tip_tension", "axis_points")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """A robot beside its measurement, P points, n notches, t tendons.
+    """A robot beside its measurement, P rows, n notches, t tendons.
 
-    The errors are taken over the points whose equilibrium was found.
+    Errors are taken over the rows that were solved; they are NaN for what was not measured.
 
     Attributes:
         robot: The robot that was compared.
-        measured: The measurement.
-        from_rest: True if every point is a pull from rest, False if each trial is one path.
+        measured: The measurement; its `from_rest` says how the rows were loaded.
         tension: Base tension in the model [N], (P, t).
         stroke: Stroke in the model [mm], (P, t).
         notch_angle: Notch angles of the model [rad], (P, n).
         total_angle: Total angle of the model [rad], (P,).
-        tip: Tip of the model [mm], (P, 3).
-        measured_tip: Forward kinematics of the measured notch angles [mm], (P, 3).
+        tip: Tip of the model in the world [mm], (P, 3).
         converged: Whether the equilibrium was found, (P,).
         reason: Why not, P texts, "" where it was.
+        others: Root-mean-square errors of what else was measured, by the names of
+            `Measurements.observed`: "tip_rotation" [rad], "tip_tension" [N], "axis_points" [mm].
         stroke_lost: Stroke that closed notches could not take in the kinematic model [mm], (P,);
             None for a model with forces.
     """
 
     robot: Robot
-    measured: Measured
-    from_rest: bool
-    tension: NDArray[np.float64]
-    stroke: NDArray[np.float64]
-    notch_angle: NDArray[np.float64]
-    total_angle: NDArray[np.float64]
-    tip: NDArray[np.float64]
-    measured_tip: NDArray[np.float64]
-    converged: NDArray[np.bool_]
+    measured: Measurements
+    tension: Float[np.ndarray, "p t"]
+    stroke: Float[np.ndarray, "p t"]
+    notch_angle: Float[np.ndarray, "p n"]
+    total_angle: Float[np.ndarray, " p"]
+    tip: Float[np.ndarray, "p 3"]
+    converged: Bool[np.ndarray, " p"]
     reason: tuple[str, ...]
-    stroke_lost: NDArray[np.float64] | None = None
+    others: dict[str, float] = field(default_factory=dict[str, float])
+    stroke_lost: Float[np.ndarray, " p"] | None = None
+
+    @cached_property
+    def measured_notch_angle(self) -> Float[np.ndarray, "p n"]:
+        """Measured angle of every notch [rad], (P, n); NaN where it was not measured."""
+        nothing = np.full(self.notch_angle.shape, np.nan)
+        return self.measured.observed.get("notch_angle", nothing)
+
+    @cached_property
+    def measured_total_angle(self) -> Float[np.ndarray, " p"]:
+        """Measured total angle [rad], (P,): its own column, or else the sum of all notches."""
+        added = np.sum(self.measured_notch_angle, axis=1)
+        own = self.measured.observed.get("total_angle")
+        return added if own is None else np.where(np.isnan(own), added, own)
+
+    @cached_property
+    def measured_tip(self) -> Float[np.ndarray, "p 3"]:
+        """Measured tip in the world [mm], (P, 3); NaN for coordinates that are not known.
+
+        As measured, or else the forward kinematics of the measured notch angles.
+        """
+        found = np.full(self.tip.shape, np.nan)
+        angles = self.measured_notch_angle
+        whole = np.isfinite(angles).all(axis=1)
+        if whole.any():
+            found[whole] = _tip_in_world(self.robot, self.measured, angles[whole])
+        own = self.measured.observed.get("tip_position")
+        if own is not None:
+            seen = np.isfinite(own).any(axis=1)
+            found[seen] = own[seen]
+        return found
 
     @property
     def points(self) -> int:
-        """Number of points that the errors are taken over."""
+        """Number of rows that the errors are taken over."""
         return int(self.converged.sum())
 
     @property
-    def rmse_notches(self) -> NDArray[np.float64]:
+    def rmse_notches(self) -> Float[np.ndarray, " n"]:
         """Root-mean-square error of every notch angle [rad], (n,)."""
-        return self._rms(self.notch_angle - self.measured.notch_angle)
+        return self._rms(self.notch_angle - self.measured_notch_angle)
 
     @property
     def rmse_total(self) -> float:
         """Root-mean-square error of the total angle [rad]."""
-        return float(self._rms(self.total_angle - self.measured.total_angle))
+        return float(self._rms(self.total_angle - self.measured_total_angle))
 
     @property
-    def tip_error(self) -> NDArray[np.float64]:
-        """Distance of the tip from the measured tip [mm], (P,)."""
-        return np.linalg.norm(self.tip - self.measured_tip, axis=-1)
+    def tip_error(self) -> Float[np.ndarray, " p"]:
+        """Distance of the tip from the measured tip [mm], (P,), over its measured coordinates."""
+        off = self.tip - self.measured_tip
+        return np.where(np.isnan(off).all(axis=1), np.nan, np.sqrt(np.nansum(off**2, axis=1)))
 
     @property
     def tip_rmse(self) -> float:
         """Root-mean-square distance of the tip from the measured tip [mm]."""
         return float(self._rms(self.tip_error))
 
+    @property
+    def diagnosis(self) -> tuple[str, ...]:
+        """What a user should know before trusting the errors; nothing where there is nothing."""
+        off = np.where(self.converged, self.measured_total_angle - self.total_angle, np.nan)
+        difference = branch_difference(off, self.measured.branches)
+        if difference is None:
+            return ()
+        return (branch_words(difference, "total_angle", self.measured),)
+
     def _rms(self, errors: NDArray[np.float64]) -> NDArray[np.float64]:
-        good = errors[self.converged]
-        if not len(good):
-            return np.full(errors.shape[1:], np.nan)
-        return np.sqrt(np.mean(good**2, axis=0))
+        known = np.isfinite(errors) & self.converged.reshape(-1, *(1,) * (errors.ndim - 1))
+        count = known.sum(axis=0)
+        total = np.sum(np.where(known, errors, 0.0) ** 2, axis=0)
+        return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
+    def __repr__(self) -> str:
+        """Return the errors on a few lines."""
+        from notchflex.comparison.tables import summary
+
+        return summary(self)
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        from html import escape
+
+        return f"<pre>{escape(repr(self))}</pre>"
 
 
-def compare(robot: Robot, measured: Measured, *, from_rest: bool = True) -> Comparison:
-    """Solve a robot at every measured point.
+def compare(robot: Robot, measurements: Measurements) -> Comparison:
+    """Solve a robot at every measured row.
 
     Args:
         robot: The robot that was measured.
-        measured: P points with forces or displacements. A negative force is 0 N in the model.
-        from_rest: True if every point is a pull from rest; False if the points of each trial, in
-            their order, are one path with memory of friction.
+        measurements: P rows, as `read_measurements` reads them or `Measurements` holds them;
+            their `from_rest` says whether each row is loaded from rest or each pull is one path.
 
     Returns:
-        The comparison. A point that does not converge is marked and left out of the errors.
+        The comparison. A row that does not converge is marked and left out of the errors.
+
+    Raises:
+        InputError: The measurements are not of such a robot.
 
     Example:
-        >>> from notchflex import load_robot
+        >>> from notchflex import Measurements, load_robot, pull
         >>> robot = load_robot("pacheco2021-a")
-        >>> angles = np.radians([[2.7, 2.7, 2.7, 2.7, 2.6]])
-        >>> pull = Measured(
-        ...     "by hand", np.array([[0.25]]), np.array([[np.nan]]), angles, angles.sum(1), ("1",)
-        ... )
-        >>> round(float(np.degrees(compare(robot, pull).rmse_total)), 2)
-        0.01
+        >>> angle = {"total_angle": np.radians([13.3, 27.1])}
+        >>> seen = Measurements("by hand", pull(0.25, 0.5, steps=2), ("1", "1"), True, angle)
+        >>> round(float(np.degrees(compare(robot, seen).rmse_total)), 2)
+        0.54
     """
-    model = (_from_rest if from_rest else _along_trials)(robot, measured)
-    measured_tip, _ = nf.tip_from_angles(robot, measured.notch_angle)
+    _check(robot, measurements)
+    observed = tuple(name for name in _OTHERS if name in measurements.observed)
+
+    def read(path: Path) -> dict[str, Any]:
+        columns = {name: np.asarray(getattr(path, name)) for name in _COLUMNS}
+        columns["reason"] = np.array(path.reason, object)
+        for name in outputs_for(observed):
+            columns[name] = (
+                np.asarray(axis_points(path, measurements.axis_at))
+                if name == "axis_points"
+                else np.asarray(getattr(path, name))
+            )
+        return columns
+
+    model = solved_rows(robot, measurements.load, measurements.pull, measurements.from_rest, read)
     return Comparison(
         robot=robot,
-        measured=measured,
-        from_rest=from_rest,
-        measured_tip=np.asarray(measured_tip),
-        **model,
+        measured=measurements,
+        tension=model["tension"],
+        stroke=model["stroke"],
+        notch_angle=model["notch_angle"],
+        total_angle=model["total_angle"],
+        tip=model["tip_position"],
+        converged=model["converged"],
+        reason=tuple(str(one) for one in model["reason"]),
+        others={name: _error(name, measurements, model) for name in observed},
     )
 
 
@@ -118,7 +202,8 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
     """Compare the model that shares the stroke equally over the notches (Pacheco 2021, eq. 1-3).
 
     It knows no forces: it takes the measured stroke, and where only the force was measured the
-    stroke that the full model finds under it.
+    stroke that the full model finds under it. Notches that are alike then add up to the total angle
+    of the full model, whatever was measured: only the notches and the tip tell the two apart.
 
     Args:
         comparison: The full model, for a robot of one tendon.
@@ -135,11 +220,10 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
             f"the kinematic model shares the stroke of one tendon; {robot.name} has "
             f"{robot.number_of_tendons}."
         )
-    given = ~np.isnan(comparison.measured.stroke[:, 0])
-    stroke = np.where(given, comparison.measured.stroke[:, 0], comparison.stroke[:, 0])
-    shared = nf.equal_stroke(robot, stroke)
+    given = ~np.isnan(comparison.measured.load.stroke[:, 0])
+    stroke = np.where(given, comparison.measured.load.stroke[:, 0], comparison.stroke[:, 0])
+    shared = equal_stroke(robot, stroke)
     angles = shared.notch_angle
-    tip, _ = nf.tip_from_angles(robot, angles)
     # A stroke past the last closing has no equilibrium, but here it is the closed shape.
     solved = comparison.converged | given
     return replace(
@@ -147,8 +231,9 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
         stroke=stroke[:, None],
         notch_angle=angles,
         total_angle=angles.sum(axis=1),
-        tip=np.asarray(tip),
+        tip=_tip_in_world(robot, comparison.measured, angles),
         converged=solved,
+        others={},
         stroke_lost=shared.stroke_lost,
         reason=tuple(
             "" if good else why for good, why in zip(solved, comparison.reason, strict=True)
@@ -156,40 +241,44 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
     )
 
 
-FIELDS = {
-    "tension": "tension",
-    "stroke": "stroke",
-    "notch_angle": "notch_angle",
-    "total_angle": "total_angle",
-    "tip": "tip_position",
-    "converged": "converged",
-    "reason": "reason",
-}
-"""Field of a comparison to the attribute of the solved state that fills it."""
-
-
-def _from_rest(robot: Robot, measured: Measured) -> dict[str, Any]:
-    from notchflex.statics import solve_each
-
-    path = solve_each(robot, nf.LoadPath(tension=measured.model_tension, stroke=measured.stroke))
-    columns = {field: np.asarray(getattr(path, name)) for field, name in FIELDS.items()}
-    return {**columns, "reason": tuple(path.reason)}
-
-
-def _along_trials(robot: Robot, measured: Measured) -> dict[str, Any]:
-    columns: dict[str, Any] = {}
-    for label in dict.fromkeys(measured.trial):
-        rows = np.array([trial == label for trial in measured.trial])
-        path = nf.simulate(
-            robot,
-            nf.LoadPath(tension=measured.model_tension[rows], stroke=measured.stroke[rows]),
+def _check(robot: Robot, measurements: Measurements) -> None:
+    if not isinstance(measurements, Measurements):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError(
+            "compare needs Measurements; read_measurements reads them from a CSV, and "
+            f"simulate_measurements makes them; got {type(measurements).__name__}"
         )
-        for field, attribute in FIELDS.items():
-            part = np.asarray(getattr(path, attribute))
-            if field == "reason":
-                part = part.astype(object)
-            if field not in columns:
-                columns[field] = np.empty((len(measured), *part.shape[1:]), part.dtype)
-            columns[field][rows] = part
-    columns["reason"] = tuple(str(reason) for reason in columns["reason"])
-    return columns
+    notches = measurements.observed.get("notch_angle")
+    if notches is not None and notches.shape[1] != robot.number_of_notches:
+        raise InputError(
+            f"{measurements.source} has angles of {notches.shape[1]} notches, but {robot.name} has "
+            f"{robot.number_of_notches}; choose the robot that was measured"
+        )
+
+
+def _tip_in_world(
+    robot: Robot, measured: Measurements, angles: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Forward kinematics of notch angles, on the base as it was turned."""
+    tip, _ = tip_from_angles(robot, angles)
+    return np.asarray(tip) @ np.asarray(rotation_about(constant(measured.load.base_rotation))).T
+
+
+def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
+    """Root-mean-square error of a quantity over the solved rows; of points that of distances."""
+    rows = np.flatnonzero(model["converged"])
+    if not len(rows) or not np.isfinite(measured.observed[name][rows]).any():
+        return float("nan")
+    values = {one: model[one][rows] for one in outputs_for((name,))}
+    slopes = {one: np.zeros((0, *value.shape)) for one, value in values.items()}
+    predicted = Predicted(values, np.ones(len(rows), bool), slopes)
+    part = measured.taken(rows)
+    # States of a path are in the world already, as what was measured.
+    part = replace(part, load=replace(part.load, base_rotation=np.zeros(3)))
+    off = misfit(name, part, predicted).values
+    coordinates = 1 if name == "tip_tension" else 3
+    squares = off.reshape(len(rows), -1, coordinates) ** 2
+    known = np.isfinite(squares).any(axis=2)
+    return float(np.sqrt(np.nansum(squares) / known.sum()))
+
+
+__all__ = ["Comparison", "compare", "compare_kinematics"]

@@ -3,6 +3,7 @@
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.constancy import Constancy, constancy
 from notchflex.fit.constants import Constant, Unknown
+from notchflex.fit.diagnosis import diagnose
 from notchflex.fit.documents import (
     calibration_document,
     left_out_document,
@@ -22,11 +23,10 @@ from notchflex.fit.measurements_csv import read_measurements
 from notchflex.fit.measurements_writing import write_measurements
 from notchflex.fit.next_measurement import NextMeasurement, next_measurement
 from notchflex.fit.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
-from notchflex.fit.posterior import Posterior, posterior
+from notchflex.fit.posterior import Posterior, sample_posterior
 from notchflex.fit.repeats import repeats, repeats_of_each
-from notchflex.fit.synthetic import synthetic
+from notchflex.fit.simulated import simulate_measurements
 from notchflex.fit.two_weights import coefficient_from_weights, weight_held
-from notchflex.fit.verdict import verdict
 
 __all__ = [
     "Calibration",
@@ -49,6 +49,7 @@ __all__ = [
     "calibration_document",
     "coefficient_from_weights",
     "constancy",
+    "diagnose",
     "errors_of_parts",
     "friction_document",
     "friction_rig",
@@ -56,14 +57,13 @@ __all__ = [
     "left_out_document",
     "next_measurement",
     "next_measurement_document",
-    "posterior",
     "posterior_document",
     "read_friction_rig",
     "read_measurements",
     "repeats",
     "repeats_of_each",
-    "synthetic",
-    "verdict",
+    "sample_posterior",
+    "simulate_measurements",
     "weight_held",
     "write_fitted",
     "write_measurements",

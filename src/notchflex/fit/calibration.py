@@ -8,11 +8,12 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.stats import chi2
+from scipy.stats import chi2, t
 
 from notchflex.errors import InputError
-from notchflex.fit.curvature import unit_free
-from notchflex.fit.intervals import Interval, allowed_rise, held
+from notchflex.fit.by_pulls import ByPulls, by_pulls
+from notchflex.fit.curvature import inverse_of
+from notchflex.fit.intervals import LEVEL, Interval, allowed_rise, held
 from notchflex.fit.minimise import Cost, Minimum
 from notchflex.fit.noise import Noise
 from notchflex.fit.problem import Problem
@@ -23,7 +24,7 @@ from notchflex.robot import Robot
 _UNLIKELY = 0.01
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """What a fit found.
 
@@ -33,7 +34,8 @@ class Calibration:
         best: Where the best search ended.
         reached: The objective there.
         searches: Where every search ended, the first from the robots as they were.
-        intervals: 95 % intervals by constant; of `LeastSquares` only.
+        intervals: 95 % intervals by constant; of `LeastSquares` only. By whole pulls where these
+            differ by more than their rows do.
     """
 
     given: Mapping[str, Robot]
@@ -100,6 +102,15 @@ class Calibration:
         return found
 
     @property
+    def counted(self) -> int:
+        """How many of the measured numbers count.
+
+        A total angle that is the sum of the notches adds nothing to them in least squares.
+        """
+        likelihood = self.problem.objective.is_likelihood
+        return self.noise.counted if likelihood else len(self.residuals)
+
+    @property
     def freedom(self) -> int:
         """How many more numbers were measured than fitted."""
         return self.noise.counted - len(self.names)
@@ -138,11 +149,17 @@ class Calibration:
         """By how much intervals are wider than noise alone makes them: the model misses more."""
         return float(np.sqrt(self.reduced_chi_squared)) if self.misses else 1.0
 
-    @property
-    def allowed_rise(self) -> float:
-        """By how much twice the misfit may rise in a 95 % interval; infinite for unknown noise."""
+    def allowed_rise(self, name: str) -> float:
+        """By how much twice the misfit may rise in the 95 % interval of a constant.
+
+        By rows, or by whole pulls where these differ by more than their rows do (`by_pulls`).
+        Infinite where nothing tells the noise.
+        """
         if self.tells_no_noise:
             return float("inf")
+        number = self.names.index(name)
+        if self.by_pulls.wider[number] > 1.0:
+            return self.by_pulls.rise(number) * self.widened**2
         freedom = None if self.noise.is_known else self.freedom
         return allowed_rise(freedom) * self.widened**2
 
@@ -169,40 +186,51 @@ class Calibration:
         if not lower[number] <= value <= upper[number]:
             return False
         found = held(self.problem, self.best.values, number, value, lower, upper)
-        return found is not None and 2.0 * (found[1] - self.cost) <= self.allowed_rise
+        return found is not None and 2.0 * (found[1] - self.cost) <= self.allowed_rise(name)
 
     @cached_property
     def covariance(self) -> Float[np.ndarray, "k k"]:
         """Covariance of the constants, in a straight-line view of the model.
 
-        Infinite where nothing measured depends on a constant, or nothing tells the noise. For
-        objectives that are no likelihood, and nowhere else, from how unlike the pulls are (Huber's
-        sandwich by pulls).
+        By rows; wider for constants about which whole pulls differ by more than their rows do
+        (`by_pulls`). For objectives that are no likelihood by pulls alone (Huber's sandwich).
+        Infinite where nothing measured depends on a constant, or nothing tells the noise.
         """
-        if self.problem.objective.is_likelihood and self.tells_no_noise:
-            return np.diag(np.full(len(self.names), np.inf))
-        inverse = _inverse(self.reached.curvature)
-        if self.problem.objective.is_likelihood:
-            return inverse * self.widened**2
-        return self.covariance_by_pulls
+        if not self.problem.objective.is_likelihood:
+            return self.by_pulls.covariance
+        wider = self.by_pulls.wider
+        return self.covariance_by_rows * np.outer(wider, wider)
 
     @cached_property
-    def covariance_by_pulls(self) -> Float[np.ndarray, "k k"]:
-        """Covariance from how unlike the pulls are, whatever the noise of a row (Huber 1967).
+    def covariance_by_rows(self) -> Float[np.ndarray, "k k"]:
+        """Covariance of the constants if all rows were independent of each other."""
+        if self.problem.objective.is_likelihood and self.tells_no_noise:
+            return np.diag(np.full(len(self.names), np.inf))
+        return inverse_of(self.reached.curvature) * self.widened**2
+
+    @cached_property
+    def by_pulls(self) -> ByPulls:
+        """How certain the constants are if whole pulls count, not rows.
 
         What the model misses is much alike within a pull: rows are not worth as much as their
-        number. NaN where there are fewer pulls than constants and one more.
+        number.
         """
-        cost = self.reached
-        pull = self.residuals.pull
-        pulls = np.unique(pull)
-        if len(pulls) <= len(self.names):
-            return np.full((len(self.names),) * 2, np.nan)
-        shares = np.stack([cost.shares[pull == one].sum(axis=0) for one in pulls])
-        inverse = _inverse(cost.curvature)
-        with np.errstate(invalid="ignore"):
-            middle = shares.T @ shares * len(pulls) / (len(pulls) - len(self.names))
-            return inverse @ middle @ inverse
+        residuals = self.residuals
+        return by_pulls(self.reached, residuals.slopes, residuals.pull, self.covariance_by_rows)
+
+    def half_width(self, slopes: Float[np.ndarray, "r k"]) -> Float[np.ndarray, " r"]:
+        """Half the 95 % interval of numbers that depend on the constants by some slopes.
+
+        In a straight-line view of the model; NaN where it has no end.
+        """
+        known = np.isfinite(np.diag(self.covariance))
+        freedom = np.where(self.by_pulls.wider > 1.0, self.by_pulls.pulls - 1, max(self.freedom, 1))
+        times = t.ppf(0.5 + 0.5 * LEVEL, freedom)[known]
+        covariance = self.covariance[np.ix_(known, known)] * np.outer(times, times)
+        variance = np.einsum("ri,ij,rj->r", slopes[:, known], covariance, slopes[:, known])
+        # A constant that is not known at all only matters where the model depends on it.
+        variance[slopes[:, ~known].any(axis=1)] = np.nan
+        return np.sqrt(np.maximum(variance, 0.0))
 
     @property
     def deviations(self) -> dict[str, float]:
@@ -216,17 +244,17 @@ class Calibration:
         size = np.where(np.isfinite(size), size, np.nan)
         return self.covariance / np.outer(size, size)
 
+    def __repr__(self) -> str:
+        """Return the constants with their intervals, the errors and the diagnosis on few lines."""
+        from notchflex.fit.summary import summary
 
-def _inverse(curvature: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
-    """The inverse; infinite for what has no curvature at all."""
-    known = np.diag(curvature) > 0.0
-    found = np.diag(np.where(known, 0.0, np.inf))
-    plain = unit_free(curvature[np.ix_(known, known)])
-    values, vectors = np.linalg.eigh(plain.curvature)
-    # What rounding makes of no curvature at all is a very wide interval, not a narrow one.
-    own = (vectors / np.maximum(values, 1e-15)) @ vectors.T
-    found[np.ix_(known, known)] = own / np.outer(plain.size, plain.size)
-    return found
+        return summary(self)
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        from html import escape
+
+        return f"<pre>{escape(repr(self))}</pre>"
 
 
 __all__ = ["Calibration"]

@@ -31,4 +31,16 @@ def unit_free(curvature: Float[np.ndarray, "k k"]) -> UnitFree:
     return UnitFree(size, curvature / np.outer(size, size))
 
 
-__all__ = ["UnitFree", "unit_free"]
+def inverse_of(curvature: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
+    """Return the inverse of a curvature; infinite for what has no curvature at all."""
+    known = np.diag(curvature) > 0.0
+    found = np.diag(np.where(known, 0.0, np.inf))
+    plain = unit_free(curvature[np.ix_(known, known)])
+    values, vectors = np.linalg.eigh(plain.curvature)
+    # What rounding makes of no curvature at all is a very wide interval, not a narrow one.
+    own = (vectors / np.maximum(values, 1e-15)) @ vectors.T
+    found[np.ix_(known, known)] = own / np.outer(plain.size, plain.size)
+    return found
+
+
+__all__ = ["UnitFree", "inverse_of", "unit_free"]

@@ -9,13 +9,13 @@ import numpy as np
 
 from notchflex import __version__
 from notchflex.fit.calibration import Calibration
+from notchflex.fit.diagnosis import diagnose
 from notchflex.fit.errors_of_parts import edge, errors_of_parts
 from notchflex.fit.folds import LeftOut
 from notchflex.fit.measurements import OBSERVED
 from notchflex.fit.next_measurement import NextMeasurement
 from notchflex.fit.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
 from notchflex.fit.posterior import Posterior
-from notchflex.fit.verdict import verdict
 from notchflex.results.json import plain
 from notchflex.results.quantities import QUANTITIES
 from notchflex.robot.robot import to_table
@@ -31,8 +31,10 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         found: The fit.
 
     Returns:
-        `converged`, `reason`, `objective`, `cost`, `reduced_chi_squared`, `constants` (each with
-        value, unit, 95 % interval, standard deviations, limits), `correlation`, `verdict`, `noise`,
+        `converged`, `reason`, `objective`, `cost`, `numbers_measured` (`numbers_counted` without
+        totals that are sums of the notches), `reduced_chi_squared`, `constants` (each with value,
+        unit, 95 % interval and whether it is by rows or by whole pulls, standard deviations,
+        limits), `correlation`, `verdict` (the sentences of `diagnose`), `noise`,
         `errors` (root mean squares of every notch, beside the repeats), `searches`, `solves` (rows
         that were solved) and `robots` (their data, and their descriptions with the constants that
         were found). Constants are in the units of the robot file; None stands where there is no
@@ -50,12 +52,13 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         "cost": found.cost,
         "cost_unit": _UNIT_OF_COST.get(type(objective), ""),
         "numbers_measured": len(found.residuals),
+        "numbers_counted": found.counted,
         "degrees_of_freedom": found.freedom,
         "reduced_chi_squared": _finite(found.reduced_chi_squared),
         "intervals_widened_by": found.widened,
         "constants": _constants(found),
         "correlation": [[_finite(one) for one in row] for row in found.correlation],
-        "verdict": list(verdict(found)),
+        "verdict": list(diagnose(found)),
         "noise": _noise(found),
         "errors": [
             {
@@ -207,7 +210,8 @@ def _head() -> dict[str, Any]:
 
 
 def _constants(found: Calibration) -> list[dict[str, Any]]:
-    by_pulls = np.sqrt(np.diag(found.covariance_by_pulls))
+    by_pulls = np.sqrt(np.diag(found.by_pulls.covariance))
+    by_rows = np.sqrt(np.diag(found.covariance_by_rows))
     rows: list[dict[str, Any]] = []
     for number, unknown in enumerate(found.problem.unknowns):
         interval = found.intervals.get(unknown.name)
@@ -221,6 +225,9 @@ def _constants(found: Calibration) -> list[dict[str, Any]]:
                 "interval_reason": "" if interval is None else interval.reason,
                 "standard_deviation": _finite(found.deviations[unknown.name]),
                 "standard_deviation_by_pulls": _finite(by_pulls[number]),
+                "standard_deviation_by_rows": _finite(by_rows[number]),
+                "interval_by": "pulls" if found.by_pulls.wider[number] > 1.0 else "rows",
+                "pulls": int(found.by_pulls.pulls[number]),
                 "before": unknown.start,
                 "limits": [_finite(unknown.lower), _finite(unknown.upper)],
                 "prior": None if unknown.prior is None else list(unknown.prior),

@@ -64,9 +64,9 @@ def calibrate(
 
     Example:
         >>> from notchflex import load_robot, pull
-        >>> from notchflex.fit import synthetic
+        >>> from notchflex.fit import simulate_measurements
         >>> wrist = load_robot("pacheco2021-a")
-        >>> seen = synthetic(
+        >>> seen = simulate_measurements(
         ...     wrist, pull(0.2, 1.4, steps=7), deviation={"notch_angle": 0.01}, seed=1
         ... )
         >>> found = calibrate(wrist, seen, "friction.coefficient", starts=1)
@@ -203,7 +203,7 @@ def _intervals(found: Calibration, progress: Progress | None) -> dict[str, Inter
             number,
             problem.lower,
             problem.upper,
-            rise=found.allowed_rise,
+            rise=found.allowed_rise(unknown.name),
             scale=unknown.scale,
         )
         if progress is not None:

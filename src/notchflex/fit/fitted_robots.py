@@ -106,7 +106,10 @@ def _trust(found: Calibration, unknown: Unknown) -> str:
         ends = f"{low:.5g} to {high:.5g}"
     else:
         ends = f"at most {high:.5g}" if low is None else f"at least {low:.5g}"
-    return f"{ends} {unit}".strip() + " (95 %)"
+    number = found.names.index(unknown.name)
+    pulls = int(found.by_pulls.pulls[number])
+    by_pulls = f", by {pulls} whole pulls" if found.by_pulls.wider[number] > 1.0 else ""
+    return f"{ends} {unit}".strip() + f" (95 %{by_pulls})"
 
 
 def _text(target: Path) -> str | None:

@@ -77,11 +77,11 @@ def leave_out(
 
     Example:
         >>> from notchflex import load_robot, pull
-        >>> from notchflex.fit import calibrate, synthetic
+        >>> from notchflex.fit import calibrate, simulate_measurements
         >>> wrist = load_robot("pacheco2021-a")
         >>> noise = {"notch_angle": 0.01}
         >>> seen = [
-        ...     synthetic(wrist, pull(0.2, 1.4, steps=7), deviation=noise, seed=seed)
+        ...     simulate_measurements(wrist, pull(0.2, 1.4, steps=7), deviation=noise, seed=seed)
         ...     for seed in (1, 2)
         ... ]
         >>> found = calibrate(wrist, seen, "friction.coefficient", starts=1, intervals=False)

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
 from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
+from notchflex.fit.loading_order import branches, commands_of
 from notchflex.statics import LoadPath
 
 OBSERVED = (
@@ -45,6 +47,8 @@ class Measurements:
             (m,).
         measured_tension: Tensions as they were measured, N, (P, t); those of `load` if left out.
         ignored: Columns of the file that were not used.
+        order: How the order of the rows was understood, where neither the file nor the caller says
+            whether they are from rest; "" where there is nothing to say.
 
     Raises:
         InputError: Shapes that do not fit each other, numbers that are not finite, a standard
@@ -68,6 +72,7 @@ class Measurements:
     axis_at: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     measured_tension: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     ignored: tuple[str, ...] = ()
+    order: str = ""
 
     def __post_init__(self) -> None:
         """Check everything, and bring it to arrays of floats."""
@@ -157,6 +162,11 @@ class Measurements:
         return tuple(dict.fromkeys(self.pull))
 
     @property
+    def branches(self) -> Int[np.ndarray, " p"]:
+        """Loading rows (1) and unloading rows (-1) by the order of the rows in their pull, (P,)."""
+        return branches(commands_of(self.measured_tension, self.load.stroke), self.pull)
+
+    @property
     def negative_forces(self) -> int:
         """Number of rows with a negative force: the offset of a sensor, 0 N in the model."""
         return int((self.measured_tension < 0.0).any(axis=1).sum())
@@ -182,12 +192,7 @@ class Measurements:
             raise InputError(f"no row of {self.source} is left; take at least one")
         return replace(
             self,
-            load=replace(
-                self.load,
-                tension=self.load.tension[which],
-                stroke=self.load.stroke[which],
-                external=tuple(self.load.external[row] for row in which),
-            ),
+            load=rows_of(self.load, which),
             pull=tuple(self.pull[row] for row in which),
             observed={name: value[which] for name, value in self.observed.items()},
             deviation={name: value[which] for name, value in self.deviation.items()},
@@ -208,6 +213,13 @@ class Measurements:
         return self.taken([label in labels for label in self.pull])
 
 
+def rows_of(load: LoadPath, rows: Sequence[int] | NDArray[np.intp]) -> LoadPath:
+    """Return some of the steps of a load path, by their numbers from 0."""
+    which = np.asarray(rows)
+    external = tuple(load.external[row] for row in which)
+    return LoadPath(load.tension[which], load.stroke[which], load.base_rotation, external)
+
+
 def _checked(value: Any, name: str, rows: int) -> NDArray[np.float64]:
     axes = {"total_angle": 1, "axis_points": 3}
     if name not in OBSERVED:
@@ -226,4 +238,4 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-__all__ = ["OBSERVED", "Measurements"]
+__all__ = ["OBSERVED", "Measurements", "rows_of"]

@@ -22,6 +22,7 @@ from notchflex.fit.columns import (
     numbered,
     places_on_axis,
 )
+from notchflex.fit.loading_order import Order, commands_of, loading_order
 from notchflex.fit.measurements import Measurements
 from notchflex.results.csv_reading import Table, no_tendon_column, read_table, tendon_columns
 from notchflex.results.quantities import AXES
@@ -45,14 +46,17 @@ def read_measurements(
         source: Path of the file.
         robot: The robot that was measured.
         from_rest: True if every row is a pull from rest, False if the rows of each pull are one
-            path with memory of friction; None for what the file says (its column `from_rest`), and
-            True where it says nothing.
+            path with friction history; None for what the file says (its column `from_rest`), and
+            where it says nothing for what the order of the rows says: a force or displacement that
+            falls step by step is unloading, one that falls at once to where it began is the next
+            pull from rest. `Measurements.order` holds what was understood.
 
     Returns:
         The measurements, in the order of the file.
 
     Raises:
-        InputError: The file cannot be used; one sentence names it, and line and column.
+        InputError: The file cannot be used, or the order of its rows can be understood in two ways;
+            one sentence names it, and line and column.
 
     Example:
         >>> from pathlib import Path
@@ -68,19 +72,48 @@ def read_measurements(
     tension, stroke = _commanded(table, robot, taken)
     observed, deviation, axis_at = _observed(table, robot, taken)
     base_rotation = _base_rotation(table, taken)
-    labels = next((table.texts(name) for name in PULL if name in table.header), None)
-    taken.update([next((name for name in PULL if name in table.header), PULL[0])])
-    told = _from_rest(table, taken)
+    column = next((name for name in PULL if name in table.header), None)
+    labels = None if column is None else table.texts(column)
+    taken.update([column or ""])
+    said = _from_rest(table, taken)
+    said = said if from_rest is None else from_rest
+    order = _order(table, tension, stroke, labels, said)
     return Measurements(
         source=table.name,
         load=LoadPath(np.maximum(tension, 0.0), stroke, base_rotation, external),
-        pull=("1",) * len(table) if labels is None else labels,
-        from_rest=told if from_rest is None else from_rest,
+        pull=order.pull,
+        from_rest=order.from_rest,
         observed=observed,
         deviation=deviation,
         axis_at=axis_at,
         measured_tension=tension,
         ignored=tuple(column for column in table.header if column not in taken),
+        order=order.words,
+    )
+
+
+def _order(
+    table: Table,
+    tension: NDArray[np.float64],
+    stroke: NDArray[np.float64],
+    labels: tuple[str, ...] | None,
+    said: bool | None,
+) -> Order:
+    """Which pull every row belongs to, and whether it was loaded from rest."""
+    if said is False:
+        return Order(False, ("1",) * len(table) if labels is None else labels)
+    order = loading_order(commands_of(tension, stroke), labels, len(table))
+    if said:
+        return Order(True, order.pull)
+    if order.unclear is None:
+        return order
+    row, name, top, bottom = order.unclear
+    raise InputError(
+        f"{table.at(row)}: the {name} falls from {top:g} to {bottom:g} neither step by step nor "
+        "to where the pull began, so the order of the rows does not tell how the robot was loaded. "
+        "Say so: --from-rest (a column from_rest "
+        "of 1) if every row was loaded from rest, --path (0) if the rows of each pull are one "
+        "loading path; a column trial separates pulls."
     )
 
 
@@ -289,10 +322,11 @@ def _base_rotation(table: Table, taken: set[str]) -> NDArray[np.float64]:
     return np.radians(turned[0])
 
 
-def _from_rest(table: Table, taken: set[str]) -> bool:
+def _from_rest(table: Table, taken: set[str]) -> bool | None:
+    """What the file says; None where it says nothing."""
     flags = _flags(table, FROM_REST, taken)
     if flags is None:
-        return True
+        return None
     if len(set(flags)) > 1:
         row = flags.index(not flags[0])
         raise InputError(

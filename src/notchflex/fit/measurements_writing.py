@@ -30,8 +30,8 @@ from notchflex.statics import BodyForce
 def write_measurements(measurements: Measurements, target: str | Path) -> None:
     """Write measurements as a CSV, whole or not at all.
 
-    Angles are written in degrees. Those that were read from a file, or made by `synthetic`, read
-    back as the very same numbers; any other to its last digit.
+    Angles are written in degrees. Those that were read from a file, or made by
+    `simulate_measurements`, read back as the very same numbers; any other to its last digit.
 
     Args:
         measurements: What to write.

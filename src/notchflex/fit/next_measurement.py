@@ -15,9 +15,9 @@ from jaxtyping import Float
 
 from notchflex.errors import InputError
 from notchflex.fit.calibration import Calibration
-from notchflex.fit.measurements import OBSERVED, Measurements
+from notchflex.fit.measurements import OBSERVED, Measurements, rows_of
 from notchflex.fit.samples import Samples
-from notchflex.fit.synthetic import modelled
+from notchflex.fit.simulated import modelled
 from notchflex.statics import Load, LoadPath, solve_each
 from notchflex.statics.load import load_path
 
@@ -87,9 +87,11 @@ def next_measurement(
 
     Example:
         >>> from notchflex import load_robot, pull
-        >>> from notchflex.fit import calibrate, synthetic
+        >>> from notchflex.fit import calibrate, simulate_measurements
         >>> wrist = load_robot("pacheco2021-a")
-        >>> seen = synthetic(wrist, pull(0.1, 0.5, steps=5), deviation={"notch_angle": 0.01})
+        >>> seen = simulate_measurements(
+        ...     wrist, pull(0.1, 0.5, steps=5), deviation={"notch_angle": 0.01}
+        ... )
         >>> found = calibrate(wrist, seen, "friction.coefficient", starts=1, intervals=False)
         >>> next_measurement(found, pull(0.2, 1.2, steps=6)).best
         5
@@ -160,12 +162,7 @@ def _slopes(
         return
     rows = Measurements(
         "candidates",
-        LoadPath(
-            loads.tension[able],
-            loads.stroke[able],
-            loads.base_rotation,
-            tuple(loads.external[step] for step in able),
-        ),
+        rows_of(loads, able),
         tuple(str(step) for step in able),
         True,
         {name: one[able] for name, one in modelled(model, observed, axis_at).items()},

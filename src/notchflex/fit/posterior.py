@@ -59,7 +59,7 @@ class Posterior:
         return {name: (lower, upper) for name, lower, upper in every}
 
 
-def posterior(
+def sample_posterior(
     found: Calibration,
     *,
     draws: int = 500,
@@ -72,7 +72,8 @@ def posterior(
 
     Every value within the constants' limits is taken for equally probable beforehand, but for
     their priors. Where the model misses more than noise explains, the misfit counts less, as it
-    does in the fit's intervals.
+    does in the fit's intervals; where whole pulls differ by more than their rows do, the draws are
+    spread about the fit by as much (the adjustment of Shaby 2014).
 
     Args:
         found: A fit by `LeastSquares`.
@@ -114,7 +115,7 @@ def posterior(
         key = jax.random.PRNGKey(seed + chain)
         start = 0.5 * jax.random.normal(key, (len(found.names),))
         sampler.run(key, init_params=start, extra_fields=("diverging",))
-        every.append(np.stack([target.values(np.asarray(one)) for one in sampler.get_samples()]))
+        every.append(np.stack([target.spread(np.asarray(one)) for one in sampler.get_samples()]))
         divergent += int(np.sum(sampler.get_extra_fields()["diverging"]))
         if progress is not None:
             progress("drawing", chain + 1, chains)
@@ -139,7 +140,8 @@ class _Target:
                 "nothing tells the noise: as many constants were fitted as numbers measured; "
                 "measure more, or give standard deviations"
             )
-        covariance = found.covariance
+        covariance = found.covariance_by_rows
+        self._wider = found.by_pulls.wider
         if not np.isfinite(covariance).all():
             raise InputError("the data cannot tell some of the constants; fit only the others")
         self._problem, self._best = found.problem, found.best.values
@@ -165,6 +167,11 @@ class _Target:
         """Constants at a place of the sampler."""
         return self._best + self._spread @ place
 
+    def spread(self, place: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Constants of a draw, farther from the fit where whole pulls say so."""
+        values = self._best + self._wider * (self._spread @ place)
+        return np.clip(values, self._problem.lower, self._problem.upper)
+
     def _at(self, place: np.ndarray) -> np.ndarray:
         values = self.values(np.asarray(place, float))
         inside = (values >= self._problem.lower).all() and (values <= self._problem.upper).all()
@@ -174,4 +181,4 @@ class _Target:
         return np.concatenate([[cost.value], self._spread.T @ cost.gradient]) / self._temper
 
 
-__all__ = ["LEAST_DRAWS", "Posterior", "posterior"]
+__all__ = ["LEAST_DRAWS", "Posterior", "sample_posterior"]

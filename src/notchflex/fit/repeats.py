@@ -8,13 +8,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex.fit.loading_order import TURN, turning_points
 from notchflex.fit.measurements import Measurements
 
 # The sensor's step where none is told, as a part of what a command ranges over.
 _STEP = 1e-3
-# A command that goes back by less than this part of its range has not turned: noise of a sensor.
-# Pulls whose turning points differ by less have the same history.
-_TURN = 0.02
 
 Numbers = NDArray[np.float64]
 
@@ -88,24 +86,6 @@ def repeats_of_each(measurements: Measurements, *, step: float | None = None) ->
     return found
 
 
-def gone_back(measurements: Measurements) -> tuple[str, ...]:
-    """Pulls in which a command rises and then falls: the way back of what loads a robot.
-
-    Returns:
-        Their labels; not those of pulls whose rows come in no order.
-    """
-    commands = _commands(measurements)
-    reach = np.ptp(commands, axis=0)
-    found: dict[str, None] = {}
-    for label in measurements.pulls:
-        rows = [row for row, pull in enumerate(measurements.pull) if pull == label]
-        for column in np.flatnonzero(reach > 0.0):
-            points = _turning_points(commands[rows, column], _TURN * reach[column])
-            if len(points) == 1 and points[0] < len(rows) - 2:
-                found[label] = None
-    return tuple(found)
-
-
 def _root_mean_square(values: Numbers) -> float:
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
@@ -144,7 +124,7 @@ def _histories(measurements: Measurements, commands: Numbers) -> list[Hashable]:
         for label in measurements.pulls:
             rows = [row for row, pull in enumerate(measurements.pull) if pull == label]
             values = commands[rows, column]
-            points = _turning_points(values, _TURN * reach[column])
+            points = turning_points(values, TURN * reach[column])
             for place, row in enumerate(rows):
                 turned[row] += [(int(column), values[p]) for p in points if p < place]
                 rising = _rises(values, points, place)
@@ -152,7 +132,7 @@ def _histories(measurements: Measurements, commands: Numbers) -> list[Hashable]:
     histories: list[Hashable] = []
     known: list[list[tuple[int, float]]] = []
     for way in turned:
-        alike = (n for n, other in enumerate(known) if _alike(way, other, _TURN * reach))
+        alike = (n for n, other in enumerate(known) if _alike(way, other, TURN * reach))
         number = next(alike, len(known))
         if number == len(known):
             known.append(way)
@@ -167,21 +147,6 @@ def _alike(first: list[tuple[int, float]], second: list[tuple[int, float]], near
         mine == its or abs(mine - its) <= near[column]
         for (column, mine), (_, its) in zip(first, second, strict=True)
     )
-
-
-def _turning_points(values: Numbers, least: float) -> list[int]:
-    """Where a command turns back by more than `least`; the first rise is no turn, from rest."""
-    points: list[int] = []
-    way, farthest = 1.0, 0  # rising, and the farthest row that way since the last turn
-    for place, value in enumerate(values):
-        gone = way * (value - values[farthest])
-        if gone > 0.0:
-            farthest = place
-        elif gone < -least:
-            if farthest > 0:
-                points.append(farthest)
-            way, farthest = -way, place
-    return points
 
 
 def _rises(values: Numbers, points: list[int], place: int) -> bool:

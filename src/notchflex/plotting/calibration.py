@@ -44,7 +44,7 @@ def calibration_picture(found: Calibration) -> Picture:
 
     Robot by robot every notch and what else was measured over the load: measured points are open
     markers, the line is the model with the constants that were found, and its band is where the
-    model lies with 95 % by the covariance of the constants, in a straight-line view. Then the
+    model lies with 95 % as the constants do, in a straight-line view. Then the
     residuals of all notches, over the noise, the profile likelihood of every constant with the line
     that ends its 95 % interval, and the correlations of the constants.
 
@@ -71,7 +71,7 @@ def calibration_picture(found: Calibration) -> Picture:
         for index, panel in enumerate(panels)
     ]
     rows = math.ceil(len(panels) / columns)
-    title = f"{', '.join(found.given)}: {len(found.residuals)} numbers measured"
+    title = f"{', '.join(found.given)}: {found.counted} numbers"
     return Picture(title, 3.0 * columns, 2.6 * rows + 0.4, cells, _legend(found, panels))
 
 

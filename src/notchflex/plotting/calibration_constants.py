@@ -28,11 +28,9 @@ END = "end of the interval"
 
 def profile_panel(found: Calibration, name: str) -> Panel:
     """Return by how much twice the misfit rises where one constant is held, all others at best."""
-    from notchflex.fit.intervals import allowed_rise
-
     interval = found.intervals[name]
     value, rise = interval.profile.T
-    line = allowed_rise(None if found.noise.is_known else found.freedom) * found.widened**2
+    line = found.allowed_rise(name)
     items: list[Item] = [
         Level(line, GREY, DOTTED, 1.2),
         Line(_smooth(value, rise, found.values[name]), BLUE),

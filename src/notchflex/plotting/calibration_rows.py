@@ -98,8 +98,11 @@ def band(polygons: Sequence[NDArray[np.float64]], name: str = "") -> Area:
 
 
 def residual_panel(found: Calibration, label: str) -> Panel:
-    """Return what is left of every number of a robot over its noise; notches by colour."""
-    own, angles = _own(found, label)
+    """Return what is left of every number of a robot over its noise; notches by colour.
+
+    A total angle that is the sum of the notches has no noise of its own and is not drawn.
+    """
+    own, angles = (one & np.isfinite(found.noise.deviation) for one in _own(found, label))
     notch = found.residuals.part
     points = np.stack(
         [_abscissa(found, label)[0], found.residuals.values / found.noise.deviation], axis=1
@@ -161,7 +164,7 @@ def _lines(found: Calibration, part: Part) -> list[_Line]:
         & (residuals.part == part.component)
     )
     x = _abscissa(found, part.label)[0]
-    half = _half_width(found)
+    half = found.half_width(found.residuals.slopes)
     lines: list[_Line] = []
     for number in np.unique(residuals.sample[own]):
         measured = found.problem.samples.every[number].measured
@@ -177,29 +180,11 @@ def _lines(found: Calibration, part: Part) -> list[_Line]:
     return lines
 
 
-def _half_width(found: Calibration) -> NDArray[np.float64]:
-    """Half the 95 % band of the model at every residual; NaN where it has no end."""
-    from scipy.stats import t
-
-    slopes = found.residuals.slopes
-    known = np.isfinite(np.diag(found.covariance))
-    covariance = found.covariance[np.ix_(known, known)]
-    variance = np.einsum("ri,ij,rj->r", slopes[:, known], covariance, slopes[:, known])
-    # A constant that is not known at all only matters where the model depends on it.
-    variance[slopes[:, ~known].any(axis=1)] = np.nan
-    return float(t.ppf(0.975, max(found.freedom, 1))) * np.sqrt(np.maximum(variance, 0.0))
-
-
 def _model(
     found: Calibration, rows: NDArray[np.intp], part: Part, measured: Any
 ) -> NDArray[np.float64]:
     """The model's number at some residuals: what was measured, and what the model is more."""
     table = measured.observed[part.quantity]
-    if part.quantity == "tip_position":  # residuals are in the frame of the base
-        from notchflex._jax import constant
-        from notchflex.motion import rotation_about
-
-        table = table @ np.asarray(rotation_about(constant(measured.load.base_rotation)))
     seen = table.reshape(len(table), -1)[found.residuals.row[rows], part.component]
     return seen + found.residuals.values[rows]
 

@@ -91,13 +91,16 @@ def comparison_picture(
         for index, panel in enumerate(panels)
     ]
     title = f"{comparison.robot.name}: {_title(models)}"
-    legend = _legend(models, comparison.measured.trial)
+    legend = _legend(models, comparison.measured.pull)
     return Picture(title, 2.9 * columns, 2.7 * rows, cells, legend)
 
 
 def _title(models: Mapping[str, Comparison]) -> str:
     one = next(iter(models.values()))
-    return f"tip {one.tip_rmse:.2f} mm rms over {one.points} points"
+    error = f"tip {one.tip_rmse:.2f} mm"
+    if math.isnan(one.tip_rmse):
+        error = f"total {one.rmse_total * DEGREES:.2f}°"
+    return f"{error} rms over {one.points} points"
 
 
 def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> Iterator[Panel]:
@@ -105,7 +108,7 @@ def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> I
     measured = comparison.measured
     x, x_label = _abscissa(comparison)
     for title, given, pick, rmse in _angles(comparison):
-        items: list[Item] = list(_points(x, given * DEGREES, measured.trial))
+        items: list[Item] = list(_points(x, given * DEGREES, measured.pull))
         for (label, one), colour, dash in zip(
             models.items(), MODEL_COLOURS * 9, MODEL_LINES * 9, strict=False
         ):
@@ -126,34 +129,43 @@ def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> I
 
 def _angles(comparison: Comparison) -> Iterator[tuple[str, NDArray[np.float64], Any, float]]:
     """Yield title, measured values, a picker of the model's values, and the error of each panel."""
-    measured = comparison.measured
     for notch in range(comparison.robot.number_of_notches):
+        seen = comparison.measured_notch_angle[:, notch]
+        if np.isnan(seen).all():
+            continue
 
         def pick(one: Comparison, notch: int = notch) -> NDArray[np.float64]:
             return one.notch_angle[:, notch]
 
-        error = float(comparison.rmse_notches[notch])
-        yield f"notch {notch + 1}", measured.notch_angle[:, notch], pick, error
-    yield "total", measured.total_angle, lambda one: one.total_angle, comparison.rmse_total
+        yield f"notch {notch + 1}", seen, pick, float(comparison.rmse_notches[notch])
+    seen = comparison.measured_total_angle
+    if not np.isnan(seen).all():
+        yield "total", seen, lambda one: one.total_angle, comparison.rmse_total
 
 
 def _abscissa(comparison: Comparison) -> tuple[NDArray[np.float64], str]:
-    """Return what was done to the first tendon that was measured, and the label of its axis."""
+    """Return what was done to the first tendon that was measured, and the label of its axis.
+
+    The row where tendons hang slack or are driven by force in some rows and by stroke in others.
+    """
     measured = comparison.measured
-    for name, values in (("tension", measured.tension), ("stroke", measured.stroke)):
-        there = ~np.isnan(values).all(axis=0)
+    for name, values in (
+        ("tension", measured.measured_tension),
+        ("stroke", measured.load.stroke),
+    ):
+        there = ~np.isnan(values).any(axis=0)
         if there.any():
             return values[:, int(np.argmax(there))], QUANTITIES[name].label
-    raise AssertionError("a measurement has a tension or a stroke")
+    return np.arange(1.0, len(measured) + 1.0), "row of the table"
 
 
 def _lines(comparison: Comparison, x: NDArray[np.float64]) -> list[NDArray[np.intp]]:
     """Return the points of each line of the model: all by load from rest, or trial by trial."""
     good = np.flatnonzero(comparison.converged)
-    if comparison.from_rest:
+    if comparison.measured.from_rest:
         return [good[np.argsort(x[good], kind="stable")]]
-    trial = np.array(comparison.measured.trial)
-    return [good[trial[good] == label] for label in dict.fromkeys(comparison.measured.trial)]
+    trial = np.array(comparison.measured.pull)
+    return [good[trial[good] == label] for label in comparison.measured.pulls]
 
 
 def _points(
@@ -161,7 +173,7 @@ def _points(
 ) -> Iterator[Line]:
     labels = np.array(trial)
     for index, label in enumerate(dict.fromkeys(trial)):
-        there = labels == label
+        there = (labels == label) & np.isfinite(y)
         yield Line(
             np.stack([x[there], y[there]], axis=1),
             GREY,
@@ -180,15 +192,17 @@ def _trial_name(label: str, trial: tuple[str, ...]) -> str:
 
 def _centre_lines(comparison: Comparison) -> Panel:
     """Measured and computed centre lines at some points of the longest trial."""
-    measured, robot = comparison.measured, comparison.robot
+    robot = comparison.robot
     view = np.radians(robot.notches[0].direction_deg)
     points = _telling_points(comparison)
     items: list[Item] = [] if points else [Note("no point was solved")]
     for angles, dash, width in (
         (comparison.notch_angle, SOLID, 1.4),
-        (measured.notch_angle, DOTTED, 2.4),
+        (comparison.measured_notch_angle, DOTTED, 2.4),
     ):
         for row, colour in zip(angles[points], sequence_colours(len(points)), strict=True):
+            if np.isnan(row).any():
+                continue
             line = outline(bent_by_angles(robot, row), view).centre_line
             items.append(Line(line, colour, dash, width))
             if dash:
@@ -204,29 +218,29 @@ def _centre_lines(comparison: Comparison) -> Panel:
 
 def _telling_points(comparison: Comparison) -> list[int]:
     """Return points of the longest trial, evenly spread in total angle."""
-    trial = np.array(comparison.measured.trial)
-    longest = max(
-        dict.fromkeys(comparison.measured.trial), key=lambda label: (trial == label).sum()
-    )
+    trial = np.array(comparison.measured.pull)
+    longest = max(comparison.measured.pulls, key=lambda label: (trial == label).sum())
     candidates = np.flatnonzero((trial == longest) & comparison.converged)
     if not len(candidates):
         return []
-    angle = comparison.measured.total_angle[candidates]
+    angle = comparison.total_angle[candidates]
     wanted = np.linspace(angle.min(), angle.max(), SHAPES)
     nearest = (int(candidates[np.argmin(np.abs(angle - goal))]) for goal in wanted)
     return list(dict.fromkeys(nearest))
 
 
 def _errors(models: Mapping[str, Comparison]) -> Panel:
-    """The tip error of every model as a bar, with its number."""
-    values = [one.tip_rmse for one in models.values()]
+    """The tip error of every model as a bar, or that of the total angle where no tip is known."""
+    tip = [one.tip_rmse for one in models.values()]
+    no_tip = bool(np.isnan(tip).all())
+    values = [one.rmse_total * DEGREES for one in models.values()] if no_tip else tip
     colours = [MODEL_COLOURS[index % 5] for index in range(len(values))]
     most = 1.2 * max((value for value in values if value > 0.0), default=1.0)
     return Panel(
         [Bars(values, list(models), colours)],
-        "tip error [mm]",
+        f"total angle error [{QUANTITIES['total_angle'].unit}]" if no_tip else "tip error [mm]",
         "",
-        title="tip error, rms",
+        title="error of the total angle, rms" if no_tip else "tip error, rms",
         x_range=(0.0, most),
     )
 

@@ -1,7 +1,8 @@
 """Tables of numbers from CSV files: read line by line, refused with the line and the column.
 
 A table is UTF-8 with commas and its header first; empty lines and lines that start with `#` are
-skipped. What stands in the columns is said by whoever asks for them.
+skipped. Semicolons between the columns, as spreadsheets write them where numbers have a decimal
+comma, are read too. What stands in the columns is said by whoever asks for them.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import csv
 import math
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +24,8 @@ from notchflex.results.quantities import QUANTITIES
 LARGEST = 1e6
 """Nothing that was measured (N, mm, deg, g) is larger; a slip of the keyboard is."""
 
+_DECIMAL = re.compile(r"[-+]?\d*([.,])\d+(?:[eE][-+]?\d+)?")
+
 
 @dataclass(frozen=True)
 class Table:
@@ -32,12 +36,14 @@ class Table:
         header: Names of the columns.
         lines: Line of the file that each row stands in.
         rows: Entries of each row, as many as columns, without spaces around them.
+        decimal: What separates the decimals of its numbers, a point or a comma.
     """
 
     name: str
     header: tuple[str, ...]
     lines: tuple[int, ...]
     rows: tuple[tuple[str, ...], ...]
+    decimal: str = "."
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -59,7 +65,9 @@ class Table:
         """
         return np.array(
             [
-                math.nan if may_miss and not text else _number(text, column, line, self.name)
+                math.nan
+                if may_miss and not text
+                else _number(text, column, line, self.name, self.decimal)
                 for text, line in zip(self.texts(column), self.lines, strict=True)
             ]
         )
@@ -100,9 +108,10 @@ def read_table(source: str | os.PathLike[str]) -> Table:
     except (OSError, ValueError) as problem:
         words = getattr(problem, "strerror", None) or str(problem)
         raise InputError(f"{path} cannot be read: {words}.") from None
+    separator = _separator(text)
     table: list[tuple[int, tuple[str, ...]]] = []
     try:
-        reader = csv.reader(text.splitlines(), strict=True)
+        reader = csv.reader(text.splitlines(), strict=True, delimiter=separator)
         for row in reader:
             if any(field.strip() for field in row) and not row[0].lstrip().startswith("#"):
                 table.append((reader.line_num, tuple(field.strip() for field in row)))
@@ -111,12 +120,10 @@ def read_table(source: str | os.PathLike[str]) -> Table:
     if not table:
         raise InputError(f"{path} is empty; it needs a header and at least one row of numbers.")
     (_, header), *body = table
-    separators = {";": "semicolons", "\t": "tabs"}
-    found = [word for mark, word in separators.items() if mark in header[0]]
-    if len(header) == 1 and found:
+    if len(header) == 1 and "\t" in header[0]:
         raise InputError(
-            f"{path}: the columns are separated by {found[0]}; save it with commas between the "
-            "columns and points in the numbers."
+            f"{path}: the columns are separated by tabs; save it with commas between the columns "
+            "and points in the numbers."
         )
     for column in header:
         if column and header.count(column) > 1:
@@ -129,7 +136,37 @@ def read_table(source: str | os.PathLike[str]) -> Table:
                 f"{path}, line {line}: {len(row)} entries for {len(header)} columns; "
                 "every row needs one entry for each column."
             )
-    return Table(str(source), header, tuple(line for line, _ in body), tuple(r for _, r in body))
+    lines, rows = tuple(line for line, _ in body), tuple(row for _, row in body)
+    decimal = "." if separator == "," else _decimal(path, lines, rows)
+    return Table(str(source), header, lines, rows, decimal)
+
+
+def _separator(text: str) -> str:
+    """Return what separates the columns: a semicolon where the header has no comma."""
+    lines = (line for line in text.splitlines() if line.strip(" ;,"))
+    header = next((line for line in lines if not line.lstrip().startswith("#")), "")
+    return ";" if ";" in header and "," not in header else ","
+
+
+def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) -> str:
+    """Return the decimal separator of a table with semicolons, whose numbers may have either.
+
+    Raises:
+        InputError: Some numbers have a comma and others a point: one of them separates thousands.
+    """
+    found: dict[str, tuple[int, str]] = {}
+    for line, row in zip(lines, rows, strict=True):
+        for entry in row:
+            number = _DECIMAL.fullmatch(entry)
+            if number is not None:
+                found.setdefault(number[1], (line, entry))
+    if len(found) == 2:
+        (line, entry), (other_line, other) = sorted(found.values())
+        raise InputError(
+            f"{path}: {entry} in line {line} and {other} in line {other_line} have different "
+            "decimal separators; write all numbers with points, or all with commas."
+        )
+    return next(iter(found), ".")
 
 
 def tendon_columns(header: Sequence[str], quantity: str, tendons: int) -> dict[int, str]:
@@ -160,9 +197,9 @@ def no_tendon_column(table: Table, tendons: int) -> InputError:
     )
 
 
-def _number(text: str, column: str, line: int, name: str) -> float:
+def _number(text: str, column: str, line: int, name: str, decimal: str) -> float:
     try:
-        value = float(text)
+        value = float(text if decimal == "." else text.replace(decimal, ".", 1))
     except ValueError:
         got = repr(text) if text else "nothing"
         raise InputError(f"{name}, line {line}: {column} is {got}; give a number.") from None

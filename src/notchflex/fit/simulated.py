@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
 from notchflex.fit.measurements import OBSERVED, Measurements
+from notchflex.fit.solved_rows import solved_rows
 from notchflex.results.spans import spans_of
 from notchflex.robot import Robot
-from notchflex.statics import Load, LoadPath, axis_points, simulate, solve_each
+from notchflex.statics import Load, LoadPath, axis_points
 from notchflex.statics.load import load_path
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 _ANGLES = ("notch_angle", "total_angle", "tip_rotation")
 
 
-def synthetic(
+def simulate_measurements(
     robot: Robot,
     load: Load | LoadPath | Iterable[Load],
     *,
@@ -55,7 +56,7 @@ def synthetic(
     Example:
         >>> from notchflex import load_robot, pull
         >>> wrist = load_robot("pacheco2021-a")
-        >>> synthetic(wrist, pull(0.2, 1.0, steps=5), deviation={"notch_angle": 0.005})
+        >>> simulate_measurements(wrist, pull(0.2, 1.0, steps=5), deviation={"notch_angle": 0.005})
         <Measurements of synthetic: 5 rows of 1 pull, each from rest; notch_angle; deviations of
         notch_angle>
     """
@@ -75,7 +76,11 @@ def synthetic(
     if len(labels) != len(path):
         raise InputError(f"{len(path)} steps need a label of their pull each; got {len(labels)}")
     random = np.random.default_rng(seed)
-    model = _solved(robot, path, labels, from_rest, tuple(observed), axis_at)
+
+    def read(states: Path) -> dict[str, NDArray[np.float64]]:
+        return modelled(states.raise_if_failed(), observed, axis_at)
+
+    model = solved_rows(robot, path, labels, from_rest, read)
     values: dict[str, NDArray[np.float64]] = {}
     for name, exact in model.items():
         noisy = exact + noise.get(name, 0.0) * random.standard_normal(exact.shape)
@@ -134,28 +139,4 @@ def _tip_tension(path: Path) -> NDArray[np.float64]:
     return path.span_tension[:, np.arange(len(last)), last]
 
 
-def _solved(
-    robot: Robot,
-    path: LoadPath,
-    labels: tuple[str, ...],
-    from_rest: bool,
-    observed: tuple[str, ...],
-    axis_at: ArrayLike,
-) -> dict[str, NDArray[np.float64]]:
-    if from_rest:
-        return modelled(solve_each(robot, path).raise_if_failed(), observed, axis_at)
-    made: dict[str, NDArray[np.float64]] = {}
-    for label in dict.fromkeys(labels):
-        rows = np.flatnonzero([one == label for one in labels])
-        own = LoadPath(
-            path.tension[rows],
-            path.stroke[rows],
-            path.base_rotation,
-            tuple(path.external[row] for row in rows),
-        )
-        for name, part in modelled(
-            simulate(robot, own).raise_if_failed(), observed, axis_at
-        ).items():
-            whole = made.setdefault(name, np.empty((len(path), *part.shape[1:])))
-            whole[rows] = part
-    return made
+__all__ = ["modelled", "rotation_vectors", "simulate_measurements"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.fit import repeats, synthetic
+from notchflex.fit import repeats, simulate_measurements
 from notchflex.statics import axis_points
 
 
@@ -18,7 +18,7 @@ def robot():
 def test_without_noise_it_is_the_model(robot):
     load = nf.pull(0.2, 1.0, steps=3).release()
     names = ("total_angle", "tip_rotation", "tip_tension", "tip_position", "axis_points")
-    data = synthetic(robot, load, observed=names, from_rest=False, axis_at=[3.0, 7.5])
+    data = simulate_measurements(robot, load, observed=names, from_rest=False, axis_at=[3.0, 7.5])
     path = nf.simulate(robot, load)
     seen = data.observed
     np.testing.assert_allclose(seen["total_angle"], path.total_angle, rtol=1e-13)
@@ -36,10 +36,12 @@ def test_each_pull_is_a_path_of_its_own(robot):
     load = nf.pull(0.2, 1.0, steps=3).release()
     twice = load.then(load)
     labels = ["a"] * 6 + ["b"] * 6
-    data = synthetic(robot, twice, observed=["total_angle"], from_rest=False, pull=labels)
+    data = simulate_measurements(
+        robot, twice, observed=["total_angle"], from_rest=False, pull=labels
+    )
     angles = data.observed["total_angle"].reshape(2, 6)
     np.testing.assert_array_equal(angles[0], angles[1])
-    rest = synthetic(robot, twice, observed=["total_angle"], pull=labels)
+    rest = simulate_measurements(robot, twice, observed=["total_angle"], pull=labels)
     angles = rest.observed["total_angle"].reshape(2, 6)
     np.testing.assert_allclose(angles[0], angles[0, ::-1], rtol=1e-12)
 
@@ -47,10 +49,10 @@ def test_each_pull_is_a_path_of_its_own(robot):
 def test_noise(robot):
     load = nf.LoadPath(np.full((400, 1), 0.5), np.full((400, 1), np.nan))
     noise = {"notch_angle": 0.01}
-    data = synthetic(robot, load, deviation=noise, seed=3)
-    again = synthetic(robot, load, deviation=noise, seed=3)
+    data = simulate_measurements(robot, load, deviation=noise, seed=3)
+    again = simulate_measurements(robot, load, deviation=noise, seed=3)
     assert data == again
-    assert data != synthetic(robot, load, deviation=noise, seed=4)
+    assert data != simulate_measurements(robot, load, deviation=noise, seed=4)
     # 5 times 399 degrees of freedom: 1.6 % of the deviation
     assert repeats(data)["notch_angle"] == pytest.approx(0.01, rel=0.06)
     np.testing.assert_allclose(data.deviation["notch_angle"], 0.01)
@@ -68,4 +70,4 @@ def test_noise(robot):
 )
 def test_what_cannot_be_made_is_refused(robot, options, words):
     with pytest.raises(nf.InputError, match=words):
-        synthetic(robot, nf.pull(0.2, 0.5, steps=2), **options)
+        simulate_measurements(robot, nf.pull(0.2, 0.5, steps=2), **options)

@@ -6,21 +6,30 @@ import math
 
 import numpy as np
 
+from notchflex.fit.branch_residuals import (
+    BRANCH_QUANTITIES,
+    branch_difference,
+    branch_words,
+    off_by_row,
+)
 from notchflex.fit.calibration import Calibration
 from notchflex.fit.intervals import NO_SOLUTION, Interval
-from notchflex.fit.repeats import gone_back
 from notchflex.fit.rows import SENSOR
 
 # A half-width of more than this part of the value is loose; constants more alike than that cannot
-# be told apart; pulls that differ by so many times more than their rows say so.
-_LOOSE, _ALIKE, _UNLIKE_PULLS = 0.5, 0.95, 1.5
+# be told apart.
+_LOOSE, _ALIKE = 0.5, 0.95
 # So many standard deviations from its prior a constant and what was known of it disagree.
 _UNLIKE_PRIOR = 3.0
 # As near to a limit as this part of where a search starts from.
 _AT_LIMIT = 1e-6
 
 
-def verdict(found: Calibration) -> tuple[str, ...]:
+NO_PROBLEMS = "No problems found."
+"""What is said where `diagnose` finds nothing."""
+
+
+def diagnose(found: Calibration) -> tuple[str, ...]:
     """What a user should know before trusting the constants, the gravest first.
 
     Args:
@@ -32,13 +41,13 @@ def verdict(found: Calibration) -> tuple[str, ...]:
     said: list[str] = []
     if not found.converged:
         said.append(f"The search did not settle: {found.reason}.")
+    said += _branches(found)
     said += _limits(found)
     said += _far(found)
     for name, interval in found.intervals.items():
         said += _loose(found, name, interval)
     said += _alike(found)
     said += _noise(found)
-    said += _ways_back(found)
     return tuple(said)
 
 
@@ -154,34 +163,33 @@ def _noise(found: Calibration) -> list[str]:
             "deviations): what the fit leaves is taken for it, as if the model were right."
         )
     if found.problem.objective.is_likelihood:
-        by_pulls = np.sqrt(np.diag(found.covariance_by_pulls))
-        by_rows = np.sqrt(np.diag(found.covariance))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            ratio = by_pulls / by_rows
-        wide = [n for n, one in zip(found.names, ratio, strict=True) if one > _UNLIKE_PULLS]
-        if wide:
-            worst = float(np.nanmax(ratio[np.isfinite(ratio)]))
+        wider = found.by_pulls.wider
+        wide = [name for name, one in zip(found.names, wider, strict=True) if one > 1.0]
+        if wide and not found.tells_no_noise:
+            pulls = int(found.by_pulls.pulls.max())
             said.append(
-                f"Pulls differ from each other by more than their rows do: judged by whole pulls, "
-                f"{', '.join(wide)} {'is' if len(wide) == 1 else 'are'} up to {worst:.2g} times "
-                "less certain than the intervals say. More pulls would help more than more rows."
+                f"Residuals within a pull are correlated: judged by whole pulls ({pulls}), "
+                f"{', '.join(wide)} {'is' if len(wide) == 1 else 'are'} up to "
+                f"{float(np.max(wider)):.2g} times less certain than independent rows would say. "
+                f"The {'interval is' if len(wide) == 1 else 'intervals are'} by pulls. More pulls "
+                "would help more than more rows."
             )
     return said
 
 
-def _ways_back(found: Calibration) -> list[str]:
-    """Pulls up and down again that were taken as pulls from rest, where the fit does not speak."""
-    if found.noise.is_known and not found.misses:
-        return []
+def _branches(found: Calibration) -> list[str]:
+    """Tables whose unloading rows the model misses otherwise than their loading rows."""
     said: list[str] = []
-    for sample in found.problem.samples.every:
-        pulls = gone_back(sample.measured) if sample.measured.from_rest else ()
-        if pulls:
-            said.append(
-                f"Pull {pulls[0]} of {sample.measured.source} goes up and down again, and each row "
-                "is taken as a pull from rest. If it was one way, say so: --path, or from_rest 0."
-            )
+    for number, sample in enumerate(found.problem.samples.every):
+        measured = sample.measured
+        for name in BRANCH_QUANTITIES:
+            off = off_by_row(found.residuals, number, name, len(measured))
+            difference = branch_difference(-off, measured.branches)
+            if difference is not None:
+                said.append(branch_words(difference, name, measured))
+            if np.isfinite(off).any():
+                break
     return said
 
 
-__all__ = ["verdict", "with_unit"]
+__all__ = ["NO_PROBLEMS", "diagnose", "with_unit"]
