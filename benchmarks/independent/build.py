@@ -13,10 +13,20 @@ Table = dict[str, Any]
 NOTCHES = {"arc": nf.ArcNotch, "strip": nf.StripNotch, "u-link": nf.ULink}
 MATERIALS = {"linear": nf.Linear, "superelastic": nf.Superelastic}
 FRICTIONS = {"capstan": nf.Capstan, "corner": nf.Corner, "frictionless": nf.Frictionless}
-LENGTHS = (
-    "outer_diameter inner_diameter base_length height uncut_length depth strip_thickness strip_length "
-    "wall_width slot_radius radius free_length"
-).split()
+LENGTHS = [
+    "outer_diameter",
+    "inner_diameter",
+    "base_length",
+    "height",
+    "uncut_length",
+    "depth",
+    "strip_thickness",
+    "strip_length",
+    "wall_width",
+    "slot_radius",
+    "radius",
+    "free_length",
+]
 
 
 def make_robot(table: Table) -> nf.Robot:
@@ -53,7 +63,7 @@ def turned(
     robot: Table, loads: list[Table], angle_deg: float
 ) -> tuple[Table, list[Table], np.ndarray]:
     """Return everything turned about the tube axis, and the rotation."""
-    robot, loads = copy.deepcopy((robot, loads))
+    robot, loads = copy.deepcopy(robot), [copy.deepcopy(load) for load in loads]
     for part in robot["notch"] + robot["tendon"]:
         part["direction_deg"] = part.get("direction_deg", 0.0) + angle_deg
     turn = rotation_of(np.array([0.0, 0.0, np.radians(angle_deg)]))
@@ -62,7 +72,7 @@ def turned(
 
 def mirrored(robot: Table, loads: list[Table]) -> tuple[Table, list[Table], np.ndarray]:
     """Return the mirror image in the plane of x and z: moments and turns are axial vectors."""
-    robot, loads = copy.deepcopy((robot, loads))
+    robot, loads = copy.deepcopy(robot), [copy.deepcopy(load) for load in loads]
     for part in robot["notch"] + robot["tendon"]:
         part["direction_deg"] = -part.get("direction_deg", 0.0)
     polar = np.diag([1.0, -1.0, 1.0])
@@ -90,7 +100,7 @@ def _mapped(load: Table, polar: np.ndarray, axial: np.ndarray) -> Table:
 
 def enlarged(robot: Table, loads: list[Table], factor: float) -> tuple[Table, list[Table]]:
     """Return everything with lengths times a factor, forces times its square, equal stresses."""
-    robot, loads = copy.deepcopy((robot, loads))
+    robot, loads = copy.deepcopy(robot), [copy.deepcopy(load) for load in loads]
     for part in [robot["tube"], *robot["notch"], *robot["tendon"]]:
         for key in LENGTHS:
             if part.get(key) is not None:

@@ -52,7 +52,7 @@ def draw_outside(
     random: np.random.Generator, robot: Table, planar: bool, marks: list[str]
 ) -> Table:
     """Return loads from outside at their full size."""
-    _, moment, force, length = sizes_of(robot)
+    _, moment, force, _ = sizes_of(robot)
     size = float(np.exp(random.uniform(np.log(0.01), np.log(1.0))))
     flat = np.array([1.0, 0.0, 1.0]) if planar else np.ones(3)
     turn = np.array([0.0, 1.0, 0.0]) if planar else np.ones(3)
@@ -88,6 +88,9 @@ def draw_outside(
                 }
                 for _ in range(int(random.integers(1, 3)))
             ]
+    heavy = robot["material"].get("density") is not None or "tip_mass" in load
+    if "gravity" in load and not heavy and random.random() < 0.9:
+        del load["gravity"]  # nothing to act on, which is refused
     load["following"] = bool(random.random() < 0.3)
     return load
 
@@ -136,6 +139,10 @@ def draw_history(
             told["stroke"][change:, tendon] = size * unit["stroke"] * course[change:]
         else:
             told[kind][:, tendon] = size * unit[kind] * course
+    if (
+        tendons > 1 and not np.isnan(told["stroke"][:, :2]).any()
+    ):  # two that work against each other
+        told["stroke"][:, 1] = -random.choice([1.0, 1.1, 0.7]) * told["stroke"][:, 0]
     outside: Table = {}
     if random.random() < 0.55:
         outside = draw_outside(random, robot, planar, marks)

@@ -74,7 +74,7 @@ def with_neighbours(case: Case, random: np.random.Generator) -> list[Table]:
 
 
 def same(first: Any, second: Any, mapped: np.ndarray, factor: float = 1.0) -> float:
-    """Return how far tips of two paths are apart, as part of the robot's length, where both hold."""
+    """Return how far two paths are apart where both hold, as part of the length or in rad."""
     both = first.converged & second.converged
     off = second.tip_position[both] - factor * first.tip_position[both] @ mapped.T
     length = np.abs(second.body_position).max() + 1e-300
@@ -121,7 +121,7 @@ def _judge(case: Case, random: np.random.Generator, verdict: Verdict) -> None:
         elif not reason:
             found.append(("not converged without a reason", step, 0.0, ""))
     verdict.reasons = [str(reason) for reason in dict.fromkeys(path.reason) if reason][:1]
-    _neighbours(case, tables, path, found)
+    check_neighbours(case, tables, path, found)
     if np.abs(again.notch_angle - path.notch_angle).max(initial=0.0) > 0:
         found.append(
             ("not repeatable", 0, float(np.abs(again.notch_angle - path.notch_angle).max()), "")
@@ -147,7 +147,7 @@ def check_state(robot: Table, path: Any, loads: list[Table], step: int) -> list[
     return found
 
 
-def _neighbours(case: Case, tables: list[Table], path: Any, found: list[Finding]) -> None:
+def check_neighbours(case: Case, tables: list[Table], path: Any, found: list[Finding]) -> None:
     """Check the states after the last load: held, two near it, and back."""
     count = len(case.loads)
     if not path.converged[count:].all():

@@ -42,7 +42,8 @@ def tell(verdict: Verdict, seconds: float) -> None:
     for what, rows in by_name.items():
         step, size, more = max(rows, key=lambda row: np.nan_to_num(row[1], nan=np.inf))
         print(
-            f"       ! {what}: {len(rows)} x, first at step {rows[0][0]}, most {size:.3g} at step {step}: {more}"
+            f"       ! {what}: {len(rows)} x, first at step {rows[0][0]}, "
+            f"most {size:.3g} at step {step}: {more}"
         )
     sys.stdout.flush()
 
@@ -54,7 +55,8 @@ def summary(verdicts: list[Verdict]) -> None:
     states, converged = sum(v.states for v in solved), sum(v.converged for v in solved)
     print(f"{len(verdicts)} draws: {sum(bool(v.refused) for v in verdicts)} refused,", end=" ")
     print(
-        f"{sum(bool(v.error) for v in verdicts)} exceptions, {states} states, {converged} converged,"
+        f"{sum(bool(v.error) for v in verdicts)} exceptions, {states} states, "
+        f"{converged} converged,"
     )
     print(f"{sum(v.converged < v.states for v in solved)} draws with unconverged states;", end=" ")
     print(f"slowest path when compiled {max((v.again_s for v in solved), default=0):.2f} s")
