@@ -13,7 +13,7 @@ Table = dict[str, Any]
 NOTCHES = {"arc": nf.ArcNotch, "strip": nf.StripNotch, "u-link": nf.ULink}
 MATERIALS = {"linear": nf.Linear, "superelastic": nf.Superelastic}
 FRICTIONS = {"capstan": nf.Capstan, "corner": nf.Corner, "frictionless": nf.Frictionless}
-LENGTHS = [
+LENGTHS = (
     "outer_diameter",
     "inner_diameter",
     "base_length",
@@ -26,7 +26,7 @@ LENGTHS = [
     "slot_radius",
     "radius",
     "free_length",
-]
+)
 
 
 def make_robot(table: Table) -> nf.Robot:

@@ -12,37 +12,14 @@ from shape import channel, free_pose, notches_of, piece_lengths, straight_gap, t
 
 Table = dict[str, Any]
 Finding = tuple[str, int, float, str]  # what, step, by how much, more
-EVERY = [
-    "tension",
-    "stroke",
-    "notch_angle",
-    "total_angle",
-    "tip_position",
-    "tip_rotation",
-    "body_position",
-    "body_rotation",
-    "span_tension",
-    "notch_moment",
-    "outer_strain",
-    "peak_strain",
-    "gap",
-    "closed",
-    "contact_force",
-    "contact_log_ratio",
-    "contact_slid",
-    "contact_bound",
-    "contact_turning",
-    "contact_state",
-    "dissipation",
-    "base_force",
-    "base_moment",
-    "moment_error",
-    "stored_energy",
-    "tendon_work",
-    "smallest_eigenvalue",
-    "residual",
-    "iterations",
-]
+NUMBERS = """
+    tension stroke notch_angle total_angle tip_position tip_rotation body_position
+    body_rotation span_tension notch_moment outer_strain peak_strain gap closed
+    contact_force contact_log_ratio contact_slid contact_bound contact_turning
+    contact_state dissipation base_force base_moment moment_error stored_energy
+    tendon_work smallest_eigenvalue residual iterations
+"""
+EVERY = NUMBERS.split()
 BY_TENDON = {"span_tension", "contact_log_ratio", "contact_slid", "contact_bound"} | {
     "contact_turning",
     "contact_state",

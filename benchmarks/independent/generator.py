@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from histories import draw_history
 from sections import reference
+from shape import notches_of
 
 Table = dict[str, Any]
 
@@ -105,6 +106,17 @@ def draw_notches(random: np.random.Generator, tube: Table, planar: bool) -> list
     return notches
 
 
+def ends_for(robot: Table, direction: float) -> list[int]:
+    """Return the bodies in which a tendon may end: those with a wall on its side."""
+    rows = notches_of(robot)
+    ends = []
+    for body, notch in enumerate(rows, start=1):
+        faces = np.cos(np.radians(direction - notch["direction_deg"])) > 0
+        if notch["kind"] != "u-link" or faces == (notch["proximal_slot"] == "toward"):
+            ends.append(body)
+    return ends or [len(rows)]
+
+
 def draw_tendons(random: np.random.Generator, robot: Table, planar: bool) -> list[Table]:
     """Return one to four tendons that suit the notches, mostly."""
     tube, kinds = robot["tube"], {notch["kind"] for notch in robot["notch"]}
@@ -123,10 +135,12 @@ def draw_tendons(random: np.random.Generator, robot: Table, planar: bool) -> lis
             direction += float(random.uniform(-20, 20))
         tendon: Table = {"radius": radius * random.uniform(0.65, 1.0), "direction_deg": direction}
         straight = {"straight": 6.0, "straight_dead": 1.0, "straight_follower": 1.0}
-        wall = {"wall_arc": 8.0} if kinds == {"arc"} else {"wall_arc": 0.15}
+        wall = {"wall_arc": 8.0} if kinds == {"arc"} else {"wall_arc": 0.08}
         tendon["path"] = pick(random, **straight, **wall)
         if random.random() < 0.25 and bodies > 1:
-            tendon["end_body"] = int(random.integers(1, bodies + 1))
+            tendon["end_body"] = int(random.choice(ends_for(robot, direction)))
+        elif bodies not in ends_for(robot, direction) and random.random() < 0.97:
+            tendon["end_body"] = ends_for(robot, direction)[-1]
         if random.random() < 0.3:
             tendon["axial_stiffness"] = tension_scale(robot) * between_decades(random, 10, 1e5)
             tendon["free_length"] = radius * random.uniform(0, 20)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 import traceback
 from dataclasses import dataclass, field
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from build import enlarged, make_loads, make_robot, mirrored, turned
 from checks import (
+    EVERY,
     Finding,
     check_base,
     check_commands,
@@ -20,7 +22,7 @@ from checks import (
     check_lips,
     check_numbers,
 )
-from generator import Case, Table, draw_case
+from generator import Case, Table, draw_case, tension_scale
 from rods import check_rods
 from shape import lies_flat
 
@@ -128,6 +130,12 @@ def _judge(case: Case, random: np.random.Generator, verdict: Verdict) -> None:
         )
     if verdict.again_s > 10.0:
         found.append(("slow", 0, verdict.again_s, "s for the path"))
+    ends = tension_scale(case.robot) * 1e7
+    told = np.nan_to_num(path.commanded_tension).max(initial=0.0)
+    wild = (path.tension.max(axis=1) > max(ends, told)) & path.converged
+    if wild.any():
+        step = int(wild.argmax())
+        found.append(("tension beyond all bounds", step, float(path.tension[step].max()), ""))
     _continued(robot, loads, path, found)
     if verdict.converged:
         _guises(case, tables, path, random, found)
@@ -181,7 +189,13 @@ def _guises(
     case: Case, tables: list[Table], path: Any, random: np.random.Generator, found: list[Finding]
 ) -> None:
     """Solve the draw turned, mirrored or enlarged: the same physics."""
-    which = random.choice(["turned", "mirrored", "enlarged", "one step"])
+    which = random.choice(["turned", "mirrored", "enlarged", "one step", "batch", "file"])
+    if which == "file":
+        found += read_back(case, path)
+        return
+    if which == "batch":
+        found += in_a_batch(make_robot(case.robot), make_loads(tables))
+        return
     if which == "one step":
         if case.robot["friction"].get("coefficient") or not path.converged.all():
             return
@@ -210,3 +224,34 @@ def _guises(
     off = same(path, other, mapped, factor)
     if off > 1e-6:
         found.append((f"{which}: another state", 0, off, f"factor {factor}"))
+
+
+def read_back(case: Case, path: Any) -> list[Finding]:
+    """Write robot and path to files, read them back, and compare."""
+    found: list[Finding] = []
+    with tempfile.TemporaryDirectory() as folder:
+        nf.save_path(path, f"{folder}/path.json")
+        again = nf.read_path(f"{folder}/path.json")
+        nf.save_robot(path.robot, f"{folder}/robot.toml")
+        robot = nf.load_robot(f"{folder}/robot.toml")
+    for name in EVERY:
+        if not np.array_equal(getattr(again, name), getattr(path, name), equal_nan=True):
+            found.append((f"file has another {name}", 0, 0.0, ""))
+    if robot.replace(name="") != make_robot(case.robot).replace(name=""):
+        found.append(("robot file has another robot", 0, 0.0, ""))
+    return found
+
+
+def in_a_batch(robot: nf.Robot, loads: list[nf.Load]) -> list[Finding]:
+    """Solve every load from rest, one by one and as a batch, and compare."""
+    each = nf.solve_each(robot, loads)
+    batch = nf.solve_batch(robot, loads, outputs=("notch_angle", "converged"), cores=1)
+    both = each.converged & batch["converged"]
+    found: list[Finding] = []
+    if (each.converged != batch["converged"]).any():
+        more = f"{each.converged.astype(int)} {batch['converged'].astype(int)}"
+        found.append(("batch converges otherwise", 0, 0.0, more))
+    off = np.abs(each.notch_angle - batch["notch_angle"])[both].max(initial=0.0)
+    if off > 1e-7:
+        found.append(("batch has another state", 0, float(off), ""))
+    return found
