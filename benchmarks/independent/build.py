@@ -6,6 +6,7 @@ import copy
 from typing import Any
 
 import numpy as np
+from generator import LENGTHS_OF
 
 import notchflex as nf
 
@@ -13,20 +14,6 @@ Table = dict[str, Any]
 NOTCHES = {"arc": nf.ArcNotch, "strip": nf.StripNotch, "u-link": nf.ULink}
 MATERIALS = {"linear": nf.Linear, "superelastic": nf.Superelastic}
 FRICTIONS = {"capstan": nf.Capstan, "corner": nf.Corner, "frictionless": nf.Frictionless}
-LENGTHS = (
-    "outer_diameter",
-    "inner_diameter",
-    "base_length",
-    "height",
-    "uncut_length",
-    "depth",
-    "strip_thickness",
-    "strip_length",
-    "wall_width",
-    "slot_radius",
-    "radius",
-    "free_length",
-)
 
 
 def make_robot(table: Table) -> nf.Robot:
@@ -102,7 +89,7 @@ def enlarged(robot: Table, loads: list[Table], factor: float) -> tuple[Table, li
     """Return everything with lengths times a factor, forces times its square, equal stresses."""
     robot, loads = copy.deepcopy(robot), [copy.deepcopy(load) for load in loads]
     for part in [robot["tube"], *robot["notch"], *robot["tendon"]]:
-        for key in LENGTHS:
+        for key in LENGTHS_OF:
             if part.get(key) is not None:
                 part[key] *= factor
         if "axial_stiffness" in part:

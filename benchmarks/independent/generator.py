@@ -11,11 +11,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from histories import draw_history
+from histories import draw_frame, draw_history
 from sections import reference
 from shape import notches_of
 
 Table = dict[str, Any]
+VARIANTS = 4
+LENGTHS = """
+    outer_diameter inner_diameter base_length height uncut_length depth strip_thickness
+    strip_length wall_width slot_radius radius free_length
+"""
+LENGTHS_OF = LENGTHS.split()
 
 
 @dataclass
@@ -206,19 +212,42 @@ def spoil(random: np.random.Generator, robot: Table) -> str:
     return what
 
 
+def varied(random: np.random.Generator, robot: Table) -> None:
+    """Give all sizes of a robot other values; its form, and so its program, stays."""
+    size = between_decades(random, 0.2, 5.0)
+    for part in [robot["tube"], *robot["notch"], *robot["tendon"]]:
+        for key in LENGTHS_OF:
+            if part.get(key):
+                part[key] *= size * random.uniform(0.97, 1.03)
+        if "axial_stiffness" in part:
+            part["axial_stiffness"] *= size**2
+    for part, keys in (("material", ("elastic_modulus",)), ("friction", ("coefficient",))):
+        for key in keys:
+            if key in robot[part]:
+                robot[part][key] *= random.uniform(0.3, 1.5)
+
+
 def draw_case(seed: int, number: int) -> Case:
-    """Return draw `number` of a seed."""
-    random = np.random.default_rng([seed, number])
-    planar = bool(random.random() < 0.55)
-    tube = draw_tube(random)
+    """Return draw `number` of a seed.
+
+    Draws follow one another in fours of one form, each with its own sizes and its own history, so
+    that a program is compiled once for four.
+    """
+    of_form = np.random.default_rng([seed, number // VARIANTS, 0])
+    random = np.random.default_rng([seed, number, 2])
+    planar = bool(of_form.random() < 0.55)
+    tube = draw_tube(of_form)
     robot: Table = {"name": f"draw {seed}-{number}", "tube": tube}
-    robot["notch"] = draw_notches(random, tube, planar)
-    robot["material"] = draw_material(random)
-    robot["friction"] = draw_friction(random)
-    robot["tendon"] = draw_tendons(random, robot, planar)
+    robot["notch"] = draw_notches(of_form, tube, planar)
+    robot["material"] = draw_material(of_form)
+    robot["friction"] = draw_friction(of_form)
+    robot["tendon"] = draw_tendons(of_form, robot, planar)
+    frame = draw_frame(of_form)
+    if number % VARIANTS:
+        varied(random, robot)
     marks = ["+".join(sorted({notch["kind"] for notch in robot["notch"]}))]
     marks += ["planar" if planar else "spatial", robot["friction"]["kind"]]
-    loads = draw_history(random, robot, planar, tension_scale(robot), marks)
-    if random.random() < 0.05:
+    loads = draw_history(random, robot, planar, tension_scale(robot), frame, marks)
+    if random.random() < 0.03:
         marks.append("spoiled: " + spoil(random, robot))
     return Case(robot, loads, planar, marks)

@@ -48,8 +48,18 @@ def sizes_of(robot: Table) -> tuple[float, float, float, float]:
     return stroke, moment, moment / length, length
 
 
+def draw_frame(random: np.random.Generator) -> tuple[int, list[str]]:
+    """Return how many steps a history has, and which kinds of loads act from outside."""
+    steps = int(random.choice([2, 5, 9, 15, 25], p=[0.1, 0.2, 0.3, 0.3, 0.1]))
+    if random.random() < 0.45:
+        return steps, []
+    kinds = ["tip_force", "tip_moment", "tip_mass", "gravity", "body_forces", "base_rotation"]
+    count = int(random.integers(1, 4))
+    return steps, [str(kind) for kind in random.choice(kinds, size=count, replace=False)]
+
+
 def draw_outside(
-    random: np.random.Generator, robot: Table, planar: bool, marks: list[str]
+    random: np.random.Generator, robot: Table, planar: bool, kinds: list[str], marks: list[str]
 ) -> Table:
     """Return loads from outside at their full size."""
     _, moment, force, _ = sizes_of(robot)
@@ -59,11 +69,7 @@ def draw_outside(
     radius = robot["tube"]["outer_diameter"] / 2
     bodies = sum(notch["repeat"] for notch in robot["notch"])
     load: Table = {}
-    for what in random.choice(
-        ["tip_force", "tip_moment", "tip_mass", "gravity", "body_forces", "base_rotation"],
-        size=int(random.integers(1, 4)),
-        replace=False,
-    ):
+    for what in kinds:
         marks.append(str(what))
         if what == "tip_force":
             load["tip_force"] = size * force * flat * random.normal(size=3)
@@ -112,10 +118,15 @@ def scaled(load: Table, factor: float) -> Table:
 
 
 def draw_history(
-    random: np.random.Generator, robot: Table, planar: bool, tension: float, marks: list[str]
+    random: np.random.Generator,
+    robot: Table,
+    planar: bool,
+    tension: float,
+    frame: tuple[int, list[str]],
+    marks: list[str],
 ) -> list[Table]:
     """Return the loads, step by step."""
-    steps = int(random.choice([2, 5, 9, 15, 25], p=[0.1, 0.2, 0.3, 0.3, 0.1]))
+    steps, kinds = frame
     size = float(np.exp(random.uniform(np.log(1e-3), np.log(3.0))))
     if random.random() < 0.04:
         size *= float(10 ** random.uniform(2, 6))
@@ -144,8 +155,8 @@ def draw_history(
     ):  # two that work against each other
         told["stroke"][:, 1] = -random.choice([1.0, 1.1, 0.7]) * told["stroke"][:, 0]
     outside: Table = {}
-    if random.random() < 0.55:
-        outside = draw_outside(random, robot, planar, marks)
+    if kinds:
+        outside = draw_outside(random, robot, planar, kinds, marks)
     changes = random.random() < 0.5
     _, course = draw_course(random, steps, both_signs=True) if changes else ("", np.ones(steps))
     return [
