@@ -32,6 +32,7 @@ class Case:
     loads: list[Table]
     planar: bool
     marks: list[str] = field(default_factory=list)
+    first: bool = True  # of its form
 
 
 def pick(random: np.random.Generator, **weights: float) -> str:
@@ -242,7 +243,7 @@ def draw_case(seed: int, number: int) -> Case:
     robot["material"] = draw_material(of_form)
     robot["friction"] = draw_friction(of_form)
     robot["tendon"] = draw_tendons(of_form, robot, planar)
-    frame = draw_frame(of_form)
+    frame = draw_frame(of_form, len(robot["tendon"]))
     if number % VARIANTS:
         varied(random, robot)
     marks = ["+".join(sorted({notch["kind"] for notch in robot["notch"]}))]
@@ -250,4 +251,4 @@ def draw_case(seed: int, number: int) -> Case:
     loads = draw_history(random, robot, planar, tension_scale(robot), frame, marks)
     if random.random() < 0.03:
         marks.append("spoiled: " + spoil(random, robot))
-    return Case(robot, loads, planar, marks)
+    return Case(robot, loads, planar, marks, first=number % VARIANTS == 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -48,18 +49,31 @@ def sizes_of(robot: Table) -> tuple[float, float, float, float]:
     return stroke, moment, moment / length, length
 
 
-def draw_frame(random: np.random.Generator) -> tuple[int, list[str]]:
-    """Return how many steps a history has, and which kinds of loads act from outside."""
+@dataclass(frozen=True)
+class Frame:
+    """What histories of one form share: another one would ask for another program."""
+
+    steps: int
+    commands: tuple[str, ...]
+    outside: tuple[str, ...]
+    following: bool
+
+
+def draw_frame(random: np.random.Generator, tendons: int) -> Frame:
+    """Return how many steps, what tendons are told, and which loads act from outside."""
     steps = int(random.choice([2, 5, 9, 15, 25], p=[0.1, 0.2, 0.3, 0.3, 0.1]))
-    if random.random() < 0.45:
-        return steps, []
+    commands = ["tension", "stroke", "both", "slack"]
+    first = str(random.choice(commands[:3], p=[0.55, 0.35, 0.1]))
+    others = random.choice(commands, size=tendons - 1, p=[0.4, 0.23, 0.07, 0.3])
     kinds = ["tip_force", "tip_moment", "tip_mass", "gravity", "body_forces", "base_rotation"]
-    count = int(random.integers(1, 4))
-    return steps, [str(kind) for kind in random.choice(kinds, size=count, replace=False)]
+    count = int(random.integers(1, 4)) if random.random() < 0.55 else 0
+    outside = random.choice(kinds, size=count, replace=False)
+    following = bool(random.random() < 0.3)
+    return Frame(steps, (first, *map(str, others)), tuple(map(str, outside)), following)
 
 
 def draw_outside(
-    random: np.random.Generator, robot: Table, planar: bool, kinds: list[str], marks: list[str]
+    random: np.random.Generator, robot: Table, planar: bool, frame: Frame, marks: list[str]
 ) -> Table:
     """Return loads from outside at their full size."""
     _, moment, force, _ = sizes_of(robot)
@@ -69,8 +83,8 @@ def draw_outside(
     radius = robot["tube"]["outer_diameter"] / 2
     bodies = sum(notch["repeat"] for notch in robot["notch"])
     load: Table = {}
-    for what in kinds:
-        marks.append(str(what))
+    for what in frame.outside:
+        marks.append(what)
         if what == "tip_force":
             load["tip_force"] = size * force * flat * random.normal(size=3)
             if random.random() < 0.3:
@@ -90,14 +104,14 @@ def draw_outside(
                     "force": size * force * flat * random.normal(size=3),
                     "moment": size * moment * 0.5 * turn * random.normal(size=3),
                     "point": flat * random.uniform(-1, 1, 3) * radius,
-                    "following": bool(random.random() < 0.3),
+                    "following": frame.following,
                 }
-                for _ in range(int(random.integers(1, 3)))
+                for _ in range(1 + frame.steps % 2)
             ]
     heavy = robot["material"].get("density") is not None or "tip_mass" in load
     if "gravity" in load and not heavy and random.random() < 0.9:
         del load["gravity"]  # nothing to act on, which is refused
-    load["following"] = bool(random.random() < 0.3)
+    load["following"] = frame.following
     return load
 
 
@@ -122,11 +136,11 @@ def draw_history(
     robot: Table,
     planar: bool,
     tension: float,
-    frame: tuple[int, list[str]],
+    frame: Frame,
     marks: list[str],
 ) -> list[Table]:
     """Return the loads, step by step."""
-    steps, kinds = frame
+    steps = frame.steps
     size = float(np.exp(random.uniform(np.log(1e-3), np.log(3.0))))
     if random.random() < 0.04:
         size *= float(10 ** random.uniform(2, 6))
@@ -137,10 +151,9 @@ def draw_history(
         "tension": np.full((steps, tendons), np.nan),
         "stroke": np.full((steps, tendons), np.nan),
     }
-    for tendon in range(tendons):
-        if tendon > 0 and random.random() < 0.3:
-            continue  # hangs slack
-        kind = str(random.choice(["tension", "stroke", "both"], p=[0.55, 0.35, 0.1]))
+    for tendon, kind in enumerate(frame.commands):
+        if kind == "slack":
+            continue
         name, course = draw_course(random, steps, both_signs=kind == "stroke" and tendon > 0)
         marks.append(f"{kind} {name}")
         unit = {"tension": tension, "stroke": min(size, 0.9) * stroke / size}
@@ -155,8 +168,8 @@ def draw_history(
     ):  # two that work against each other
         told["stroke"][:, 1] = -random.choice([1.0, 1.1, 0.7]) * told["stroke"][:, 0]
     outside: Table = {}
-    if kinds:
-        outside = draw_outside(random, robot, planar, kinds, marks)
+    if frame.outside:
+        outside = draw_outside(random, robot, planar, frame, marks)
     changes = random.random() < 0.5
     _, course = draw_course(random, steps, both_signs=True) if changes else ("", np.ones(steps))
     return [
