@@ -76,10 +76,10 @@ def main() -> None:
             count["refused"] += 1
         except Exception as error:  # whatever it is, it is a finding
             last = traceback.extract_tb(error.__traceback__)[-1]
-            ours = (
-                "build" in last.filename or isinstance(error, TypeError) and "keyword" in str(error)
-            )
-            kind = "not for the library" if ours else f"{type(error).__name__}: {error}"[:150]
+            ours = "build" in last.filename
+            ours |= isinstance(error, TypeError) and "keyword" in str(error)
+            kind = f"{type(error).__name__}: {error}"[:150]
+            kind = "not for the library" if ours else kind
             count["not for the library" if ours else "EXCEPTION"] += 1
             seen.setdefault(kind, f"{number} {last.filename}:{last.lineno} {what}")
     print(dict(count))
