@@ -16,7 +16,7 @@ from sections import reference
 from shape import notches_of
 
 Table = dict[str, Any]
-VARIANTS = 4
+VARIANTS = 16
 LENGTHS = """
     outer_diameter inner_diameter base_length height uncut_length depth strip_thickness
     strip_length wall_width slot_radius radius free_length
@@ -231,8 +231,8 @@ def varied(random: np.random.Generator, robot: Table) -> None:
 def draw_case(seed: int, number: int) -> Case:
     """Return draw `number` of a seed.
 
-    Draws follow one another in fours of one form, each with its own sizes and its own history, so
-    that a program is compiled once for four.
+    Draws follow one another in sixteens of one form, each with its own sizes and its own history, so
+    that a program is compiled once for them.
     """
     of_form = np.random.default_rng([seed, number // VARIANTS, 0])
     random = np.random.default_rng([seed, number, 2])

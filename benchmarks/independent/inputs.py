@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from build import make_loads, make_robot
-from generator import draw_case
+from generator import VARIANTS, draw_case
 
 import notchflex as nf
 
@@ -63,7 +63,7 @@ def main() -> None:
     seen: dict[str, str] = {}
     for number in range(told.count):
         random = np.random.default_rng([told.seed, number, 3])
-        case = draw_case(told.seed, 4 * number)
+        case = draw_case(told.seed, VARIANTS * number)
         tables = {"robot": case.robot, "loads": copy.deepcopy(case.loads[:2])}
         which = "robot" if random.random() < 0.6 else "loads"
         what = mutate(random, tables[which])
