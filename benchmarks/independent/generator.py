@@ -231,8 +231,8 @@ def varied(random: np.random.Generator, robot: Table) -> None:
 def draw_case(seed: int, number: int) -> Case:
     """Return draw `number` of a seed.
 
-    Draws follow one another in sixteens of one form, each with its own sizes and its own history, so
-    that a program is compiled once for them.
+    Draws follow one another in sixteens of one form, each with its own sizes and its own history:
+    a program is compiled once for them.
     """
     of_form = np.random.default_rng([seed, number // VARIANTS, 0])
     random = np.random.default_rng([seed, number, 2])
