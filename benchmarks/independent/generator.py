@@ -140,7 +140,7 @@ def draw_tendons(random: np.random.Generator, robot: Table, planar: bool) -> lis
         if not planar:
             direction = 360.0 / count * number if kinds == {"arc"} else direction
             direction += float(random.uniform(-20, 20))
-        tendon: Table = {"radius": radius * random.uniform(0.65, 1.0), "direction_deg": direction}
+        tendon: Table = {"radius": radius * random.uniform(0.65, 0.94), "direction_deg": direction}
         straight = {"straight": 6.0, "straight_dead": 1.0, "straight_follower": 1.0}
         wall = {"wall_arc": 8.0} if kinds == {"arc"} else {"wall_arc": 0.08}
         tendon["path"] = pick(random, **straight, **wall)

@@ -41,6 +41,9 @@ class Verdict:
     error: str = ""
     states: int = 0
     converged: int = 0
+    closed: int = 0
+    stuck: int = 0
+    slack: int = 0
     reasons: list[str] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
     first_s: float = 0.0
@@ -113,6 +116,11 @@ def _judge(case: Case, random: np.random.Generator, verdict: Verdict) -> None:
     again = nf.simulate(robot, loads)
     verdict.again_s = time.perf_counter() - began
     verdict.states, verdict.converged = len(path), int(path.converged.sum())
+    good = path.converged
+    verdict.closed = int(path.closed[good].any(axis=1).sum())
+    stuck = (path.contact_state == 0) & (path.contact_bound > 1e-9)
+    verdict.stuck = int(stuck[good].any(axis=(1, 2)).sum())
+    verdict.slack = int((path.tension[good] <= 0).any(axis=1).sum())
     found = verdict.findings
     for step in range(len(path)):
         good, reason = bool(path.converged[step]), str(path.reason[step])

@@ -69,8 +69,12 @@ def check_rods(robot: Table, path: Any, load: Table, step: int) -> Iterator[Find
             push = tension * (near - far) / np.linalg.norm(near - far)
             force += push
             moment += float(np.cross(far - start, push) @ axis)
-        if state.contact_force[j] > 0:
-            continue
+        # the lips close by (r_o + centroid) times the angle, and press with the same lever
+        reach = robot["tube"]["outer_diameter"] / 2 + centroid
+        left = notch["height"] - reach * float(state.notch_angle[j])
+        off = abs(left - float(state.gap[j])) / notch["height"]
+        yield from above("gap is not that of the angle", step, off, 1e-7, f"notch {j + 1}")
+        constant -= float(state.contact_force[j]) * reach
         yield from _compare(
             robot,
             path,

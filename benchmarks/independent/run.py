@@ -60,6 +60,9 @@ def summary(verdicts: list[Verdict]) -> None:
     )
     print(f"{sum(v.converged < v.states for v in solved)} draws with unconverged states;", end=" ")
     print(f"slowest path when compiled {max((v.again_s for v in solved), default=0):.2f} s")
+    for what in ("closed", "stuck", "slack"):
+        print(f"{sum(getattr(v, what) for v in solved)} states with something {what};", end=" ")
+    print()
     for what, count in kinds.most_common():
         print(f"  {count:4d} draws: {what}")
 

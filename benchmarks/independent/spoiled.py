@@ -26,7 +26,7 @@ CASE = Case(
     },
     [
         {"tension": [tension], "stroke": [None], "tip_force": np.array([0.02, 0.0, 0.01])}
-        for tension in (0.0, 0.3, 0.6, 0.5)
+        for tension in (0.0, 0.3, 2.6, 0.5)
     ],
     planar=True,
 )
