@@ -140,7 +140,7 @@ def _judge(case: Case, random: np.random.Generator, verdict: Verdict) -> None:
         found.append(("slow", 0, verdict.again_s, "s for the path"))
     ends = tension_scale(case.robot) * 1e7
     told = np.nan_to_num(path.commanded_tension).max(initial=0.0)
-    wild = (path.tension.max(axis=1) > max(ends, told)) & path.converged
+    wild = path.tension.max(axis=1) > max(ends, told)  # the last good state of a failure too
     if wild.any():
         step = int(wild.argmax())
         found.append(("tension beyond all bounds", step, float(path.tension[step].max()), ""))
