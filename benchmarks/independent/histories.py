@@ -163,9 +163,9 @@ def draw_history(
             told["stroke"][change:, tendon] = size * unit["stroke"] * course[change:]
         else:
             told[kind][:, tendon] = size * unit[kind] * course
-    if (
-        tendons > 1 and not np.isnan(told["stroke"][:, :2]).any()
-    ):  # two that work against each other
+    # two strokes that work against each other agree, mostly: nothing stretches where they do not
+    both = tendons > 1 and not np.isnan(told["stroke"][:, :2]).any()
+    if both and random.random() < 0.85:
         told["stroke"][:, 1] = -random.choice([1.0, 1.1, 0.7]) * told["stroke"][:, 0]
     outside: Table = {}
     if frame.outside:
