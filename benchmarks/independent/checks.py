@@ -169,7 +169,10 @@ def check_lengths(robot: Table, path: Any, step: int) -> Iterator[Finding]:
         along = path.span_tension[step, t]
         rest = tendon.get("free_length", 0.0) + robot["tube"]["base_length"]
         off = abs(path.stroke[step, t] - slid[0] - along[0] * rest / stiff) / reach
-        yield from above("stroke is not what slid in and stretched", step, off, 1e-8, f"{t + 1}")
+        if rows[0]["kind"] == "arc":  # elsewhere the first span reaches beyond the base
+            yield from above(
+                "stroke is not what slid in and stretched", step, off, 1e-8, f"{t + 1}"
+            )
         for j, notch in enumerate(rows[: count // 2]):
             if notch["kind"] != "arc":
                 continue
@@ -236,4 +239,6 @@ def check_energy(robot: Table, path: Any, loads: list[Table], step: int) -> Iter
     off = abs(gained + heat - work - float(pulls.sum())) / max(size, 1e-300)
     more = f"gained {gained:.4e} heat {heat:.4e} outside {work:.4e} drives {pulls.sum():.4e}"
     yield from above("energy does not balance", step, off, 2e-3 if rough else 1e-4, more)
-    yield from above("friction gives energy", step, -heat / max(size, 1e-300), 1e-3)
+    # below this, contacts that stick give by what keeps their tension determined
+    size = max(size, 1e-6 * float(np.abs(second.tension).max()) * reach, 1e-300)
+    yield from above("friction gives energy", step, -heat / size, 1e-3)

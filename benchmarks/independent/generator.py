@@ -95,6 +95,8 @@ def draw_notches(random: np.random.Generator, tube: Table, planar: bool) -> list
     notches: list[Table] = []
     while sum(notch.get("repeat", 1) for notch in notches) < count:
         kind = pick(random, arc=2, strip=1, u_link=1) if family == "mixed" else family
+        if kind == "u-link" and notches and notches[-1]["kind"] == "u-link":
+            kind = "arc"  # rows side by side would have to share a slot
         notch = draw_notch(random, kind, tube)
         left = count - sum(other.get("repeat", 1) for other in notches)
         equal = left if random.random() < 0.4 or count > 12 else 1
