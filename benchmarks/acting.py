@@ -1,6 +1,6 @@
 """All forces on the bodies of a solved robot, put together in numpy from what a result reports.
 
-Loads from outside, tendons and closed edges: `State` holds them with the point and the body they
+External loads, tendons and closed edges: `State` holds them with the point and the body they
 act on, so that `beyond` adds up what acts beyond a notch. Nothing is taken from the solver but
 poses, tensions along the tendons and contact forces; where a tendon leaves and enters bodies
 follows from the notches' openings. Tendons on an arc of the wall and the lips opposite a spine act
@@ -138,7 +138,7 @@ class State:
         return self.robot.tendon[number].end_body or len(self.robot.notches)
 
     def _external(self, path: nf.EquilibriumPath):
-        """Loads from outside, as the load tells them."""
+        """External loads, as the load tells them."""
         load, last, none = self.load, len(self.origin) - 1, np.zeros(3)
         for one in load.body_forces:
             turn = self.rotation[one.body] if one.following else np.eye(3)

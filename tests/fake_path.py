@@ -34,7 +34,7 @@ class FakePath:
 
     @property
     def load(self) -> Any:
-        """The loads from outside."""
+        """The external loads."""
         return SimpleNamespace(external=self.external)
 
     @property

@@ -75,7 +75,7 @@ def draw_frame(random: np.random.Generator, tendons: int) -> Frame:
 def draw_outside(
     random: np.random.Generator, robot: Table, planar: bool, frame: Frame, marks: list[str]
 ) -> Table:
-    """Return loads from outside at their full size."""
+    """Return external loads at their full size."""
     _, moment, force, _ = sizes_of(robot)
     size = float(np.exp(random.uniform(np.log(0.01), np.log(1.0))))
     flat = np.array([1.0, 0.0, 1.0]) if planar else np.ones(3)
@@ -116,7 +116,7 @@ def draw_outside(
 
 
 def scaled(load: Table, factor: float) -> Table:
-    """Return loads from outside with forces, moments and masses times a factor."""
+    """Return external loads with forces, moments and masses times a factor."""
     load = dict(load)
     for key in ("tip_force", "tip_moment"):
         if key in load:

@@ -96,9 +96,18 @@ def _allowed(value: dict[str, Any]) -> str:
     if "anyOf" in value:
         return " or ".join(filter(None, map(_allowed, value["anyOf"])))
     word = {"integer": "whole number", "number": "number", "string": "text"}[value["type"]]
-    ends = (("exclusiveMinimum", "above"), ("minimum", "from"), ("maximum", "to"))
-    limits = [f"{name} {value[key]:g}" for key, name in ends if key in value]
-    return " ".join([word, *limits])
+    lower = [("from", "minimum"), ("above", "exclusiveMinimum")]
+    upper = [("to", "maximum"), ("and below", "exclusiveMaximum")]
+    limits = [
+        next((f"{name} {_number(value[key])}" for name, key in end if key in value), "")
+        for end in (lower, upper)
+    ]
+    return " ".join(filter(None, [word, *limits]))
+
+
+def _number(value: float) -> str:
+    """Return a number as a robot file holds it: 1e-6, not 1e-06."""
+    return re.sub(r"e([+-])0*", lambda found: f"e{found[1].strip('+')}", f"{value:g}")
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:

@@ -1,4 +1,4 @@
-"""Loads from outside in the head of the table."""
+"""External loads in the head of the table."""
 
 from notchflex.cli.load_words import in_words, load_sentences
 from notchflex.statics.external import NOTHING, BodyForce, ExternalLoad
@@ -25,8 +25,8 @@ def test_every_load_is_named_with_its_unit():
 
 def test_lines_fit_and_changes_are_told_by_their_steps():
     lines = load_sentences([NOTHING, NOTHING, PUSH])
-    assert lines[0] == "loads from outside, steps 1 to 2: none"
-    assert lines[1].startswith("loads from outside, step 3: tip force")
+    assert lines[0] == "external loads, steps 1 to 2: none"
+    assert lines[1].startswith("external loads, step 3: tip force")
     assert all(len(line) <= 80 for line in lines)
     many = [ExternalLoad(tip_mass=mass) for mass in range(1, 6)]
-    assert load_sentences(many) == ["loads from outside: 5 different ones over the steps"]
+    assert load_sentences(many) == ["external loads: 5 different ones over the steps"]

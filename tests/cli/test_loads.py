@@ -1,4 +1,4 @@
-"""The grammar of `--tip-force` and the other loads from outside."""
+"""The grammar of `--tip-force` and the other external loads."""
 
 import numpy as np
 import pytest

@@ -96,7 +96,7 @@ def test_quiet_computes_only_what_it_warns_of(call, monkeypatch):
             asked.append(name)
             return []
 
-        monkeypatch.setattr(nf.Path, name, property(spy))
+        monkeypatch.setattr(nf.EquilibriumPath, name, property(spy))
     assert call(*LOOP[:2], "--tension", "0,1", "--quiet") == (0, "", "")
     assert (made, asked) == ([], [])
     call(*LOOP[:2], "--tension", "0,1")
@@ -206,7 +206,7 @@ def test_loads_and_refinement_reach_the_solver_and_the_head_of_the_table(call, t
         "--json", "a.json",
     )  # fmt: skip
     assert code == 0
-    assert "loads from outside: tip force (-0.05, 0, 0) N" in out
+    assert "external loads: tip force (-0.05, 0, 0) N" in out
     step = json.loads((tmp_path / "a.json").read_text())["steps"][0]
     robot = nf.load_robot("pacheco2021-a")
     load = nf.Load(tension=1.0, tip_force=(-0.05, 0, 0))

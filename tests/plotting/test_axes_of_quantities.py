@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 import notchflex as nf
 from notchflex.errors import InputError
 from notchflex.plotting import Picture
-from notchflex.plotting.drive import LETTING_GO, PULLING
+from notchflex.plotting.drive import LOADING, UNLOADING
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +47,12 @@ def test_angles_are_in_degrees_and_both_ways_differ(path, ax):
     np.testing.assert_allclose(there.get_ydata(), np.degrees(path.total_angle[:5]))
     assert there.get_linestyle() != back.get_linestyle()
     assert there.get_color() != back.get_color()
-    assert names(ax) == [PULLING, LETTING_GO]
+    assert names(ax) == [LOADING, UNLOADING]
 
 
 def test_a_quantity_with_several_entries_has_a_line_for_each(path, ax):
     path.plot("tension", "notch_angle", ax=ax)
-    assert names(ax) == [*(f"notch {number}" for number in range(1, 6)), PULLING, LETTING_GO]
+    assert names(ax) == [*(f"notch {number}" for number in range(1, 6)), LOADING, UNLOADING]
     drawn = [line for line in ax.get_lines() if len(line.get_xdata())]
     assert len(drawn) == 10
     np.testing.assert_allclose(drawn[4].get_ydata(), np.degrees(path.notch_angle[:5, 2]))

@@ -14,8 +14,8 @@ import notchflex as nf
 from fake_path import fake_path
 from fitted import DEVIATION, NAMES, OBSERVED
 from notchflex.cli import run
-from notchflex.comparison import Measured, compare
-from notchflex.fit import calibrate, simulate_measurements
+from notchflex.comparison import compare
+from notchflex.fit import Measurements, calibrate, simulate_measurements
 from notchflex.plotting import (
     beside_picture,
     calibration_picture,
@@ -40,9 +40,9 @@ def nasty_path(steps=3):
 def nasty_comparison():
     robot = nf.load_robot(WRIST).replace(name=NASTY)
     angles = np.radians([[5.0, 5.0, 5.0, 4.0, 4.0], [9.0, 9.0, 8.0, 8.0, 8.0]])
-    none = np.full((2, 1), np.nan)
-    tension = np.array([[0.5], [0.9]])
-    one = compare(robot, Measured(NASTY, tension, none, angles, angles.sum(1), (NASTY, "_2")))
+    observed = {"notch_angle": angles, "total_angle": angles.sum(1)}
+    load = nf.pull(0.5, 0.9, steps=2)
+    one = compare(robot, Measurements(NASTY, load, (NASTY, "_2"), True, observed))
     return comparison_picture(one, {NASTY: one, "_other": one})
 
 
@@ -169,3 +169,14 @@ def test_a_browser_shows_the_heading_letter_by_letter(browser, tmp_path):
         assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert json.loads(page.evaluate("JSON.stringify(document.title)")) == NASTY
     page.close()
+
+
+@pytest.mark.parametrize("column", ["tip_x_mm", "notch_3_deg", "notch_12_deg"])
+def test_the_symbol_of_one_entry_is_mathematics(column):
+    wrist = nf.load_robot("pacheco2021-a")
+    twelve = replace(wrist, notch=(replace(wrist.notch[0], repeat=12),))
+    axes = nf.solve_each(twelve, nf.pull(0.0, 0.5, steps=2)).plot(column, "total_angle")
+    label = axes.get_xlabel()
+    assert r"\$" not in label
+    assert label.count("$") == 2
+    assert "$" not in for_browser(label)

@@ -24,7 +24,7 @@ def loop():
 
 @pytest.fixture(scope="module")
 def turned():
-    """A base that is turned, and loads from outside of several kinds, all in one plane."""
+    """A base that is turned, and external loads of several kinds, all in one plane."""
     robot = nf.load_robot("pacheco2021-a")
     side = nf.BodyForce(2, (0.01, 0.0, 0.0), point=(0.5, 0.0, 0.0), following=True)
     loads = nf.pull(0.0, 1.0, steps=2).loaded(tip_force=(0.0, 0.0, 0.02), body_forces=[side])

@@ -1,4 +1,4 @@
-"""Loads from outside: the sums that the solver takes against every force added up by hand."""
+"""External loads: the sums that the solver takes against every force added up by hand."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Loads from outside as people give them: what is taken and kept, and what is refused."""
+"""External loads as people give them: what is taken and kept, and what is refused."""
 
 import numpy as np
 import pytest

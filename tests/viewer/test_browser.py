@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.drive import LETTING_GO, PULLING
+from notchflex.plotting.drive import LOADING, UNLOADING
 from notchflex.robot import robot_from_text
 from visit import Visit, changed
 
@@ -60,7 +60,7 @@ def test_a_slider_moved_is_a_wrist_bent_and_back_again_leaves_hysteresis(visit):
     assert changed(straight, bent) > 0.01
     assert changed(bent, held) > 0.01
     loop = visit.page.locator("svg[aria-label='total angle against tension'] path title")
-    assert loop.all_text_contents() == [PULLING, LETTING_GO]
+    assert loop.all_text_contents() == [LOADING, UNLOADING]
     visit.reset()
     assert visit.angle() == 0.0
     assert changed(straight, visit.picture()) < 0.004
@@ -82,7 +82,7 @@ def test_dragging_the_slider_with_the_mouse(visit):
     assert value > 0.0
     assert visit.still()["tension_1"] == pytest.approx(value, abs=1e-3)
     loop = visit.page.locator("svg[aria-label='total angle against tension'] path title")
-    assert loop.all_text_contents() == [PULLING, LETTING_GO]  # it has been up
+    assert loop.all_text_contents() == [LOADING, UNLOADING]  # it has been up
     visit.reset()
 
 

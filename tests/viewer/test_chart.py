@@ -50,17 +50,17 @@ def test_many_points_are_thinned_but_not_their_ends():
     assert len(text) < 50_000
 
 
-def test_the_loop_tells_pulling_from_letting_go_and_keeps_the_loop_before():
+def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
     from notchflex.viewer.charts import loop_chart, tendon_chart
 
     session = Session(ready("A"))
     for tension in (1.0, 2.0, 1.0):
         session.go(session.controls.with_tendon(0, "tension", tension))
     ways = [one.text for one in elements(loop_chart(session, 0), "title")]
-    assert ways == ["pulling", "letting go"]
+    assert ways == ["loading", "unloading"]
     session.change(ready("A").with_value("friction.coefficient", 0.05))
     ways = [one.text for one in elements(loop_chart(session, 0), "title")]
-    assert ways == ["before the change", "pulling", "letting go"]
+    assert ways == ["before the change", "loading", "unloading"]
     along = tendon_chart(session, 0)
     assert "span tension [N]" in [one.text for one in elements(along, "text")]
     assert len(elements(along, "circle")) == 9  # two edges a notch, but the last one is fixed

@@ -1,4 +1,4 @@
-"""Loads from outside in words, for the head of a table."""
+"""External loads in words, for the head of a table."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ def load_sentences(external: Sequence[ExternalLoad]) -> list[str]:
     if all(one.is_nothing for one in different):
         return []
     if len(different) > MOST_LOADS:
-        return [f"loads from outside: {len(different)} different ones over the steps"]
+        return [f"external loads: {len(different)} different ones over the steps"]
     lines: list[str] = []
     for one in different:
         steps = [number for number, other in enumerate(external, start=1) if other == one]
         where = "" if len(different) == 1 else _steps(steps)
-        text = f"loads from outside{where}: {in_words(one)}"
+        text = f"external loads{where}: {in_words(one)}"
         lines += textwrap.wrap(text, width=terminal.NARROW, subsequent_indent="    ")
     return lines
 

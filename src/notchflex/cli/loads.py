@@ -1,4 +1,4 @@
-"""Loads from outside on the command line: forces, moments, a hung mass and gravity."""
+"""External loads on the command line: forces, moments, a hung mass and gravity."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from notchflex.statics import BodyForce, LoadPath
 
 LOADS = Group(
-    "Loads from outside", sort_key=8, help="They act before the first step and stay as they are."
+    "External loads", sort_key=8, help="They act before the first step and stay as they are."
 )
 _OPTION = Parameter(group=LOADS, allow_leading_hyphen=True)
 _BODY = "BODY:X,Y,Z or BODY:X,Y,Z@X,Y,Z, such as 3:0,0.1,0 or 3:0,0.1,0@0.8,0,0.5"

@@ -15,7 +15,7 @@ from notchflex.results.spans import holds
 from notchflex.robot._explain import nearest
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 NO_NUMBER = "–"
 CLOSED = "*"
@@ -87,7 +87,7 @@ def step_group(rows: Sequence[int]) -> Group:
     return Group((), 0, [Column("step", "", [str(row + 1) for row in rows])])
 
 
-def usual_groups(path: Path, rows: Sequence[int]) -> list[Group]:
+def usual_groups(path: EquilibriumPath, rows: Sequence[int]) -> list[Group]:
     """Return the columns that are shown where none are named, in the order of the table."""
     groups: list[Group] = []
     for tendon in range(path.tension.shape[1]):
@@ -118,7 +118,7 @@ def usual_groups(path: Path, rows: Sequence[int]) -> list[Group]:
     return groups
 
 
-def named_groups(path: Path, rows: Sequence[int], names: Sequence[str]) -> list[Group]:
+def named_groups(path: EquilibriumPath, rows: Sequence[int], names: Sequence[str]) -> list[Group]:
     """Return the columns of the quantities that were named, in that order."""
     return [_group(path, rows, name, 1) for name in names]
 
@@ -150,7 +150,7 @@ def parse_columns(text: str) -> list[str]:
     return names
 
 
-def _group(path: Path, rows: Sequence[int], name: str, rank: int) -> Group:
+def _group(path: EquilibriumPath, rows: Sequence[int], name: str, rank: int) -> Group:
     quantity = QUANTITIES[name]
     columns = _components(path, rows, quantity)
     return Group((name,), rank, columns, _meaning(name, HEADS.get(name, "")))
@@ -163,7 +163,7 @@ def _meaning(name: str, head: str) -> str:
     return f"{head}: {text}{unit}" if head else f"{text}{unit}"
 
 
-def _components(path: Path, rows: Sequence[int], quantity: Quantity) -> list[Column]:
+def _components(path: EquilibriumPath, rows: Sequence[int], quantity: Quantity) -> list[Column]:
     """Return a column for every component of a quantity that holds anything."""
     values = getattr(path, quantity.name, None)
     if values is None:
@@ -183,7 +183,11 @@ def _components(path: Path, rows: Sequence[int], quantity: Quantity) -> list[Col
 
 
 def _marked(
-    path: Path, rows: Sequence[int], quantity: Quantity, index: tuple[int, ...], cells: list[str]
+    path: EquilibriumPath,
+    rows: Sequence[int],
+    quantity: Quantity,
+    index: tuple[int, ...],
+    cells: list[str],
 ) -> Column:
     """Return a column with its head; a star marks the angle of a closed notch."""
     head, unit = _head(quantity, index, np.shape(getattr(path, quantity.name))[1:]), _unit(quantity)
@@ -211,7 +215,7 @@ def _unit(quantity: Quantity) -> str:
     return "%" if quantity.name in PERCENT else quantity.unit
 
 
-def _is_told(path: Path, quantity: Quantity, row: int) -> bool:
+def _is_told(path: EquilibriumPath, quantity: Quantity, row: int) -> bool:
     always = ("commanded_tension", "commanded_stroke", "converged", "reason", "residual")
     return bool(path.converged[row]) or quantity.name in (*always, "iterations")
 

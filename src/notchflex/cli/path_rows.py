@@ -10,13 +10,13 @@ import numpy as np
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 MOST_ROWS = 60
 """A path with no more steps than this is shown whole."""
 
 
-def shown_rows(path: Path, most: int = MOST_ROWS) -> tuple[list[int], int]:
+def shown_rows(path: EquilibriumPath, most: int = MOST_ROWS) -> tuple[list[int], int]:
     """Return the steps to show and the stride between them.
 
     Args:
@@ -44,7 +44,7 @@ def shown_rows(path: Path, most: int = MOST_ROWS) -> tuple[list[int], int]:
     return sorted(rows), stride
 
 
-def reversals_of(path: Path) -> set[int]:
+def reversals_of(path: EquilibriumPath) -> set[int]:
     """Return the steps at which a commanded tension or stroke stops rising or falling.
 
     Where a load is held for some steps before it reverses, the first and the last of these.
@@ -70,7 +70,7 @@ def rows_note(steps: int, shown: int, stride: int) -> str:
     )
 
 
-def _extremes(path: Path) -> set[int]:
+def _extremes(path: EquilibriumPath) -> set[int]:
     return {
         int(pick(column))
         for column in _commanded(path)
@@ -79,13 +79,13 @@ def _extremes(path: Path) -> set[int]:
     }
 
 
-def _commanded(path: Path) -> list[np.ndarray]:
+def _commanded(path: EquilibriumPath) -> list[np.ndarray]:
     """The columns of what was commanded; the tensions of what was not are no commands."""
     columns = [*np.asarray(path.commanded_tension).T, *np.asarray(path.commanded_stroke).T]
     return [column for column in columns if np.isfinite(column).any()]
 
 
-def all_rows(path: Path) -> tuple[list[int], int]:
+def all_rows(path: EquilibriumPath) -> tuple[list[int], int]:
     """Return every step of a path, as `shown_rows` does.
 
     Raises:

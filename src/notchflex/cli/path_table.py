@@ -23,11 +23,11 @@ from notchflex.results.quantities import QUANTITIES
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 
 def print_path(
-    path: Path, title: str, *, columns: Sequence[str] = (), every_row: bool = False
+    path: EquilibriumPath, title: str, *, columns: Sequence[str] = (), every_row: bool = False
 ) -> None:
     """Print the steps of a path with units.
 
@@ -65,7 +65,7 @@ def print_path(
 
 
 def print_beside(
-    paths: Mapping[str, Path], *, columns: Sequence[str] = (), every_row: bool = False
+    paths: Mapping[str, EquilibriumPath], *, columns: Sequence[str] = (), every_row: bool = False
 ) -> None:
     """Print quantities of several paths under the same loads, side by side.
 
@@ -135,7 +135,7 @@ def _columns(groups: Sequence[Group]) -> list[Column]:
 
 
 def _print_block(
-    console: Console, path: Path, rows: Sequence[int], columns: Sequence[Column]
+    console: Console, path: EquilibriumPath, rows: Sequence[int], columns: Sequence[Column]
 ) -> None:
     table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
     # Units stand on one line at the foot of the heads.

@@ -41,7 +41,7 @@ from notchflex.errors import InputError
 from notchflex.results.files import STANDARD_OUTPUT
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path, SavedState
+    from notchflex.statics import EquilibriumPath, SavedState
 
 SPEC = (
     "Values or `start:stop:count` ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. "
@@ -142,9 +142,9 @@ def simulate(
 ) -> int:
     """Pull the tendons of a robot through a series of tensions or strokes.
 
-    The steps are one path with memory: friction keeps what earlier steps did, so a tension that
-    is let go differs from the same tension pulled. Prints a table as wide as the terminal (the
-    variable COLUMNS says otherwise) unless `--json -` or `--csv -` prints something else.
+    The steps are one path with friction history: at the same tension, unloading differs from
+    loading. Prints a table as wide as the terminal (the variable COLUMNS says otherwise) unless
+    `--json -` or `--csv -` prints something else.
     """
     terminal.be_quiet(quiet)
     named = () if columns is None else parse_columns(columns)
@@ -187,7 +187,7 @@ def simulate(
         start = None if from_state is None else _start(from_state)
         pulled = statics.LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
         pulled = put_on(pulled, loads)
-        paths: dict[str, Path] = {}
+        paths: dict[str, EquilibriumPath] = {}
         for number, (label, one) in enumerate(robots.items()):
             if number:
                 counted(number, len(robots))
@@ -224,7 +224,7 @@ def _refinement(text: str) -> int:
     return int(text)
 
 
-def _say_what_matters(path: Path, label: str) -> int:
+def _say_what_matters(path: EquilibriumPath, label: str) -> int:
     """Tell warnings and failures, of one of several with its label; return the exit code."""
     from notchflex.cli.app import DONE, NOT_CONVERGED
     from notchflex.results.warnings import path_warnings

@@ -21,7 +21,7 @@ from notchflex.results.files import (
 )
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 Outputs = Mapping[str, str | None]
 """Option, such as `--json`, to the file that it names; None where it was not given."""
@@ -62,7 +62,7 @@ def check_files(outputs: Outputs, inputs: Sequence[FilePath], *, steps: int, sev
             need("polars", "data", option)
 
 
-def write_files(paths: Mapping[str, Path], outputs: Outputs, title: str) -> None:
+def write_files(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str) -> None:
     """Write what was asked for: table, JSON and picture of all paths, other files of the first.
 
     Args:
@@ -106,7 +106,7 @@ def _moves(target: str) -> bool:
     return FilePath(target).suffix.lower() in MOVING
 
 
-def _draw(paths: Mapping[str, Path], target: str, title: str) -> None:
+def _draw(paths: Mapping[str, EquilibriumPath], target: str, title: str) -> None:
     path, *others = paths.values()
     if _moves(target):
         with terminal.counting(f"drawing {target}") as counted:

@@ -22,7 +22,7 @@ from notchflex.robot import Robot
 from notchflex.statics import axis_points, equal_stroke, tip_from_angles
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 _COLUMNS = ("tension", "stroke", "notch_angle", "total_angle", "tip_position", "converged")
 # What has no column of its own in a comparison: only its error is told.
@@ -172,7 +172,7 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
     _check(robot, measurements)
     observed = tuple(name for name in _OTHERS if name in measurements.observed)
 
-    def read(path: Path) -> dict[str, Any]:
+    def read(path: EquilibriumPath) -> dict[str, Any]:
         columns = {name: np.asarray(getattr(path, name)) for name in _COLUMNS}
         columns["reason"] = np.array(path.reason, object)
         for name in outputs_for(observed):

@@ -32,7 +32,7 @@ class Measurements:
     Attributes:
         source: Where they came from.
         load: What was done, P steps: tension or stroke of every tendon as the model is given it,
-            NaN where the other is given; the loads from outside of each row. A measured tension
+            NaN where the other is given; the external loads of each row. A measured tension
             below 0 is the offset of a sensor, and 0 N in the model.
         pull: Label of the pull that each row belongs to, P of them.
         from_rest: True where every row is a pull from rest; False where the rows of a pull, in

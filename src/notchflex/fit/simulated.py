@@ -17,7 +17,7 @@ from notchflex.statics import Load, LoadPath, axis_points
 from notchflex.statics.load import load_path
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 _ANGLES = ("notch_angle", "total_angle", "tip_rotation")
 
@@ -77,7 +77,7 @@ def simulate_measurements(
         raise InputError(f"{len(path)} steps need a label of their pull each; got {len(labels)}")
     random = np.random.default_rng(seed)
 
-    def read(states: Path) -> dict[str, NDArray[np.float64]]:
+    def read(states: EquilibriumPath) -> dict[str, NDArray[np.float64]]:
         return modelled(states.raise_if_failed(), observed, axis_at)
 
     model = solved_rows(robot, path, labels, from_rest, read)
@@ -99,7 +99,7 @@ def simulate_measurements(
 
 
 def modelled(
-    path: Path, observed: Sequence[str], axis_at: ArrayLike = ()
+    path: EquilibriumPath, observed: Sequence[str], axis_at: ArrayLike = ()
 ) -> dict[str, NDArray[np.float64]]:
     """What would be measured on solved states, by the names of `Measurements.observed`.
 
@@ -134,7 +134,7 @@ def _told(value: Any, name: str) -> Any:
     return np.radians(np.degrees(value)) if name in _ANGLES else value
 
 
-def _tip_tension(path: Path) -> NDArray[np.float64]:
+def _tip_tension(path: EquilibriumPath) -> NDArray[np.float64]:
     last = [spans_of(path, tendon) - 1 for tendon in range(path.span_tension.shape[1])]
     return path.span_tension[:, np.arange(len(last)), last]
 

@@ -13,7 +13,7 @@ from notchflex.robot import Robot
 from notchflex.statics import LoadPath, simulate, solve_each
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 
 def solved_rows(
@@ -21,7 +21,7 @@ def solved_rows(
     load: LoadPath,
     pull: Sequence[str],
     from_rest: bool,
-    read: Callable[[Path], Mapping[str, NDArray[Any]]],
+    read: Callable[[EquilibriumPath], Mapping[str, NDArray[Any]]],
 ) -> dict[str, NDArray[Any]]:
     """Solve every row and return what is read from the solved states.
 

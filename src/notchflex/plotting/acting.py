@@ -1,4 +1,4 @@
-"""Loads from outside in a picture: where they act on the bent robot, and which way."""
+"""External loads in a picture: where they act on the bent robot, and which way."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from notchflex.plotting.style import GREY, PURPLE, SKY
 
 if TYPE_CHECKING:
     from notchflex.plotting.bent import Bent
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 DEAD, FOLLOWING, WEIGHT = "", ", following", ", weight"
 COLOUR = {DEAD: PURPLE, FOLLOWING: SKY, WEIGHT: GREY}
@@ -45,7 +45,7 @@ class Acting(NamedTuple):
         return f"{self.name} {self.size:.3g} {unit}{self.kind}"
 
 
-def acting_at(path: Path, step: int, shape: Bent) -> list[Acting]:
+def acting_at(path: EquilibriumPath, step: int, shape: Bent) -> list[Acting]:
     """Return the forces and moments on a robot at one step of a path; a hung mass as its weight.
 
     Gravity on the robot's own mass acts everywhere and is not among them.
@@ -58,7 +58,7 @@ def acting_at(path: Path, step: int, shape: Bent) -> list[Acting]:
     return [one for one in _every(path, step, shape) if one.size > 0.0]
 
 
-def _every(path: Path, step: int, shape: Bent) -> Iterator[Acting]:
+def _every(path: EquilibriumPath, step: int, shape: Bent) -> Iterator[Acting]:
     load = path.load.external[step]
     world = path.body_rotation[step, 0]
 
@@ -79,7 +79,7 @@ def _every(path: Path, step: int, shape: Bent) -> Iterator[Acting]:
         yield Acting("moment", kind, point, carried(one.moment, one.body, one.following))
 
 
-def out_of_plane(path: Path, step: int, shape: Bent, view: float) -> float:
+def out_of_plane(path: EquilibriumPath, step: int, shape: Bent, view: float) -> float:
     """Return the largest part of a load that a view does not show: of a force, or of a moment.
 
     A force shows where it lies in the plane of the view, a moment where it stands on it.

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.plotting.curves import COLOUR, LINE
-from notchflex.plotting.drive import LETTING_GO, PULLING, abscissa, branches, drive, way_of
+from notchflex.plotting.drive import LOADING, UNLOADING, abscissa, branches, drive, way_of
 from notchflex.plotting.sheet import BESIDE, Item, Line, Panel
 from notchflex.plotting.style import sequence_colours
 from notchflex.results.quantities import QUANTITIES
 from notchflex.results.spans import spans_of
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 MOST_STEPS = 6
 MOST_TENDONS = 8
@@ -28,13 +28,13 @@ SLACK = 1e-9
 """A tendon with less tension [N] all along a path has nothing to show."""
 
 
-def pulled_tendons(path: Path) -> list[int]:
+def pulled_tendons(path: EquilibriumPath) -> list[int]:
     """Return the tendons (from 0) that carry tension anywhere on a path."""
     tension = np.nan_to_num(np.where(np.asarray(path.converged)[:, None], path.tension, 0.0))
     return [int(i) for i in np.flatnonzero(tension.max(axis=0) > SLACK)]
 
 
-def profile_panel(path: Path, tendon: int) -> Panel:
+def profile_panel(path: EquilibriumPath, tendon: int) -> Panel:
     """Return the tension of a tendon (from 0) from span to span, while loading and unloading.
 
     Steps of one tension have one colour; solid lines are loading, dashed ones unloading.
@@ -74,11 +74,11 @@ def profile_panel(path: Path, tendon: int) -> Panel:
     )
 
 
-def front_panel(path: Path) -> Panel:
+def front_panel(path: EquilibriumPath) -> Panel:
     """Return at how many contacts of every pulled tendon the friction has reversed.
 
     After a reversal of the load friction turns contact by contact, from the base on; between two
-    contacts by how far the one of them has come (`Path.front`).
+    contacts by how far the one of them has come (`EquilibriumPath.front`).
     """
     x, label = abscissa(path)
     tendons = pulled_tendons(path)
@@ -87,7 +87,7 @@ def front_panel(path: Path) -> Panel:
     for order, tendon in enumerate(tendons):
         named: set[str] = set()
         for part, growing in branches(drive(path)):
-            way = PULLING if growing else LETTING_GO
+            way = LOADING if growing else UNLOADING
             which = f", tendon {tendon + 1}" if len(tendons) > 1 else ""
             items.append(
                 Line(
@@ -117,7 +117,7 @@ def front_panel(path: Path) -> Panel:
     )
 
 
-def reversed_contacts(path: Path) -> NDArray[np.float64]:
+def reversed_contacts(path: EquilibriumPath) -> NDArray[np.float64]:
     """Return at how many contacts the friction has reversed, (S, tendons); NaN without tension."""
     m, eta = (np.asarray(part, float) for part in path.front)
     # eta falls from 1 to -1 while the friction of one contact reverses.
@@ -127,7 +127,7 @@ def reversed_contacts(path: Path) -> NDArray[np.float64]:
     return reversed_
 
 
-def reverses_step_by_step(path: Path) -> bool:
+def reverses_step_by_step(path: EquilibriumPath) -> bool:
     """Tell whether the friction of a tendon reverses over several steps: whether to draw it."""
     if not has_friction(path):
         return False
@@ -139,14 +139,14 @@ def reverses_step_by_step(path: Path) -> bool:
     return max(map(len, between), default=0) >= _FEWEST
 
 
-def has_friction(path: Path) -> bool:
+def has_friction(path: EquilibriumPath) -> bool:
     """Tell whether any contact of a pulled tendon rubs at any step."""
     bound = np.nan_to_num(path.contact_bound[np.asarray(path.converged)])
     tendons = pulled_tendons(path)
     return bool(tendons) and bool((bound[:, tendons] > 0.0).any())
 
 
-def _spread(path: Path, steps: list[int], tendon: int) -> list[int]:
+def _spread(path: EquilibriumPath, steps: list[int], tendon: int) -> list[int]:
     """Some of the steps with tension, evenly spread over it."""
     steps = [step for step in steps if path.tension[step, tendon] > SLACK]
     if len(steps) <= MOST_STEPS:

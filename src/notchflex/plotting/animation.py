@@ -22,7 +22,7 @@ from notchflex.results.files import MOVING, check_picture, replacing
 from notchflex.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 MOST_FRAMES = 48
 """Steps of a long path that are shown."""
@@ -37,7 +37,7 @@ _SHORTEST, _LONGEST = 0.1, 0.4
 
 
 def save_animation(
-    path: Path,
+    path: EquilibriumPath,
     target: str | FilePath,
     *,
     title: str | None = None,
@@ -49,7 +49,7 @@ def save_animation(
 
     Args:
         path: Solved path; of a long one some steps are shown, spread evenly.
-        target: Path that ends in .gif; the file is whole or not there.
+        target: EquilibriumPath that ends in .gif; the file is whole or not there.
         title: Heading; the name of the robot if None.
         progress: Called with the frames done and all frames.
 
@@ -103,7 +103,7 @@ def save_animation(
                 progress(number + 1, len(steps))
 
 
-def frames_of(path: Path) -> list[int]:
+def frames_of(path: EquilibriumPath) -> list[int]:
     """Return the steps to show: converged ones, spread evenly, with the first and the last."""
     good = np.flatnonzero(np.asarray(path.converged))
     if len(good) <= MOST_FRAMES:
@@ -112,7 +112,7 @@ def frames_of(path: Path) -> list[int]:
     return [int(step) for step in good[spread]]
 
 
-def _stage(path: Path, title: str | None) -> Picture:
+def _stage(path: EquilibriumPath, title: str | None) -> Picture:
     """What stands still: the curves, and axes in which every shape has room."""
     widest = shape_panel(path, telling_steps(path), plane_of(path))
     # Legends change from frame to frame and would jump.
@@ -122,13 +122,13 @@ def _stage(path: Path, title: str | None) -> Picture:
     return Picture(path.robot.name if title is None else title, 9.6, 5.4, cells)
 
 
-def _robot(path: Path, step: int, view: float | None) -> Panel:
+def _robot(path: EquilibriumPath, step: int, view: float | None) -> Panel:
     panel = shape_panel(path, [step], view, colours=[BLUE])
     label = next(one.name for one in panel.items if isinstance(one, (Area, Faces)) and one.name)
     return replace(panel, legend="", title=label)
 
 
-def _dots(path: Path, step: int) -> list[tuple[list[float], list[float], str]]:
+def _dots(path: EquilibriumPath, step: int) -> list[tuple[list[float], list[float], str]]:
     """Where a step stands on the loop, and on the curves of the notches."""
     x = float(abscissa(path)[0][step])
     total = float(path.total_angle[step]) * QUANTITIES["total_angle"].scale

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from notchflex.errors import InputError
 from notchflex.plotting.curves import COLOUR, LINE, failures, solved_only
-from notchflex.plotting.drive import LETTING_GO, PULLING, branches, drive
+from notchflex.plotting.drive import LOADING, UNLOADING, branches, drive
 from notchflex.plotting.equilibrium import robot_shape, state_shape
 from notchflex.plotting.sheet import BESIDE, INSIDE, Item, Line, Panel
 from notchflex.plotting.style import house_style, sequence_colours
@@ -102,7 +102,7 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
     Raises:
         InputError: There is no such quantity, it is no number, or x has several entries.
     """
-    ways = [(part, PULLING if up else LETTING_GO) for part, up in branches(drive(path))]
+    ways = [(part, LOADING if up else UNLOADING) for part, up in branches(drive(path))]
     both = len({way for _, way in ways}) > 1
     across, upward = series_of(path, x), series_of(path, y)
     pairs = _pairs(x, across, upward)
@@ -127,7 +127,7 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
             )
             named.add(name)
     if several and both:
-        items += [Line([], "#4c4c4c", LINE[way], name=way) for way in (PULLING, LETTING_GO)]
+        items += [Line([], "#4c4c4c", LINE[way], name=way) for way in (LOADING, UNLOADING)]
     if len({column for column, _ in pairs}) == 1:
         items += failures(path, across.values[:, pairs[0][0]])
     told = both or not np.all(path.converged)
@@ -172,7 +172,9 @@ def _label(quantity: Quantity, entry: Entry) -> str:
         title, symbol = f"{quantity.title} {name}", f"{quantity.symbol}_{name}"
     else:
         title = f"{quantity.title.removeprefix(f'{quantity.per[0]} ')} of {name}"
-        symbol = quantity.symbol.replace("_j", f"_{name.removeprefix('notch ')}")
+        number = name.removeprefix("notch ")
+        index = number if len(number) == 1 else f"{{{number}}}"
+        symbol = quantity.symbol.replace("_j", f"_{index}")
     return replace(quantity, title=title, symbol=symbol).label
 
 

@@ -19,7 +19,7 @@ from notchflex.robot import Robot
 
 if TYPE_CHECKING:
     from notchflex.chain import Chain
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 Points = NDArray[np.float64]
 Walls = list[tuple[float, float] | None]
@@ -239,7 +239,7 @@ def bent(
     return Bent(robot, chain, rotation, position, [flexures[j] for j in range(len(counts))])
 
 
-def bent_at(path: Path, step: int, pieces: int = FLEXURE_POINTS) -> Bent:
+def bent_at(path: EquilibriumPath, step: int, pieces: int = FLEXURE_POINTS) -> Bent:
     """Return the robot of a path at one of its steps; for `pieces` see `bent`."""
     modes, own = path.run.solved.point.unknowns.modes[step], path.chain
     chain = _of_space(path.robot, own.level, own.refinement)

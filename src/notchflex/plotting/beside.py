@@ -11,7 +11,7 @@ from notchflex.errors import InputError
 from notchflex.plotting.along import SLACK
 from notchflex.plotting.comparison import MODEL_COLOURS
 from notchflex.plotting.curves import LINE, failures, solved_only
-from notchflex.plotting.drive import LETTING_GO, PULLING, abscissa, branches, drive, way_of
+from notchflex.plotting.drive import LOADING, UNLOADING, abscissa, branches, drive, way_of
 from notchflex.plotting.path import plane_of, shape_panel
 from notchflex.plotting.sheet import BELOW, Cell, Colour, Item, Line, Note, Panel, Picture
 from notchflex.plotting.style import GREY, rgb
@@ -20,7 +20,7 @@ from notchflex.results.quantities import QUANTITIES
 from notchflex.results.spans import spans_of
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 MOST = len(MODEL_COLOURS)
 """More robots than this cannot be told apart by colour."""
@@ -28,7 +28,7 @@ MOST = len(MODEL_COLOURS)
 _SHAPES = 3
 
 
-def beside_picture(paths: Mapping[str, Path], *, title: str = "") -> Picture:
+def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> Picture:
     """Describe several solved paths beside each other: other robots, or other models of one.
 
     Every robot to scale at a few loads, in the colour that it has in the curves too: total angle
@@ -71,12 +71,12 @@ def beside_picture(paths: Mapping[str, Path], *, title: str = "") -> Picture:
         cells.append(Cell(panel, (row, row + 1), (column, column + 1)))
     legend = [Line([], colours[label], name=label, group=label) for label in paths]
     if any(len(way_of(path)) > 1 for path in paths.values()):
-        legend += [Line([], GREY, LINE[way], name=way) for way in (PULLING, LETTING_GO)]
+        legend += [Line([], GREY, LINE[way], name=way) for way in (LOADING, UNLOADING)]
     heading = title or "; ".join(dict.fromkeys(path.robot.name for path in paths.values()))
     return Picture(heading, 1.2 + 3.6 * (len(paths) + 2), 6.8, cells, legend)
 
 
-def most_bent(path: Path) -> int | None:
+def most_bent(path: EquilibriumPath) -> int | None:
     """Return the converged step at which the notches are bent most; None without any."""
     steps = telling_steps(path)
     return steps[-1] if steps else None
@@ -86,7 +86,7 @@ def _pale(colour: Colour, part: float) -> Colour:
     return tuple(one + part * (1.0 - one) for one in rgb(colour))
 
 
-def _angles(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
+def _angles(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:
     quantity = QUANTITIES["total_angle"]
     items: list[Item] = []
     labels: list[str] = []
@@ -101,7 +101,7 @@ def _angles(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
     return Panel(items, together, quantity.label)
 
 
-def _travel(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
+def _travel(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:
     quantity = QUANTITIES["tip_position"]
     items: list[Item] = []
     for label, path in paths.items():
@@ -120,7 +120,7 @@ def _dots(points: np.ndarray, colours: Mapping[str, Colour], label: str, size: f
     return Line(points, colours[label], marker="o", size=size, group=label, told=True)
 
 
-def _notches(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
+def _notches(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:
     quantity = QUANTITIES["notch_angle"]
     items: list[Item] = []
     least = 0.0
@@ -142,7 +142,7 @@ def _notches(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
     )
 
 
-def _tensions(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel:
+def _tensions(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:
     quantity = QUANTITIES["span_tension"]
     items: list[Item] = []
     for label, path in paths.items():
@@ -163,12 +163,12 @@ def _tensions(paths: Mapping[str, Path], colours: Mapping[str, Colour]) -> Panel
     )
 
 
-def _loop(path: Path, points: np.ndarray, label: str, colour: Colour) -> list[Item]:
+def _loop(path: EquilibriumPath, points: np.ndarray, label: str, colour: Colour) -> list[Item]:
     return [
         Line(
             points[part],
             colour,
-            LINE[PULLING if growing else LETTING_GO],
+            LINE[LOADING if growing else UNLOADING],
             marker="o" if part.stop - part.start == 1 else "",
             group=label,
             told=True,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.drive import LETTING_GO, PULLING, abscissa, branches, drive
+from notchflex.plotting.drive import LOADING, UNLOADING, abscissa, branches, drive
 from notchflex.plotting.sheet import (
     BESIDE,
     DASHED,
@@ -25,15 +25,15 @@ from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
-COLOUR = {PULLING: BLUE, LETTING_GO: VERMILLION}
-LINE = {PULLING: SOLID, LETTING_GO: DASHED}
+COLOUR = {LOADING: BLUE, UNLOADING: VERMILLION}
+LINE = {LOADING: SOLID, UNLOADING: DASHED}
 MOST_NAMES = 12
 """More notches than this are not all named in a legend."""
 
 
-def total_panel(path: Path) -> Panel:
+def total_panel(path: EquilibriumPath) -> Panel:
     """Return the total angle against tension or stroke, loading and unloading apart."""
     quantity = QUANTITIES["total_angle"]
     x, label = abscissa(path)
@@ -44,7 +44,7 @@ def total_panel(path: Path) -> Panel:
     return Panel(items, label, quantity.label, legend=INSIDE if told else "")
 
 
-def notches_panel(path: Path) -> Panel:
+def notches_panel(path: EquilibriumPath) -> Panel:
     """Return the angle of every notch; dots mark where a notch is closed."""
     quantity = QUANTITIES["notch_angle"]
     x, label = abscissa(path)
@@ -64,7 +64,7 @@ def notches_panel(path: Path) -> Panel:
     return Panel(items, label, quantity.label, legend=BESIDE)
 
 
-def strain_panel(path: Path) -> Panel:
+def strain_panel(path: EquilibriumPath) -> Panel:
     """Return the peak strain of every notch, with what the material is allowed."""
     x, label = abscissa(path)
     strain = solved_only(path, 100.0 * np.abs(path.peak_strain))
@@ -85,7 +85,7 @@ def strain_panel(path: Path) -> Panel:
     )
 
 
-def stroke_panel(path: Path, tendon: int) -> Panel:
+def stroke_panel(path: EquilibriumPath, tendon: int) -> Panel:
     """Return the tension of a tendon (from 0) over its stroke: the loop that friction makes."""
     points = np.stack([path.stroke[:, tendon], solved_only(path, path.tension)[:, tendon]], axis=1)
     items = list(_ways(path, points))
@@ -101,11 +101,11 @@ def stroke_panel(path: Path, tendon: int) -> Panel:
     return Panel(items, labels[0], labels[1], legend=INSIDE, y_range=(0.0, None))
 
 
-def _ways(path: Path, points: NDArray[np.float64]) -> Iterator[Item]:
+def _ways(path: EquilibriumPath, points: NDArray[np.float64]) -> Iterator[Item]:
     """The branches of a loop, loading and unloading apart, each named once."""
     named: set[str] = set()
     for part, growing in branches(drive(path)):
-        way = PULLING if growing else LETTING_GO
+        way = LOADING if growing else UNLOADING
         name = "" if way in named else way
         marker = _marker(part)
         yield Line(
@@ -115,7 +115,7 @@ def _ways(path: Path, points: NDArray[np.float64]) -> Iterator[Item]:
 
 
 def _of_notch(
-    path: Path,
+    path: EquilibriumPath,
     x: NDArray[np.float64],
     values: NDArray[np.float64],
     notch: int,
@@ -133,7 +133,7 @@ def _of_notch(
         yield Line(
             np.stack([x[part], values[part, notch]], axis=1),
             colour,
-            LINE[PULLING if growing else LETTING_GO],
+            LINE[LOADING if growing else UNLOADING],
             marker=_marker(part),
             name=group if named and order == 0 and notch in chosen else "",
             group=group,
@@ -145,14 +145,14 @@ def _notch_name(notch: int) -> str:
     return f"notch {notch + 1}"
 
 
-def failures(path: Path, x: NDArray[np.float64]) -> Iterator[Item]:
+def failures(path: EquilibriumPath, x: NDArray[np.float64]) -> Iterator[Item]:
     """Mark the steps that were not solved by dotted lines."""
     places = x[~np.asarray(path.converged)]
     for order, place in enumerate(places[np.isfinite(places)]):
         yield Upright(float(place), name="" if order else "not converged")
 
 
-def solved_only(path: Path, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def solved_only(path: EquilibriumPath, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return values with NaN in the steps that did not converge."""
     values = np.array(values, dtype=float)
     values[~np.asarray(path.converged)] = np.nan

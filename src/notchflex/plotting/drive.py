@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from notchflex.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
-PULLING, LETTING_GO = "loading", "unloading"
+LOADING, UNLOADING = "loading", "unloading"
 """What the two branches of a loop are called."""
 
 
-def abscissa(path: Path) -> tuple[NDArray[np.float64], str]:
+def abscissa(path: EquilibriumPath) -> tuple[NDArray[np.float64], str]:
     """Return what a path is drawn against: the one tendon that changes, or the step.
 
     Where several change in step with each other, the first of them tells. It is its stroke where
@@ -41,7 +41,7 @@ def abscissa(path: Path) -> tuple[NDArray[np.float64], str]:
     return np.arange(1.0, len(path) + 1.0), "step [number]"
 
 
-def drive(path: Path) -> NDArray[np.float64]:
+def drive(path: EquilibriumPath) -> NDArray[np.float64]:
     """Return a number for each step that rises while the tendons are pulled, (S,).
 
     The sum over the tendons that change, each by its tension or stroke as it is commanded.
@@ -81,28 +81,28 @@ def branches(x: NDArray[np.float64]) -> Iterator[tuple[slice, bool]]:
     yield slice(start, len(x)), bool(direction >= 0)
 
 
-def by_stroke(path: Path, tendon: int) -> bool:
+def by_stroke(path: EquilibriumPath, tendon: int) -> bool:
     """Tell whether the stroke of a tendon (from 0) is commanded, and not its tension."""
     return bool(np.isfinite(np.asarray(path.commanded_stroke, float)[:, tendon]).any())
 
 
-def driven_by_stroke(path: Path) -> list[int]:
+def driven_by_stroke(path: EquilibriumPath) -> list[int]:
     """Return the tendons (from 0) that are drawn by changing strokes."""
     return [int(tendon) for tendon in _changing(path) if by_stroke(path, int(tendon))]
 
 
-def way_of(path: Path) -> dict[str, list[int]]:
+def way_of(path: EquilibriumPath) -> dict[str, list[int]]:
     """Return the converged steps of loading and of unloading, each where there is any."""
     good = np.asarray(path.converged)
     found: dict[str, list[int]] = {}
     for part, growing in branches(drive(path)):
         steps = [step for step in range(part.start, part.stop) if good[step]]
-        known = found.setdefault(PULLING if growing else LETTING_GO, [])
+        known = found.setdefault(LOADING if growing else UNLOADING, [])
         known += [step for step in steps if step not in known]
     return {name: steps for name, steps in found.items() if steps}
 
 
-def _changing(path: Path) -> NDArray[np.intp]:
+def _changing(path: EquilibriumPath) -> NDArray[np.intp]:
     good = np.asarray(path.converged)
     spread = np.zeros(path.tension.shape[1])
     if good.any():
@@ -114,7 +114,7 @@ def _changing(path: Path) -> NDArray[np.intp]:
     return np.flatnonzero(spread > 1e-12)
 
 
-def _in_step(path: Path, first: int, other: int) -> bool:
+def _in_step(path: EquilibriumPath, first: int, other: int) -> bool:
     """Tell whether what drives two tendons changes in proportion."""
     good = np.asarray(path.converged)
     pair = [

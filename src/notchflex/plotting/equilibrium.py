@@ -16,10 +16,10 @@ from notchflex.results.spans import spans_of
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 
-def state_picture(path: Path, step: int, *, title: str | None = None) -> Picture:
+def state_picture(path: EquilibriumPath, step: int, *, title: str | None = None) -> Picture:
     """Describe the picture of one state of a path.
 
     The robot to scale with its loads, the angle of every notch with where it is closed, and the
@@ -61,12 +61,12 @@ def robot_shape(robot: Robot) -> Panel:
     return replace(state_shape(free.path, free.step), legend="")
 
 
-def state_shape(path: Path, step: int) -> Panel:
+def state_shape(path: EquilibriumPath, step: int) -> Panel:
     """Return the shape of one state, to scale, with its loads."""
     return shape_panel(path, [step] if path.converged[step] else [], plane_of(path))
 
 
-def notch_bars(path: Path, step: int) -> Panel:
+def notch_bars(path: EquilibriumPath, step: int) -> Panel:
     """Return the angle of every notch in one state, base to tip."""
     quantity = QUANTITIES["notch_angle"]
     if not path.converged[step]:
@@ -95,7 +95,7 @@ def notch_bars(path: Path, step: int) -> Panel:
     )
 
 
-def tension_along(path: Path, step: int) -> Panel:
+def tension_along(path: EquilibriumPath, step: int) -> Panel:
     """Return the tension of every pulled tendon from span to span in one state."""
     quantity = QUANTITIES["span_tension"]
     x_label = "span of tendon [number], 0 at the base"

@@ -18,7 +18,10 @@ from notchflex.results.quantities import QUANTITIES
 
 SYMBOLS = frozenset(one.symbol for one in QUANTITIES.values() if one.symbol) | {r"\mu"}
 
-_OURS = re.compile(r"\$(" + "|".join(map(re.escape, sorted(SYMBOLS))) + r")\$")
+# A symbol may have the index of one of its entries: p_x, \theta_3, \theta_{12}.
+_INDEX = r"(?:_(?:[xyz]|\d|\{\d+\}))?"
+_PLAIN = sorted({symbol.removesuffix("_j") for symbol in SYMBOLS} | SYMBOLS)
+_OURS = re.compile(r"\$((?:" + "|".join(map(re.escape, _PLAIN)) + f"){_INDEX})" + r"\$")
 # Neither an SVG nor a UTF-8 file can hold these.
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff]")
 _GREEK = {

@@ -14,7 +14,7 @@ from notchflex.plotting.along import (
 )
 from notchflex.plotting.bent import bent_at
 from notchflex.plotting.curves import notches_panel, strain_panel, stroke_panel, total_panel
-from notchflex.plotting.drive import LETTING_GO, PULLING, driven_by_stroke, way_of
+from notchflex.plotting.drive import LOADING, UNLOADING, driven_by_stroke, way_of
 from notchflex.plotting.outline import bending_plane
 from notchflex.plotting.sheet import BESIDE, Cell, Colour, Panel, Picture
 from notchflex.plotting.space import space_panel
@@ -23,7 +23,7 @@ from notchflex.plotting.wrist import telling_steps, wrist_panel
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 MOST_PROFILES = 2
 """Tendons whose tension is drawn over the stroke, and from span to span."""
@@ -32,7 +32,7 @@ _TWO_ROWS = 4
 """More curves than this are drawn three to a column."""
 
 
-def path_figure(path: Path, *, title: str | None = None) -> Figure:
+def path_figure(path: EquilibriumPath, *, title: str | None = None) -> Figure:
     """Draw a solved path with matplotlib; for what it shows see `path_picture`.
 
     Args:
@@ -52,7 +52,7 @@ def path_figure(path: Path, *, title: str | None = None) -> Figure:
     return path_picture(path, title=title).figure()
 
 
-def path_picture(path: Path, *, title: str | None = None) -> Picture:
+def path_picture(path: EquilibriumPath, *, title: str | None = None) -> Picture:
     """Describe the picture of a solved path, for paper and for a browser.
 
     First the robot to scale at up to five loads: in its plane of bending, or in space where it
@@ -89,7 +89,7 @@ def path_picture(path: Path, *, title: str | None = None) -> Picture:
 
 
 def shape_panel(
-    path: Path,
+    path: EquilibriumPath,
     steps: Sequence[int],
     view: float | None,
     title: str = "",
@@ -103,7 +103,7 @@ def shape_panel(
     return wrist_panel(path, steps, view or 0.0, **look)
 
 
-def plane_of(path: Path) -> float | None:
+def plane_of(path: EquilibriumPath) -> float | None:
     """Return the direction across the base [rad] of the plane that holds a path, if one does."""
     view = bending_plane(path.robot)
     if view is None:
@@ -113,14 +113,14 @@ def plane_of(path: Path) -> float | None:
     return None if max(leaves, default=0.0) > 1e-6 else view
 
 
-def _shapes(path: Path, ways: dict[str, list[int]]) -> dict[str, list[int]]:
+def _shapes(path: EquilibriumPath, ways: dict[str, list[int]]) -> dict[str, list[int]]:
     """Return the steps to draw: of loading and of unloading apart, where there are both."""
     if len(ways) < 2:
         return {"": telling_steps(path)}
-    return {way: telling_steps(path, among=ways[way]) for way in (PULLING, LETTING_GO)}
+    return {way: telling_steps(path, among=ways[way]) for way in (LOADING, UNLOADING)}
 
 
-def _panels(path: Path, ways: dict[str, list[int]]) -> list[Panel]:
+def _panels(path: EquilibriumPath, ways: dict[str, list[int]]) -> list[Panel]:
     """Return the curves."""
     if len(path) == 1:
         return []

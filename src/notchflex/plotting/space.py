@@ -15,7 +15,7 @@ from notchflex.plotting.style import GREY, ORANGE, VERMILLION, rgb, sequence_col
 from notchflex.plotting.wrist import ARROW, arrow_of, extent_of, load_label
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 ROUND = 32  # flat pieces round the tube
 LIGHT = np.array([0.35, -0.75, 0.55])
@@ -24,7 +24,7 @@ Pieces = NDArray[np.float64]
 
 
 def space_panel(
-    path: Path,
+    path: EquilibriumPath,
     steps: Sequence[int],
     *,
     title: str = "",

@@ -16,7 +16,7 @@ from notchflex.plotting.sheet import BESIDE, FINE, Area, Arrow, Colour, Item, Li
 from notchflex.plotting.style import GREY, ORANGE, VERMILLION, rgb, sequence_colours
 
 if TYPE_CHECKING:
-    from notchflex.statics import Path
+    from notchflex.statics import EquilibriumPath
 
 MOST_SHAPES = 5
 """More shapes than this hide each other."""
@@ -32,7 +32,7 @@ SHORTEST = 0.25
 
 
 def telling_steps(
-    path: Path, most: int = MOST_SHAPES, among: Sequence[int] | None = None
+    path: EquilibriumPath, most: int = MOST_SHAPES, among: Sequence[int] | None = None
 ) -> list[int]:
     """Return the steps to draw: spread evenly over the shapes that the robot goes through.
 
@@ -62,7 +62,7 @@ def telling_steps(
 
 
 def wrist_panel(
-    path: Path,
+    path: EquilibriumPath,
     steps: Sequence[int],
     view: float = 0.0,
     *,
@@ -125,7 +125,7 @@ def across_name(view: float) -> str:
     return {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
 
 
-def extent_of(path: Path) -> float:
+def extent_of(path: EquilibriumPath) -> float:
     """Return about how long a robot is [mm]."""
     steps = np.diff(path.body_position[0], axis=0)
     return float(np.linalg.norm(steps, axis=1).sum() + path.robot.tube.outer_diameter)
@@ -174,7 +174,7 @@ def load_arrows(
             )
 
 
-def load_label(path: Path, step: int) -> str:
+def load_label(path: EquilibriumPath, step: int) -> str:
     """Return what tells a step apart in a legend: what drives it, and its total angle.
 
     The strokes of tendons that strokes drive, and the tensions where there are none.

@@ -26,7 +26,7 @@ PLAIN = tuple(
 )  # all but the contacts, which are gathered contact by contact
 CONTACTS = tuple(q for q in QUANTITIES.values() if q.key and q.per == ("tendon", "contact"))
 
-# Loads from outside are what a user gave, and no result: they have no row in the table.
+# External loads are what a user gave, and no result: they have no row in the table.
 LOAD_UNITS = {
     "load.tip_force_N": "N",
     "load.tip_moment_Nmm": "N mm",
@@ -140,7 +140,7 @@ def _step(path: EquilibriumPath, index: int, outside: list[dict[str, Any]]) -> d
 
 
 def _outside(path: EquilibriumPath) -> list[dict[str, Any]]:
-    """Loads from outside of every step; nothing at all where no step has any."""
+    """External loads of every step; nothing at all where no step has any."""
     external = path.load.external
     if all(one.is_nothing for one in external):
         return []

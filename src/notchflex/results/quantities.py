@@ -160,12 +160,12 @@ def _rows() -> tuple[Quantity, ...]:
         q(
             "front_contact", "friction front", "m", "",
             "Contact, from 1 at the base, up to which the friction of a tendon has turned from "
-            "pulling to letting go (Gao 2017, eq. 26); one more than there are where all have.",
+            "loading to unloading (Gao 2017, eq. 26); one more than there are where all have.",
             "front.m", "tendon{tendon}_front_m", ("tendon",), kind=int,
         ),
         q(
             "front_eta", "friction at the front", r"\eta", "",
-            "Friction of that contact over its largest, from 1 (pulling) to -1 (letting go).",
+            "Friction of that contact over its largest, from 1 (loading) to -1 (unloading).",
             "front.eta", "tendon{tendon}_front_eta", ("tendon",),
         ),
         q(
@@ -239,7 +239,7 @@ QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _rows
 """Every quantity of a solved state, by the attribute that holds it."""
 
 CONTACT_STATES = {0: "stick", 1: "slip toward base", -1: "slip toward tip"}
-"""What the numbers of `contact_state` mean. Pulling makes a tendon slip toward the base."""
+"""What the numbers of `contact_state` mean. Loading makes a tendon slip toward the base."""
 
 
 def span_names(count: int) -> list[str]:

@@ -38,7 +38,7 @@ class Record:
     """What a path is made of.
 
     Attributes:
-        facts: The robot file as text, the loads from outside, how it was solved; plain values.
+        facts: The robot file as text, the external loads, how it was solved; plain values.
         arrays: Everything else by name, in mm, N, rad.
     """
 
@@ -143,7 +143,7 @@ def _little(array: NDArray[Any]) -> Any:
 
 
 def _loads_of(path: EquilibriumPath) -> str:
-    """The loads from outside: each different one, and which of them every step has."""
+    """The external loads: each different one, and which of them every step has."""
     distinct = [asdict(one) for one in path.load.different]
     return json.dumps({"distinct": distinct, "step": path.load.which.tolist()})
 

@@ -17,7 +17,6 @@ from notchflex.statics.kinks import Kink
 from notchflex.statics.load import Load, LoadPath
 from notchflex.statics.newton import Settings
 from notchflex.statics.path import EquilibriumPath
-from notchflex.statics.path import EquilibriumPath as Path  # old name, until all files are renamed
 from notchflex.statics.prepare import prepared
 from notchflex.statics.ramps import pull, stroke_path
 from notchflex.statics.recorded import BEFORE, TOLD, Recorded
@@ -41,7 +40,6 @@ __all__ = [
     "Kink",
     "Load",
     "LoadPath",
-    "Path",
     "Recorded",
     "SavedState",
     "Settings",

@@ -1,4 +1,4 @@
-"""Loads from outside as the solver takes them: sums over each body, in the frame of the base.
+"""External loads as the solver takes them: sums over each body, in the frame of the base.
 
 With R the rotation of a body against the base, a force f that keeps its direction in the base
 acts on the body's frame as R^T f, at a point p of the body with the moment p x R^T f about its
@@ -29,7 +29,7 @@ _ROUNDING = 1e-12
 
 
 class Applied(NamedTuple):
-    """Loads from outside on the bodies, base first; loads as leading axis. Units N, N mm.
+    """External loads on the bodies, base first; loads as leading axis. Units N, N mm.
 
     Attributes:
         dead_force: Sum of the forces that keep their direction, in the base frame.

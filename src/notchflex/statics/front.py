@@ -1,4 +1,4 @@
-"""The friction front: how far a turn from pulling to letting go has come along a tendon."""
+"""The friction front: how far the reversal from loading to unloading has come along a tendon."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ class Layout:
 
     @property
     def outside(self) -> int:
-        """Numbers that say how the loads from outside beyond change.
+        """Numbers that say how the external loads beyond change.
 
         Forces that keep their direction change as the body turns that they are seen from; only
         their moment comes back.

@@ -6,7 +6,7 @@ bodies are counted relative to the body before, forces along with the body they 
 robot that only turns as a whole changes nothing. What is carried on are
 
     the motion of bodies further back, as far as spans reach; the turn of the body against the base,
-    where loads from outside keep their direction; the tensions
+    where external loads keep their direction; the tensions
 
 and what comes back are
 

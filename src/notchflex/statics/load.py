@@ -1,4 +1,4 @@
-"""What is done to a robot, step by step: its tendons pulled or drawn, loads from outside."""
+"""What is done to a robot, step by step: its tendons pulled or drawn, external loads."""
 
 from __future__ import annotations
 
@@ -232,7 +232,7 @@ class LoadPath(Displayed):
         tip_mass: float | None = None,
         gravity: Sequence[float] | None = None,
     ) -> LoadPath:
-        """The same path with loads from outside on all its steps.
+        """The same path with external loads on all its steps.
 
         Args:
             tip_force: Force at the tip, N; this and all others as in `Load`.

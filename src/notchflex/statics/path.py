@@ -116,10 +116,10 @@ class EquilibriumPath(PathQuantities, Displayed):
 
     @property
     def front(self) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
-        """How far a turn of the friction has come along every tendon, m and eta, (s, t) each.
+        """How far the friction has reversed along every tendon, m and eta, (s, t) each.
 
-        Gao 2017, eq. 26: the friction of contact i is that of letting go for i < m, eta times
-        the largest for i = m, and that of pulling for i > m. Contacts are counted from 1 at the
+        Gao 2017, eq. 26: the friction of contact i is that of unloading for i < m, eta times
+        the largest for i = m, and that of loading for i > m. Contacts are counted from 1 at the
         base; m is one more than there are when all have turned (eta is then NaN). A tendon that
         is pulled for the first time has m = 1 and eta = 1.
         """

@@ -233,8 +233,8 @@ class PathQuantities:
     def front_contact(self) -> Int[np.ndarray, "s t"]:
         """Friction front, shape (s, t).
 
-        Contact, from 1 at the base, up to which the friction of a tendon has turned from pulling to
-        letting go (Gao 2017, eq. 26); one more than there are where all have.
+        Contact, from 1 at the base, up to which the friction of a tendon has turned from loading to
+        unloading (Gao 2017, eq. 26); one more than there are where all have.
         """
         return self.quantity("front_contact")
 
@@ -242,7 +242,7 @@ class PathQuantities:
     def front_eta(self) -> Float[np.ndarray, "s t"]:
         """Friction at the front, shape (s, t).
 
-        Friction of that contact over its largest, from 1 (pulling) to -1 (letting go).
+        Friction of that contact over its largest, from 1 (loading) to -1 (unloading).
         """
         return self.quantity("front_eta")
 
@@ -568,8 +568,8 @@ class EquilibriumQuantities:
     def front_contact(self) -> Int[np.ndarray, " t"]:
         """Friction front, shape (t,).
 
-        Contact, from 1 at the base, up to which the friction of a tendon has turned from pulling to
-        letting go (Gao 2017, eq. 26); one more than there are where all have.
+        Contact, from 1 at the base, up to which the friction of a tendon has turned from loading to
+        unloading (Gao 2017, eq. 26); one more than there are where all have.
         """
         return self.quantity("front_contact")
 
@@ -577,7 +577,7 @@ class EquilibriumQuantities:
     def front_eta(self) -> Float[np.ndarray, " t"]:
         """Friction at the front, shape (t,).
 
-        Friction of that contact over its largest, from 1 (pulling) to -1 (letting go).
+        Friction of that contact over its largest, from 1 (loading) to -1 (unloading).
         """
         return self.quantity("front_eta")
 

@@ -19,7 +19,7 @@ def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> Load
         tendon: Which tendon, counted from 1.
 
     Returns:
-        The path; `.release()` adds the way back, `.loaded(...)` loads from outside.
+        The path; `.release()` adds the way back, `.loaded(...)` external loads.
 
     Raises:
         InputError: Fewer than one step, a negative or infinite tension, no such tendon.
@@ -41,7 +41,7 @@ def stroke_path(start: float, stop: float, steps: int = 31, *, tendon: int = 1) 
         tendon: Which tendon, counted from 1.
 
     Returns:
-        The path; `.release()` adds the way back, `.loaded(...)` loads from outside.
+        The path; `.release()` adds the way back, `.loaded(...)` external loads.
 
     Raises:
         InputError: Fewer than one step, an infinite stroke, no such tendon.

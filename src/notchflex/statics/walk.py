@@ -2,7 +2,7 @@
 
 Everything is seen from the bodies: what ends at body j is a wrench about and along its frame. Only
 three things are summed up along the chain: the logarithms of the tensions from the base on, tendon
-set free and stretched from the tip on, and the loads from outside.
+set free and stretched from the tip on, and the external loads.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Wrenches(NamedTuple):
         ending: What the spans and lips that end at body j do to the bodies j - m and beyond
             together, for m = 0 ... window - 1.
         handed: The same of those that end beyond body j.
-        outside: The loads from outside on body j and all beyond; None where there are none.
+        outside: The external loads on body j and all beyond; None where there are none.
         whole: All that acts on body j and beyond.
     """
 
@@ -73,7 +73,7 @@ class Base(NamedTuple):
     Attributes:
         drawn: How much of every tendon the shape has set free, mm.
         stretch: Sum of tension times length of every tendon, N mm.
-        load: Loads from outside on all bodies, about and along the base; None if there are none.
+        load: External loads on all bodies, about and along the base; None if there are none.
     """
 
     drawn: Float[Array, " t"]
@@ -268,7 +268,7 @@ def holds(group: TendonGroup) -> Float[Array, "n t 2"]:
 
 
 class _Outside(NamedTuple):
-    """Loads from outside on all bodies; None where there are none."""
+    """External loads on all bodies; None where there are none."""
 
     rotation: Float[Array, "n d d"] | None
     beyond: Float[Array, "n w"] | None

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from notchflex.plotting.curves import COLOUR
-from notchflex.plotting.drive import LETTING_GO, PULLING, branches
+from notchflex.plotting.drive import LOADING, UNLOADING, branches
 from notchflex.plotting.style import GREY
 from notchflex.results.quantities import QUANTITIES
 from notchflex.viewer.chart import Line, chart
@@ -42,8 +42,8 @@ class Loop(NamedTuple):
 def loop(session: Session, tendon: int) -> Loop:
     """Return the total angle against tension or stroke of a tendon (from 0), since it was at rest.
 
-    It is against what commands the tendon now. What was pulled and what was let go have their
-    colours; a loop of the robot before its last change is grey.
+    It is against what commands the tendon now. Loading and unloading have their colours; a loop of
+    the robot before its last change is grey.
     """
     scale = QUANTITIES["total_angle"].scale
     by = session.controls.by[tendon]
@@ -53,7 +53,7 @@ def loop(session: Session, tendon: int) -> Loop:
         lines.append(Line(drawn, scale * angle, BEFORE, name="before the change"))
     drawn, angle = session.history.loop(tendon, by)
     for part, growing in branches(drawn) if len(drawn) > 1 else ():
-        way = PULLING if growing else LETTING_GO
+        way = LOADING if growing else UNLOADING
         lines.append(Line(drawn[part], scale * angle[part], COLOUR[way], name=way))
     lines.append(Line(drawn[-1:], scale * angle[-1:], "", 0.0, ("#111111",), 4.5, "now"))
     x_label = axis(by)

@@ -30,7 +30,7 @@ class LoadControls:
         with gui.add_folder("Tendons", order=1.0) as tendons:
             self._drives = [_Drive(viewer, self, tendon) for tendon in range(count)]
             self._chosen = self._charted(gui)
-            play = gui.add_button("Play a cycle", hint="pull the tendon of the charts and let go")
+            play = gui.add_button("Play a cycle", hint="load and unload the tendon of the charts")
             halt = gui.add_button("Stop", hint="stay where the robot is")
             reset = gui.add_button("Reset", hint="the free robot, which remembers nothing")
         with gui.add_folder("At the tip", order=2.0) as tip:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.plotting.bent import Bent
-from notchflex.statics import Path
+from notchflex.statics import EquilibriumPath
 from notchflex.viewer.colours import CLOSED, TENDON, UNKNOWN, linear, of_contacts
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Marks:
         """Places of the marks of the contacts of a tendon (from 0)."""
         return shape.contacts(tendon, _CONTACT_AT * self._outer).astype(np.float32)
 
-    def move(self, path: Path, shape: Bent, shown: Shown) -> None:
+    def move(self, path: EquilibriumPath, shape: Bent, shown: Shown) -> None:
         """Move them to a new state.
 
         Args:

@@ -16,7 +16,7 @@ from notchflex.plotting.acting import Acting, acting_at
 from notchflex.plotting.bent import HELD, Bent, bent_at
 from notchflex.plotting.twist import rotation_of
 from notchflex.robot import Robot
-from notchflex.statics import Path
+from notchflex.statics import EquilibriumPath
 from notchflex.viewer.camera import Eye, first_eye, framed, quaternions
 from notchflex.viewer.colours import LOAD, METAL, linear, of_strain
 from notchflex.viewer.controls import POINTING, Controls
@@ -135,7 +135,7 @@ class Scene:
         """Width of a cell of the grid on the floor, mm."""
         return self._grid_cell
 
-    def update(self, path: Path, controls: Controls) -> Bent:
+    def update(self, path: EquilibriumPath, controls: Controls) -> Bent:
         """Move everything to a new state.
 
         Args:
@@ -165,7 +165,7 @@ class Scene:
         lowest = {"up": HELD * outer, "sideways": 0.35 * self.length, "down": 1.1 * self.length}
         self._grid.position = (0.0, 0.0, -lowest[pointing])
 
-    def _dress(self, path: Path, shape: Bent) -> None:
+    def _dress(self, path: EquilibriumPath, shape: Bent) -> None:
         """Take other triangles for the flexures where other loads ask for more sections of them."""
         if len(self._skins[0].across.T) == len(shape.flexures[0].area):
             return
@@ -195,14 +195,14 @@ class Scene:
         for node, skin, sections in zip(self._flexures, self._skins, shape.flexures, strict=True):
             node.vertices = skin.at(sections).astype(np.float32)
 
-    def _paint(self, path: Path) -> None:
+    def _paint(self, path: EquilibriumPath) -> None:
         allowed = self.robot.material.allowed_strain
         for number, strain in enumerate(path.peak_strain[0]):
             colour = of_strain(None if allowed is None else float(strain) / allowed)
             if colour != self._colours[number]:
                 self._flexures[number].color = self._colours[number] = colour
 
-    def _move_loads(self, path: Path, shape: Bent) -> None:
+    def _move_loads(self, path: EquilibriumPath, shape: Bent) -> None:
         loads = acting_at(path, 0, shape) if self.shown.loads else []
         self._arrows.visible = bool(loads)
         for label in self._labels[len(loads) :]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from notchflex.robot import Robot
-from notchflex.statics import Equilibrium, Path, simulate
+from notchflex.statics import Equilibrium, EquilibriumPath, simulate
 from notchflex.viewer.controls import STROKE, Controls
 from notchflex.viewer.history import History
 
@@ -158,7 +158,7 @@ class Session:
                 return Step(self.state, f"stopped after step {number} of {count} again")
         return Step(self.state, "")
 
-    def path(self) -> Path:
+    def path(self) -> EquilibriumPath:
         """All that was done as one path from rest, as `notchflex.simulate` finds it."""
         return simulate(self.robot, [one.load() for one in self.history.controls])
 
