@@ -54,7 +54,7 @@ def outputs_function(
         own = {name: (*first[name].shape, *more) for name in names}
         return {name: jax.ShapeDtypeStruct(own[name], first[name].dtype) for name in names}
 
-    def called(function: Callable[[np.ndarray], Any], result: dict[str, Any], at: Array) -> Any:
+    def called(function: Callable[[np.ndarray], Any], result: dict[str, Any]) -> Any:
         def safe(at: Any) -> dict[str, np.ndarray]:
             try:
                 found = function(np.asarray(at))
@@ -62,19 +62,27 @@ def outputs_function(
             except InputError:
                 return {name: _nothing(one) for name, one in result.items()}
 
-        return jax.pure_callback(safe, result, at, vmap_method="sequential")
+        # Compiled once: a callback on its own is compiled at every call.
+        return jax.jit(lambda at: jax.pure_callback(safe, result, at, vmap_method="sequential"))
+
+    values_of_floats = called(solver.values, shapes(floats))
+    values_of_others = called(solver.values, shapes(others))
+    slopes_of_floats = called(lambda at: solver.jacobian(at, floats), shapes(floats, len(start)))
+
+    compiled: list[bool] = []
 
     @jax.custom_jvp
     def of_floats(at: Array) -> dict[str, Array]:
-        return called(solver.values, shapes(floats), at)
+        return values_of_floats(at)
 
     @of_floats.defjvp
     def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Any, Any]:
         (at,), (change,) = primals, tangents
         # Compiled now: within a program of JAX nothing may be traced.
-        solver.jacobian(start, floats)
-        result = shapes(floats, len(start))
-        slopes = called(lambda at: solver.jacobian(at, floats), result, at)
+        if not compiled:
+            solver.jacobian(start, floats)
+            compiled.append(True)
+        slopes = slopes_of_floats(at)
         return of_floats(at), {name: slopes[name] @ change for name in floats}
 
     def function(at: Array) -> dict[str, Array]:
@@ -84,7 +92,7 @@ def outputs_function(
             }
         found = dict(of_floats(at)) if floats else {}
         if others:
-            found |= called(solver.values, shapes(others), jax.lax.stop_gradient(at))
+            found |= values_of_others(jax.lax.stop_gradient(at))
         return {name: found[name] for name in first}
 
     return function

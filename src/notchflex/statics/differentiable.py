@@ -34,6 +34,8 @@ _TENDONS = ("tension", "stroke")
 _TIP = ("tip_force", "tip_moment")
 # Largest change of a parameter in one-sided differences.
 _ASIDE = 1e-5
+# Derivatives by numbers of the robot that are kept.
+_REMEMBERED = 256
 
 
 def differentiable(
@@ -284,6 +286,7 @@ class _Solver:
     def __init__(self, function: Differentiable) -> None:
         self._of = function
         self.last: tuple[bytes, EquilibriumPath] | None = None
+        self._kept: dict[Any, np.ndarray] = {}
 
     def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
         """Return the outputs.
@@ -328,24 +331,38 @@ class _Solver:
         """Change of loads and chain, packed for the long chain, per unit of every value."""
         values, of = self._named(flat), self._of
         steps = len(of.load)
-        form = of.ready.long.chain_form
-        numbers = np.array([values[name] for name in of.numbers], float)
-
-        def packed(numbers: np.ndarray) -> np.ndarray:
-            given = dict(zip(of.numbers, numbers, strict=True))
-            return self._packed({**values, **given})
-
+        size = of.ready.long.chain_form.size
         for name, value in values.items():
             if name in of.numbers:
-                change = slope(packed, numbers, of.numbers.index(name))
-                yield change[form.size :].reshape(steps, -1), change[: form.size]
+                change = self._by_number(values, name)
+                yield change[size:].reshape(steps, -1), change[:size]
                 continue
-            base = self._packed(values)[form.size :].reshape(steps, -1)
+            base = self._packed(values)[size:].reshape(steps, -1)
             for place in np.ndindex(value.shape):
                 varied = np.array(value)
                 varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
-                more = self._packed({**values, name: varied})[form.size :].reshape(steps, -1)
+                more = self._packed({**values, name: varied})[size:].reshape(steps, -1)
                 yield more - base, None
+
+    def _by_number(self, values: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+        """Change of chain and loads by a number of the robot.
+
+        The last ones are kept: a control loop asks for the same robot again and again, under other
+        tensions and strokes, of which this does not depend.
+        """
+        numbers = np.array([values[own] for own in self._of.numbers], float)
+        tip = [values[own].tobytes() for own in values if own in _TIP]
+        key = (name, numbers.tobytes(), *tip)
+        if key not in self._kept:
+
+            def packed(numbers: np.ndarray) -> np.ndarray:
+                given = dict(zip(self._of.numbers, numbers, strict=True))
+                return self._packed({**values, **given})
+
+            if len(self._kept) >= _REMEMBERED:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = slope(packed, numbers, self._of.numbers.index(name))
+        return self._kept[key]
 
     def _packed(self, values: Mapping[str, Any]) -> np.ndarray:
         """The long chain and all loads as one vector."""
