@@ -77,7 +77,7 @@ VERBS = {
         "notchflex view pacheco2021-a --open\n    notchflex view two-axis-wrist --port 9000",
     ),
     "compare": (
-        "Compare a robot with measured notch angles.",
+        "Compare a robot with measured angles and tip positions.",
         "notchflex simulate pacheco2021-a --tension 0:2:9,2:0:9 --csv loop.csv\n"
         "    notchflex compare pacheco2021-a loop.csv --path --set friction.coefficient=0.1 \\\n"
         "        --plot compare.png",

@@ -3,39 +3,39 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import jnp
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.robot.paths import number_at
-from notchflex.statics.actuation import Command
+from notchflex.statics.callback import outputs_function
 from notchflex.statics.command import command
 from notchflex.statics.given import robot_given, shown
 from notchflex.statics.kinks import Kink, kinks
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
-from notchflex.statics.numbers import with_slopes
-from notchflex.statics.outputs import followed, known_outputs
-from notchflex.statics.packing import Form
+from notchflex.statics.numbers import slope
+from notchflex.statics.outputs import known_outputs
 from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import Prepared, prepared
 from notchflex.statics.run import run
-from notchflex.statics.sensitivity import answered, solved_path
 from notchflex.statics.solve import check_refinement, prepared_for
-from notchflex.statics.stepping import at_rest
+from notchflex.statics.tangent import PathTangents
 
 _TENDONS = ("tension", "stroke")
 _TIP = ("tip_force", "tip_moment")
 # Largest change of a parameter in one-sided differences.
 _ASIDE = 1e-5
+# Derivatives by numbers of the robot that are kept.
+_REMEMBERED = 256
 
 
 def differentiable(
@@ -141,10 +141,7 @@ class Differentiable:
         taken = self._taken(values)
         if not any(isinstance(value, Tracer) for value in taken.values()):
             self._check(taken)
-        arrays = self.traced(jnp.array([taken[name] for name in self.numbers], float))
-        loads = {name: value for name, value in taken.items() if name in (*_TENDONS, *_TIP)}
-        given = {name: getattr(self.load, name) for name in _TENDONS}
-        return _followed(self._program, arrays, loads, given, np.array(self.settings.numbers))
+        return self._function(jnp.concatenate([taken[name].ravel() for name in self.start]))
 
     def kinks(self, values: Mapping[str, Any] | None = None, *, within: float = 1e-6) -> list[Kink]:
         """List the contacts and notches at a switch, where derivatives are those of one side.
@@ -204,30 +201,33 @@ class Differentiable:
             )
         return sides[0], sides[1]
 
-    def _path(self, values: dict[str, Array]) -> EquilibriumPath:
+    def _path(self, values: Mapping[str, Any]) -> EquilibriumPath:
         """Solve the path at some values."""
+        robot, load = self._robot(values), self._load(values)
+        ready = self._prepared(robot)
+        loads = command(load, robot, ready.chain)
+        came = run(ready, loads, None, self.settings, each_from_start=False)
+        return EquilibriumPath(robot, load, ready, came, settings=self.settings)
+
+    def _robot(self, values: Mapping[str, Any]) -> Robot:
         numbers = {name: float(values[name]) for name in self.numbers}
-        robot = self.robot.with_values(numbers) if numbers else self.robot
+        return self.robot.with_values(numbers) if numbers else self.robot
+
+    def _load(self, values: Mapping[str, Any]) -> LoadPath:
         load = self.load
         for name in _TENDONS:
             if name in values:
                 given = getattr(load, name)
                 value = np.where(np.isnan(given), np.nan, np.asarray(values[name]))
                 load = dataclasses.replace(load, **{name: value})
-        if self._tip:
+        tip = {name: np.asarray(values[name]) for name in self._tip}
+        if tip:
             external = tuple(
-                dataclasses.replace(
-                    one,
-                    **{name: tuple(np.asarray(values[name])[step].tolist()) for name in self._tip},
-                )
+                dataclasses.replace(one, **{name: tuple(at[step]) for name, at in tip.items()})
                 for step, one in enumerate(load.external)
             )
             load = dataclasses.replace(load, external=external)
-        ready = self._prepared(robot)
-        came = run(
-            ready, command(load, robot, ready.chain), None, self.settings, each_from_start=False
-        )
-        return EquilibriumPath(robot, load, ready, came, settings=self.settings)
+        return load
 
     def _taken(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Values of all parameters, in their shapes."""
@@ -274,92 +274,105 @@ class Differentiable:
         return self._prepared(self.robot)
 
     @cached_property
-    def command_form(self) -> Form:
-        """Form of one load."""
-        return self.ready.command_form(command(self.load, self.robot, self.ready.chain))
-
-    @cached_property
-    def traced(self) -> Any:
-        """From numbers of the robot to all arrays as one vector."""
-        present = np.array([float(self.start[name]) for name in self.numbers])
-        return with_slopes(self._arrays, len(self._arrays(present)))
-
-    def _arrays(self, numbers: Float[np.ndarray, " k"]) -> Float[np.ndarray, " all"]:
-        """Chain, loads without those at the tip that vary, and loads of 1 N or N mm at the tip."""
-        values = {name: float(at) for name, at in zip(self.numbers, numbers, strict=True)}
-        robot = self.robot.with_values(values) if values else self.robot
-        ready = self._prepared(robot)
-        if ready.chain_form is not self.ready.chain_form:
-            raise InputError(f"with {values} the robot has another form; it must stay the same")
-        nothing: dict[str, Any] = dict.fromkeys(self._tip, (0.0, 0.0, 0.0))
-        bare = self.load.loaded(**nothing)
-        units: list[dict[str, Any]] = [{name: row} for name in self._tip for row in np.eye(3)]
-        unit = [bare.loaded(**one) for one in units]
-        packed = [
-            self.command_form.pack(command(path, robot, ready.chain), leading=1).ravel()
-            for path in (bare, *unit)
-        ]
-        return np.concatenate([ready.chain_form.pack(ready.chain), *packed])
-
-    @cached_property
-    def _program(self) -> _Program:
-        return _Program(self.ready.chain_form, self.command_form, self._tip, self.outputs)
+    def _function(self) -> Callable[[Array], dict[str, Array]]:
+        """All values as one vector to the outputs, as a function of JAX."""
+        start = np.concatenate([np.ravel(self.start[name]) for name in self.start])
+        return outputs_function(_Solver(self), start)
 
 
-@dataclass(frozen=True)
-class _Program:
-    """What a compiled program is made for: robots and loads of one form share it."""
+class _Solver:
+    """Outputs and their Jacobian by compiled programs, for plain vectors of values."""
 
-    chain_form: Form
-    command_form: Form
-    tip: tuple[str, ...]
-    outputs: tuple[str, ...]
+    def __init__(self, function: Differentiable) -> None:
+        self._of = function
+        self.last: tuple[bytes, EquilibriumPath] | None = None
+        self._kept: dict[Any, np.ndarray] = {}
 
-    def commands(
-        self,
-        packed: Float[Array, " loads"],
-        values: dict[str, Array],
-        given: dict[str, Float[Array, "s t"]],
-    ) -> Command:
-        """The loads, with the values of parameters in them."""
-        form = self.command_form
-        every = packed.reshape(1 + 3 * len(self.tip), -1, form.size)
-        bare: Command = form.unpack(every[0])
-        applied = bare.applied
-        for number, name in enumerate(self.tip):
-            for axis in range(3):
-                unit: Command = form.unpack(every[1 + 3 * number + axis])
-                along = values[name][:, axis]
-                applied = jax.tree.map(partial(_added, along), applied, bare.applied, unit.applied)
-        value = bare.value
-        if "tension" in values:
-            pulled = jnp.where(values["tension"] < 0.0, jnp.nan, values["tension"])
-            value = jnp.where(~jnp.isnan(given["tension"]), pulled, value)
-        if "stroke" in values:
-            value = jnp.where(~jnp.isnan(given["stroke"]), values["stroke"], value)
-        return bare._replace(value=value, applied=applied)
+    def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
+        """Return the outputs.
 
+        Raises:
+            InputError: No robot or load can have these values.
+        """
+        path = self._path(flat)
+        return {name: np.asarray(getattr(path, name)) for name in self._of.outputs}
 
-def _added(along: Array, total: Array, none: Array, unit: Array) -> Array:
-    return total + along.reshape(-1, *(1,) * (unit.ndim - 1)) * (unit - none)
+    def jacobian(
+        self, flat: Float[np.ndarray, " k"], outputs: tuple[str, ...]
+    ) -> dict[str, np.ndarray]:
+        """Return the derivatives of some outputs by every value, as last axis.
 
+        Raises:
+            InputError: No robot or load can have these values.
+        """
+        tangents = PathTangents(self._path(flat), tuple(n for n in outputs if n != "residual"))
+        columns = [tangents.along(*change) for change in self._changes(flat)]
+        found = {name: np.stack([one[name] for one in columns], axis=-1) for name in columns[0]}
+        if "residual" in outputs:  # what the solver leaves is no function of the values
+            found["residual"] = np.zeros((len(self._of.load), len(flat)))
+        return found
 
-# Without options of the compiler: JAX takes them only where nothing else is traced around.
-@partial(jax.jit, static_argnums=0)
-def _followed(
-    program: _Program,
-    arrays: Float[Array, " all"],
-    values: dict[str, Array],
-    given: dict[str, Float[Array, "s t"]],
-    numbers: Float[Array, " settings"],
-) -> dict[str, Array]:
-    size = program.chain_form.size
-    chain = program.chain_form.unpack(arrays[:size])
-    commands = program.commands(arrays[size:], values, given)
-    start, settings = at_rest(chain), Settings.of(numbers)
-    # Solved once, and looked at again for the slopes: nothing that iterates is differentiated.
-    items: Any = (commands, solved_path(chain, commands, start, settings))
-    return followed(chain, items, start, settings, program.outputs, answered)
+    def _named(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
+        shapes = {name: np.shape(at) for name, at in self._of.start.items()}
+        ends = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])[:-1]
+        parts = zip(shapes.items(), np.split(flat, ends), strict=True)
+        return {name: part.reshape(shape) for (name, shape), part in parts}
+
+    def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
+        """The path at some values; the last one is kept, as its derivatives are asked for next."""
+        key = flat.tobytes()
+        if self.last is None or self.last[0] != key:
+            self.last = key, self._of._path(self._named(flat))  # pyright: ignore[reportPrivateUsage]
+        return self.last[1]
+
+    def _changes(
+        self, flat: Float[np.ndarray, " k"]
+    ) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+        """Change of loads and chain, packed for the long chain, per unit of every value."""
+        values, of = self._named(flat), self._of
+        steps = len(of.load)
+        size = of.ready.long.chain_form.size
+        for name, value in values.items():
+            if name in of.numbers:
+                change = self._by_number(values, name)
+                yield change[size:].reshape(steps, -1), change[:size]
+                continue
+            base = self._packed(values)[size:].reshape(steps, -1)
+            for place in np.ndindex(value.shape):
+                varied = np.array(value)
+                varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
+                more = self._packed({**values, name: varied})[size:].reshape(steps, -1)
+                yield more - base, None
+
+    def _by_number(self, values: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+        """Change of chain and loads by a number of the robot.
+
+        The last ones are kept: a control loop asks for the same robot again and again, under other
+        tensions and strokes, of which this does not depend.
+        """
+        numbers = np.array([values[own] for own in self._of.numbers], float)
+        tip = [values[own].tobytes() for own in values if own in _TIP]
+        key = (name, numbers.tobytes(), *tip)
+        if key not in self._kept:
+
+            def packed(numbers: np.ndarray) -> np.ndarray:
+                given = dict(zip(self._of.numbers, numbers, strict=True))
+                return self._packed({**values, **given})
+
+            if len(self._kept) >= _REMEMBERED:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = slope(packed, numbers, self._of.numbers.index(name))
+        return self._kept[key]
+
+    def _packed(self, values: Mapping[str, Any]) -> np.ndarray:
+        """The long chain and all loads as one vector."""
+        of = self._of
+        robot, load = of._robot(values), of._load(values)  # pyright: ignore[reportPrivateUsage]
+        ready = of._prepared(robot)  # pyright: ignore[reportPrivateUsage]
+        if ready.chain_form is not of.ready.chain_form:
+            raise InputError("with these values the robot has another form; it must stay the same")
+        loads, _ = ready.long_commands(command(load, robot, ready.chain))
+        return np.concatenate([ready.long.vector, loads.ravel()])
 
 
 __all__ = ["Differentiable", "differentiable"]

@@ -9,66 +9,14 @@ Everything after the arrays is differentiated exactly.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from notchflex._jax import jax
 from notchflex.errors import InputError
 
 # Widest difference, of the number itself, and how often it is halved.
 _WIDTH, _HALVINGS = 4e-3, 2
-# A control loop asks for the same numbers again and again.
-_REMEMBERED = 8
-
-
-def with_slopes(
-    vector_of: Callable[[Float[np.ndarray, " k"]], Float[np.ndarray, " chain"]], size: int
-) -> Callable[[Float[Array, " k"]], Float[Array, " chain"]]:
-    """A plain function of numbers as one that JAX can trace and differentiate once.
-
-    Args:
-        vector_of: From numbers to arrays, as one vector.
-        size: How long that is.
-    """
-
-    # A robot that cannot be has NaN for arrays: a traceback out of a program tells nobody.
-    @lru_cache(maxsize=_REMEMBERED)
-    def value_at(numbers: tuple[float, ...]) -> np.ndarray:
-        try:
-            return vector_of(np.array(numbers))
-        except InputError:
-            return np.full(size, np.nan)
-
-    @lru_cache(maxsize=_REMEMBERED)
-    def slopes_at(numbers: tuple[float, ...]) -> np.ndarray:
-        at = np.array(numbers)
-        try:
-            rows = [slope(vector_of, at, index) for index in range(len(at))]
-        except InputError:
-            rows = [np.full(size, np.nan) for _ in numbers]
-        return np.stack([value_at(numbers), *rows])
-
-    def value(numbers: Array) -> np.ndarray:
-        return value_at(tuple(np.asarray(numbers).tolist()))
-
-    def slopes(numbers: Array) -> np.ndarray:
-        return slopes_at(tuple(np.asarray(numbers).tolist()))
-
-    @jax.custom_jvp
-    def traced(numbers: Array) -> Array:
-        shape = jax.ShapeDtypeStruct((size,), float)
-        return jax.pure_callback(value, shape, numbers, vmap_method="sequential")
-
-    @traced.defjvp
-    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
-        (numbers,), (change,) = primals, tangents
-        shape = jax.ShapeDtypeStruct((1 + len(numbers), size), float)
-        both = jax.pure_callback(slopes, shape, numbers, vmap_method="sequential")
-        return both[0], change @ both[1:]
-
-    return traced
 
 
 def slope(
@@ -126,4 +74,4 @@ def _extrapolated(
     return table[-1]
 
 
-__all__ = ["slope", "with_slopes"]
+__all__ = ["slope"]

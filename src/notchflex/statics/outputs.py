@@ -87,13 +87,20 @@ def followed(
 def _told(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
     """What is asked of a state, and whether it may be believed."""
     own = shape(chain, solved)
-    last = own.body_rotation[-1]
-    known = {**own._asdict(), "tip_rotation": last}
+    holds = believable(own.friction_holds, own.moment_error, own.bend_possible)
+    return _named(chain, solved, own, outputs) | {"_holds": holds}
+
+
+def reported(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
+    """Return quantities of a solved state by name, in the frame of the base."""
+    return _named(chain, solved, shape(chain, solved), outputs)
+
+
+def _named(chain: Chain, solved: Solved, own: Shape, outputs: tuple[str, ...]) -> dict[str, Array]:
+    known = {**own._asdict(), "tip_rotation": own.body_rotation[-1]}
     if any(name in Quantities._fields for name in outputs):
         known |= quantities(chain, solved)._asdict()
-    told = {name: known[name] for name in outputs if name in known}
-    holds = believable(own.friction_holds, own.moment_error, own.bend_possible)
-    return told | {"_holds": holds}
+    return {name: known[name] for name in outputs if name in known}
 
 
-__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "followed", "known_outputs"]
+__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "followed", "known_outputs", "reported"]

@@ -151,6 +151,7 @@ class Quantities(NamedTuple):
 
 
 _BY_FLEXURE = (
+    "notch_angle",
     "chord_angle",
     "notch_moment",
     "outer_strain",
@@ -158,6 +159,8 @@ _BY_FLEXURE = (
     "gap",
     "contact_force",
 )
+# With so many axes behind that of the bodies.
+_BY_BODY = {"body_position": 1, "body_rotation": 2}
 _BY_CONTACT = (
     "span_tension",
     "contact_log_ratio",
@@ -317,11 +320,13 @@ def of_own(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
 
     Args:
         chain: The own chain.
-        name: Name of the quantity, one of `Quantities`.
+        name: Name of the quantity, one of `Shape` or `Quantities`.
         values: Its values with any leading axes, of a chain that may have more flexures.
     """
     if name in _BY_FLEXURE:
         return values[..., : chain.flexures]
+    if name in _BY_BODY:
+        return values[(..., slice(chain.flexures + 1), *(slice(None),) * _BY_BODY[name])]
     if name not in _BY_CONTACT:
         return values
     met = np.asarray(chain.contacts)

@@ -38,7 +38,7 @@ class Run:
         self, prepared: Prepared, start: np.ndarray, table: np.ndarray, count: int
     ) -> None:
         """Take what the program returned for the long chain."""
-        self._prepared, self._first, self._count = prepared, start, count
+        self._prepared, self.first, self._count = prepared, start, count
         self._table, self._long = table[:, prepared.columns], table
 
     def _told(self, number: int) -> np.ndarray:
@@ -99,7 +99,7 @@ class Run:
     def _more(self) -> dict[str, np.ndarray]:
         """What is reported of the state before the first load and of each state, by name."""
         own, long = self._prepared, self._prepared.long
-        rows = lengthen(np.concatenate([self._first[None], self.states]), own.state, long.state)
+        rows = lengthen(np.concatenate([self.first[None], self.states]), own.state, long.state)
         given = (np.zeros(1), long.known_vector, rows, long.known_form, long.state)
         every = _quantities.along((False, False, True), *given)
         return {name: of_own(own.chain, name, values) for name, values in every.items()}
@@ -115,7 +115,7 @@ class Run:
         """A quantity of the state before the first load; of the shape only tension and stroke."""
         if name not in ("tension", "stroke"):
             return self._more[name][0]
-        start: Solved = self._prepared.state.unpack(self._first)
+        start: Solved = self._prepared.state.unpack(self.first)
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:

@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from notchflex._jax import constant, jax, jnp
-from notchflex._native import native
-from notchflex.chain import Chain
-from notchflex.motion import rotation_about, unskew
+from notchflex._jax import constant
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
 from notchflex.statics.applied import Applied
-from notchflex.statics.capacity import lengthen
 from notchflex.statics.command import command
 from notchflex.statics.given import robot_given
 from notchflex.statics.kinks import Kink, kinks
-from notchflex.statics.known import KnownForm
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
-from notchflex.statics.packing import Form, lane_sizes
 from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import prepared
-from notchflex.statics.quantities import shape
 from notchflex.statics.run import run
-from notchflex.statics.sensitivity import Way, answering
 from notchflex.statics.solve import check_refinement
+from notchflex.statics.tangent import PathTangents
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,71 +88,51 @@ def tip_response(
     commands = command(path, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=False)
     found = EquilibriumPath(robot, path, ready, came)
-    long = ready.long
-    loads, form = ready.long_commands(commands)
-    states, between = (
-        lengthen(one, ready.state, long.state) for one in (came.states, came.between)
-    )
-    how = np.stack([came.part_before, came.parts, found.converged], axis=1)
-    rows = (False, False, True, True, True, True)
-    given = (long.rest_vector, long.known_vector, states, loads, between, how)
-    slopes = _slopes.along(rows, *given, long.known_form, form, long.state)
-    slopes = np.swapaxes(slopes, -1, -2)
-    base = np.asarray(rotation_about(constant(path.base_rotation)))
-    turn = np.kron(np.eye(2), base)
+    # Each state is varied alone: what the contacts remember of the state before stays.
+    tangents = PathTangents(found, ("tip_rotation", "tip_position"), remembers=False)
+    columns = [_pose_change(found, tangents.along(loads)) for loads in _unit_loads(found)]
+    slopes = np.stack(columns, axis=-1)
+    turn = np.eye(6)
+    if found.base_to_world is not None:
+        turn = np.kron(np.eye(2), found.base_to_world)
     tendons = ready.chain.tendons
-    return TipResponse(found, turn @ slopes[..., :tendons], turn @ slopes[..., tendons:] @ turn.T)
+    return TipResponse(found, slopes[..., :tendons], slopes[..., tendons:] @ turn.T)
 
 
-@native(6, lane_sizes)
-def _slopes(
-    before: Float[Array, " state"],
-    vector: Float[Array, " chain"],
-    state: Float[Array, " state"],
-    load: Float[Array, " command"],
-    between: Float[Array, " state"],
-    how: Float[Array, " 3"],
-    chain_form: KnownForm,
-    command_form: Form,
-    state_form: Form,
-) -> tuple[Float[Array, " state"], Float[Array, "changes 6"]]:
-    """Change of the pose of the tip per change of every drive and of the wrench at the tip.
-
-    Carried from state to state is the state, the one before the next.
-    """
-    chain: Chain = chain_form.unpack(vector)
-    last, solved, halfway = (state_form.unpack(one) for one in (before, state, between))
-    command: Command = command_form.unpack(load)
-    assert command.applied is not None  # the chain is assembled for loads
-    applied = command.applied
-    way = Way(halfway, how[0], how[1].astype(int), how[2] > 0.0)
-
-    def pose(change: Array) -> tuple[Array, Array]:
-        drives, wrench = change[: chain.tendons], change[chain.tendons :]
-        varied = command._replace(
-            value=command.value + drives,
-            applied=_with_tip(applied, wrench, chain.body_length[-1]),
-        )
-        own = shape(chain, answering(chain, varied, last, solved, way))
-        return own.body_rotation[-1], own.tip_position
-
-    def along(direction: Array) -> Array:
-        still = jnp.zeros_like(direction)
-        (rotation, _), (turned, moved) = jax.jvp(pose, (still,), (direction,))
-        return jnp.concatenate([unskew(turned @ rotation.T), moved])
-
-    # A loop over the changes: their derivatives are compiled once.
-    return state, jax.lax.map(along, jnp.eye(chain.tendons + 6))
+def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
+    """Changes of the loads, packed: a unit of every drive, then of tip moment and force."""
+    long = path.prepared.long
+    packed, form = path.prepared.long_commands(path.commands)
+    none: Command = form.unpack(np.zeros(form.size))
+    assert none.applied is not None  # the chain is assembled for loads
+    units = [none._replace(value=constant(row)) for row in np.eye(long.chain.tendons)]
+    for row in np.eye(6):
+        applied = _with_tip(none.applied, row, np.asarray(long.chain.body_length)[-1])
+        units.append(none._replace(applied=applied))
+    for unit in units:
+        yield np.broadcast_to(np.asarray(form.pack(unit)), packed.shape)
 
 
-def _with_tip(applied: Applied, wrench: Float[Array, " 6"], length: Float[Array, ""]) -> Applied:
+def _pose_change(
+    path: EquilibriumPath, changes: Mapping[str, np.ndarray]
+) -> Float[np.ndarray, "s 6"]:
+    """Rotation vector and displacement of the tip, in the world."""
+    spin = changes["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
+    turned = [spin[:, b, a] - spin[:, a, b] for a, b in ((1, 2), (2, 0), (0, 1))]
+    return np.concatenate([0.5 * np.stack(turned, axis=-1), changes["tip_position"]], axis=-1)
+
+
+def _with_tip(applied: Applied, wrench: Float[np.ndarray, " 6"], length: float) -> Applied:
     """Loads with a moment and a force more at the tip, dead in the base frame."""
     moment, force = wrench[:3], wrench[3:]
-    arm = jnp.zeros((3, 3)).at[2].set(length * force)
+    last = np.zeros(len(applied.dead_force))
+    last[-1] = 1.0
+    arm = np.zeros((3, 3))
+    arm[2] = length * force
     return applied._replace(
-        dead_force=applied.dead_force.at[-1].add(force),
-        dead_moment=applied.dead_moment.at[-1].add(moment),
-        dead_arm=applied.dead_arm.at[-1].add(arm),
+        dead_force=constant(applied.dead_force + np.multiply.outer(last, force)),
+        dead_moment=constant(applied.dead_moment + np.multiply.outer(last, moment)),
+        dead_arm=constant(applied.dead_arm + np.multiply.outer(last, arm)),
     )
 
 
