@@ -63,7 +63,12 @@ def outputs_function(
                 return {name: _nothing(one) for name, one in result.items()}
 
         # Compiled once: a callback on its own is compiled at every call.
-        return jax.jit(lambda at: jax.pure_callback(safe, result, at, vmap_method="sequential"))
+        compiled = jax.jit(lambda at: jax.pure_callback(safe, result, at, vmap_method="sequential"))
+
+        def call(at: Array) -> dict[str, Array]:
+            return compiled(at) if isinstance(at, Tracer) else jax.tree.map(jnp.asarray, safe(at))
+
+        return call
 
     values_of_floats = called(solver.values, shapes(floats))
     values_of_others = called(solver.values, shapes(others))
