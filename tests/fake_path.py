@@ -1,8 +1,8 @@
 """A path as the statics return it, made from closed formulas: results and pictures need no solver.
 
 The angles are those of five equal notches that grow in proportion to the tension and stop at their
-closing angle; letting go follows later. It is no physics, only numbers of the
-right shapes and sizes.
+closing angle; unloading lags behind. It is no physics, only numbers of the right shapes
+and sizes.
 """
 
 from dataclasses import dataclass, field
@@ -52,7 +52,7 @@ class FakePath:
 
     @property
     def front(self) -> Any:
-        """The friction front, as `Path` has it."""
+        """The friction front, as `EquilibriumPath` has it."""
         return self.front_contact, self.front_eta
 
     def __len__(self) -> int:
@@ -115,6 +115,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "iterations": np.full(count, 4),
         "stable": np.ones(count, bool),
         "smallest_eigenvalue": np.full(count, 7.0),
+        "determinant_sign": np.ones(count),
     }
     return FakePath(robot, columns)
 
