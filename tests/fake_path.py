@@ -115,6 +115,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "iterations": np.full(count, 4),
         "stable": np.ones(count, bool),
         "smallest_eigenvalue": np.full(count, 7.0),
+        "determinant_sign": np.ones(count),
     }
     return FakePath(robot, columns)
 

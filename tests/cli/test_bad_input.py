@@ -136,7 +136,6 @@ def test_robot_files(folder, refused, old, new, words):
         (["show", "mine.toml", "--set", "notch.depth=2"], "less than"),
         (["compare", "mine.toml", "none.csv"], "no such file"),
         (["compare", "mine.toml", "mine.toml"], "column"),
-        (["compare", "pacheco2021-a", "data.csv"], "notch_3_deg"),
         (["compare", "mine.toml", "data.csv", "--beside", "linear"], "kinematics"),
         (["compare", "mine.toml", "data.csv", "--beside", "x: material.kind=wood"], "wood"),
     ],

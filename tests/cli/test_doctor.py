@@ -36,7 +36,7 @@ def test_healthy_installation(call):
 def test_table_has_what_is_asked_and_fits(call):
     code, out, _ = call("doctor")
     assert code == 0
-    for words in ("python", "jaxlib", "known sum", "right", "compiled code", "plot"):
+    for words in ("python", "jaxlib", "known sum", "right", "programs", "plot"):
         assert words in out
     assert max(map(len, out.splitlines())) <= 80
 

@@ -96,7 +96,7 @@ def test_quiet_computes_only_what_it_warns_of(call, monkeypatch):
             asked.append(name)
             return []
 
-        monkeypatch.setattr(nf.Path, name, property(spy))
+        monkeypatch.setattr(nf.EquilibriumPath, name, property(spy))
     assert call(*LOOP[:2], "--tension", "0,1", "--quiet") == (0, "", "")
     assert (made, asked) == ([], [])
     call(*LOOP[:2], "--tension", "0,1")

@@ -109,7 +109,7 @@ def test_kinematics_takes_the_stroke_of_the_model_where_none_was_measured():
     shared = compare_kinematics(by_force)
     np.testing.assert_allclose(shared.total_angle, by_force.total_angle, rtol=1e-6)
     assert errors_document(shared)["stroke_from"] == "model"
-    by_stroke = nf.compare(WRIST, seen("notch_angle", load=nf.draw(0.2, 1.2, steps=4)))
+    by_stroke = nf.compare(WRIST, seen("notch_angle", load=nf.stroke_path(0.2, 1.2, steps=4)))
     assert errors_document(compare_kinematics(by_stroke))["stroke_from"] == "measurement"
     assert "stroke_from" not in errors_document(by_stroke)
 

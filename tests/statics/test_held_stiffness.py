@@ -16,12 +16,14 @@ WRIST = nf.load_robot("pacheco2021-a")
 PULLED = [nf.Load(tension=value) for value in (0.5, 1.9, 2.2, 1.8, 0.4)]
 
 
-def pushed(robot: nf.Robot, *forces: tuple[float, float, float], tension: float = 0.0) -> nf.Path:
+def pushed(
+    robot: nf.Robot, *forces: tuple[float, float, float], tension: float = 0.0
+) -> nf.EquilibriumPath:
     pull = (tension,) + (0.0,) * (robot.number_of_tendons - 1)
     return nf.simulate(robot, [nf.Load(tension=pull, tip_force=one) for one in forces])
 
 
-def two_by_stroke() -> nf.Path:
+def two_by_stroke() -> nf.EquilibriumPath:
     load = nf.Load(tension=(1.0, None, 0.2, None), stroke=(None, 0.3, None, 0.0))
     return nf.simulate(nf.load_robot("two-axis-wrist"), load)
 
@@ -39,7 +41,7 @@ CASES = {
 }
 
 
-def by_the_oracle(path: nf.Path) -> tuple[np.ndarray, np.ndarray]:
+def by_the_oracle(path: nf.EquilibriumPath) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and sign of the determinant of every state."""
     loads = command(path.load, path.robot, path.chain)
     own = np.flatnonzero(np.asarray(path.chain.rods.idle).ravel() == 0.0)
@@ -55,7 +57,7 @@ def by_the_oracle(path: nf.Path) -> tuple[np.ndarray, np.ndarray]:
     return np.array(found), np.array(signs)
 
 
-def held(path: nf.Path) -> np.ndarray:
+def held(path: nf.EquilibriumPath) -> np.ndarray:
     loads = command(path.load, path.robot, path.chain)
     pieces = held_stiffness(path.prepared, loads, path.run.solved)
     return np.concatenate([one.stiffness for one in pieces])

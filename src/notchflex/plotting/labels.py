@@ -18,7 +18,9 @@ from notchflex.results.quantities import QUANTITIES
 
 SYMBOLS = frozenset(one.symbol for one in QUANTITIES.values() if one.symbol) | {r"\mu"}
 
-_OURS = re.compile(r"\$(" + "|".join(map(re.escape, sorted(SYMBOLS))) + r")\$")
+# Of one notch the symbol has its number for j, of one axis its name behind.
+_EACH = (re.escape(one).replace("_j", r"_(?:j|\d+)") for one in sorted(SYMBOLS))
+_OURS = re.compile(r"\$((?:" + "|".join(_EACH) + r")(?:_[xyz])?)\$")
 # Neither an SVG nor a UTF-8 file can hold these.
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff]")
 _GREEK = {
