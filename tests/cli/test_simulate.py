@@ -70,7 +70,8 @@ def test_what_set_changed_stands_above_the_table_and_in_the_picture(call, tmp_pa
     assert call("show", LOOP[1], *change)[1].splitlines()[0] == title
 
 
-def test_named_columns(call):
+def test_named_columns(call, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
     _, out, _ = call(*LOOP[:2], "--tension", "0,2", "--columns", "gap, closed,peak_strain")
     (last,) = (line.split() for line in out.splitlines() if line.startswith("   2 "))
     robot = nf.load_robot("pacheco2021-a")

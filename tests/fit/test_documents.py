@@ -50,7 +50,7 @@ def test_constants_are_those_of_the_fit():
         assert one["value"] == found.values[one["name"]]
         assert one["interval_95"] == [interval.lower, interval.upper]
         assert one["standard_deviation"] == found.deviations[one["name"]]
-    assert friction["limits"] == [0.0, None]
+    assert friction["limits"] == [0.0, 1000.0]
     assert (friction["before"], modulus["before"]) == (0.13, 10_000.0)
     np.testing.assert_allclose(document["correlation"], found.correlation)
     assert document["cost"] == found.cost

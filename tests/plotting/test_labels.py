@@ -14,8 +14,7 @@ import notchflex as nf
 from fake_path import fake_path
 from fitted import DEVIATION, NAMES, OBSERVED
 from notchflex.cli import run
-from notchflex.comparison import compare
-from notchflex.fit import Measurements, calibrate, simulate_measurements
+from notchflex.fit import calibrate, simulate_measurements
 from notchflex.plotting import (
     beside_picture,
     calibration_picture,
@@ -40,9 +39,9 @@ def nasty_path(steps=3):
 def nasty_comparison():
     robot = nf.load_robot(WRIST).replace(name=NASTY)
     angles = np.radians([[5.0, 5.0, 5.0, 4.0, 4.0], [9.0, 9.0, 8.0, 8.0, 8.0]])
-    observed = {"notch_angle": angles, "total_angle": angles.sum(1)}
-    load = nf.pull(0.5, 0.9, steps=2)
-    one = compare(robot, Measurements(NASTY, load, (NASTY, "_2"), True, observed))
+    loads = nf.pull(0.5, 0.9, steps=2)
+    seen = nf.Measurements(NASTY, loads, (NASTY, "_2"), True, {"notch_angle": angles})
+    one = nf.compare(robot, seen)
     return comparison_picture(one, {NASTY: one, "_other": one})
 
 
