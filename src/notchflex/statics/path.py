@@ -1,4 +1,4 @@
-"""What a simulation returns: many states with memory."""
+"""What a simulation returns: the states of a path."""
 
 from __future__ import annotations
 

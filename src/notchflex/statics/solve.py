@@ -1,4 +1,4 @@
-"""The public functions: one load, a path with memory, many loads each from rest."""
+"""The public functions: one load, a path with friction history, many loads each from rest."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ def simulate(
     settings: Settings | None = None,
     refinement: int = 0,
 ) -> EquilibriumPath:
-    """Follow loads one after the other, with friction that remembers.
+    """Follow loads one after the other, with friction history.
 
     Args:
         robot: The robot.
         loads: A path such as `pull(0.0, 3.0).release()`, or loads in order.
         from_state: State to continue from; rest where not given.
-        settings: How hard the solver tries.
-        refinement: 0 has the strain modes that serve for usual loads, 1, 2, 3 more of them: a
-            result that stays the same can be trusted (`moment_error` tells how much is missing).
+        settings: Tolerance and limits of the solver.
+        refinement: 0 for the usual strain modes; 1, 2 or 3 adds more. A result that does not change
+            has converged (`moment_error` says how much is missing).
 
     Returns:
-        The states, one per load. A load that does not converge is told by `converged` and
-        `reason`, and ends the path.
+        The states, one per load. Where a load does not converge, `converged` is false and `reason`
+        says why; later loads are not tried.
 
     Raises:
-        InputError: Loads that are none, or a state of another robot.
+        InputError: Invalid loads, or a state of another robot.
 
     Example:
         >>> from notchflex import load_robot, pull
@@ -76,14 +76,14 @@ def solve(
         robot: The robot.
         load: Tension or stroke of its tendons.
         from_state: State to start from; rest where not given.
-        settings: How hard the solver tries.
+        settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
 
     Returns:
         The equilibrium, or the last good state on the way with `converged` false and a reason.
 
     Raises:
-        InputError: A load that is none, or a state of another robot.
+        InputError: An invalid load, or a state of another robot.
 
     Example:
         >>> from math import degrees
@@ -102,19 +102,19 @@ def solve_each(
     settings: Settings | None = None,
     refinement: int = 0,
 ) -> EquilibriumPath:
-    """Solve many loads, each from rest, without memory from one to the next.
+    """Solve many loads, each from rest.
 
     Args:
         robot: The robot.
         loads: The loads.
-        settings: How hard the solver tries.
+        settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
 
     Returns:
         The states, one per load; a failure of one does not touch the others.
 
     Raises:
-        InputError: Loads that are none.
+        InputError: Invalid loads.
 
     Example:
         >>> from notchflex import load_robot, pull
