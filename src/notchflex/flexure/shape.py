@@ -138,9 +138,8 @@ def _left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
 
 def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
     """Products of all rotations up to each."""
-    if array_module(parts) is np:
-        return constant(list(accumulate(parts, np.matmul)))
-    return jax.lax.associative_scan(jnp.matmul, parts)
+    xp = array_module(parts)
+    return xp.stack(list(accumulate(parts, xp.matmul)))
 
 
 def _before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
