@@ -6,15 +6,15 @@ import notchflex as nf
 from notchflex.statics.command import command
 from notchflex.statics.load import load_path
 from notchflex.statics.newton import Settings
-from notchflex.statics.path import Path
+from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import prepared
 from notchflex.statics.run import run
 
 
-def simulate_at(robot: nf.Robot, loads, level: str, *, loaded: bool = False) -> Path:
+def simulate_at(robot: nf.Robot, loads, level: str, *, loaded: bool = False) -> EquilibriumPath:
     """`nf.simulate` with modes for "tendons" alone, loads in the "plane", or "space"."""
     load = load_path(loads, robot.number_of_tendons)
     ready = prepared(robot, level, loaded=loaded)
     commands = command(load, robot, ready.chain)
     came = run(ready, commands, ready.rest, Settings(), each_from_start=False)
-    return Path(robot, load, ready, came)
+    return EquilibriumPath(robot, load, ready, came)
