@@ -96,7 +96,8 @@ def check_commands(robot: Table, path: Any, load: Table, step: int) -> Iterator[
     """Find tensions and strokes other than those commanded."""
     tension, stroke = path.tension[step], path.stroke[step]
     most = max(np.abs(path.tension).max(), 1e-12)
-    yield from above("tension below 0", step, float(-tension.min()) / most, 1e-12)
+    own = max(most, tension_scale(robot))  # a tension found for a stroke is as exact as that
+    yield from above("tension below 0", step, float(-tension.min()) / own, 1e-12)
     reach = piece_lengths(robot).sum() + robot["tube"]["outer_diameter"]
     for t in range(len(tension)):
         pull, drawn = load["tension"][t], load["stroke"][t]
@@ -115,6 +116,7 @@ def check_friction(robot: Table, path: Any, step: int) -> Iterator[Finding]:
     reach = piece_lengths(robot).sum() + robot["tube"]["outer_diameter"]
     most = max(np.abs(path.tension[step]).max(), 1e-300)
     highest = max(np.abs(path.tension).max(), 1e-12)
+    own = max(highest, tension_scale(robot))
     for t in range(len(robot["tendon"])):
         count = spans_of(robot, path, t)
         along = path.span_tension[step, t, :count]
@@ -123,7 +125,7 @@ def check_friction(robot: Table, path: Any, step: int) -> Iterator[Finding]:
         turning = path.contact_turning[step, t, : count - 1]
         state = path.contact_state[step, t, : count - 1]
         name = f"tendon {t + 1}"
-        yield from above("span tension below 0", step, float(-along.min()) / highest, 1e-12, name)
+        yield from above("span tension below 0", step, float(-along.min()) / own, 1e-12, name)
         base = abs(along[0] - path.tension[step, t]) / most
         yield from above("first span is not the base", step, base, 1e-9, name)
         law = friction_bound(robot["friction"], turning)
