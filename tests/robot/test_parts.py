@@ -4,6 +4,7 @@ import copy
 import dataclasses
 import pickle
 
+import numpy as np
 import pytest
 
 import notchflex as nf
@@ -83,3 +84,11 @@ def test_problems_count_notches_from_the_base(robot: nf.Robot):
     deep = dataclasses.replace(NOTCH, depth=1.7)
     with pytest.raises(nf.InputError, match=r"`notch\[3\].depth` is 1.7 mm"):
         robot.replace(notch=(NOTCH, deep))
+
+
+@pytest.mark.parametrize("number", [np.array([1.0, 2.0]), np.array(1.5), np.array([1, 2]), 2.0])
+def test_whole_numbers_are_asked_for_whatever_comes(number):
+    with pytest.raises(nf.InputError, match=r"`repeat` .* whole number"):
+        dataclasses.replace(NOTCH, repeat=number)
+    with pytest.raises(nf.InputError, match=r"`end_body` .* whole number"):
+        nf.Tendon(0.7, end_body=number)

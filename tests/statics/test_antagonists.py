@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.chain import assemble
+from notchflex.statics.actuation import Command, command_residual, drawn_when_closed
+from notchflex.statics.walk import Base
 
 STIFF = 4000.0  # N, E A of the elastic cables
 
@@ -102,3 +105,59 @@ def test_one_by_force_one_by_stroke(elastic, margin) -> None:
     ).raise_if_failed()
     margin.within("tension found", mixed.tension - both.tension, 1e-7, "N")
     margin.within("shape", mixed.notch_angle - both.notch_angle, 1e-9, "rad")
+
+
+def _notch(path: str, opposite: str, friction: nf.Capstan | nf.Frictionless) -> nf.Robot:
+    """One notch between two inextensible tendons."""
+    return nf.Robot(
+        name="one notch",
+        tube=nf.Tube(1.62, 1.40),
+        notch=[nf.ArcNotch(cut="on-axis", depth=1.4, height=0.8, uncut_length=1.2)],
+        tendon=[
+            nf.Tendon(0.7, path=path),
+            nf.Tendon(0.7, direction_deg=180.0, path=opposite),
+        ],
+        material=nf.Linear(7510.0),
+        friction=friction,
+    )
+
+
+@pytest.mark.parametrize(
+    ("robot", "strokes"),
+    [
+        (_notch("straight", "wall-arc", nf.Capstan(0.0)), (0.05, 0.0)),
+        (_notch("straight", "wall-arc", nf.Frictionless()), (0.05, 0.0)),
+        (_notch("straight", "wall-arc", nf.Capstan(0.2)), (0.05, 0.0)),
+        (_notch("wall-arc", "wall-arc", nf.Frictionless()), (0.1, 0.01)),
+    ],
+)
+def test_strokes_that_contradict_each_other(robot, strokes) -> None:
+    """Bent one way, the other tendon is let go; drawn as well, no shape has both strokes."""
+    loads = [nf.Load(stroke=(0.05, -1.0)), nf.Load(stroke=strokes)]
+    path = nf.simulate(robot, loads)
+    assert path.converged.tolist() == [True, False], path.reason
+    assert path.residual[1] > 1e-10, "a missed stroke is no imbalance"
+    assert "strokes of tendons 1 and 2 contradict each other" in path.reason[1]
+    assert "finite axial_stiffness" in path.reason[1]
+    assert (path.tension[1] < 1e5 * path.chain.closing_force).all()
+    given = robot.with_value("tendon.axial_stiffness", 1e4)
+    assert nf.simulate(given, loads).converged.all(), "the remedy named is none"
+
+
+def test_a_missed_stroke_is_an_imbalance_beside_any_tension() -> None:
+    """A difference of tensions and strokes would round the stroke away."""
+    chain = assemble(_notch("straight", "wall-arc", nf.Frictionless()))
+    command = Command(np.array([0.05, 0.0]), np.array([True, True]), None)
+    base = Base(drawn=np.array([0.05 - 1e-6, -1e-6]), stretch=np.zeros(2), load=None)
+    for tension in (1.0, 1e8, 1e16):
+        missed = command_residual(chain, command, np.full(2, tension), base)
+        np.testing.assert_allclose(missed, -1e-6, rtol=1e-9)
+
+
+def test_stroke_that_closes_every_notch() -> None:
+    robot = _notch("wall-arc", "wall-arc", nf.Frictionless())
+    reach = drawn_when_closed(assemble(robot))
+    closing = nf.solve(robot, nf.Load(tension=(10.0, 0.0)))
+    assert closing.closed.all()
+    assert abs(reach[0] - closing.stroke[0]) < 1e-9
+    assert np.isinf(reach[1]), "a tendon that the closing notch draws in goes on as it opens"

@@ -118,3 +118,12 @@ def test_no_stroke_leaves_the_tendon_slack(margin):
     assert state.converged, state.reason
     margin.within("tension", state.tension, 1e-12, "N")
     margin.within("angles", state.notch_angle, 1e-12, "rad")
+
+
+def test_no_stroke_is_followed_to_a_tension_that_nothing_bears():
+    """Beside the plane of its notches a tendon goes on bending closed notches sideways."""
+    robot = ready("A").with_value("tendon[1].direction_deg", 4.0)
+    path = nf.simulate(robot, strokes([3.0, 8.0]))
+    assert path.converged.tolist() == [True, False]
+    assert path.reason[1]
+    assert path.tension.max() < 1e5 * float(path.chain.closing_force)

@@ -68,12 +68,12 @@ def _rows() -> tuple[Quantity, ...]:
         ),
         q(
             "tip_position", "tip position", "p", "mm",
-            "Position of the tip (the end of the last uncut section) in the base frame.",
+            "Position of the tip (the end of the last uncut section) in the world.",
             "tip_position_mm", "tip_{axis}_mm", ("axis",),
         ),
         q(
             "tip_rotation", "tip rotation", "R", "",
-            "Rotation matrix of the tip in the base frame.",
+            "Rotation matrix of the tip in the world.",
             "tip_rotation", "", ("row", "axis"),
         ),
         q(

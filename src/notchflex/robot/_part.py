@@ -78,7 +78,10 @@ def _as_int(value: object) -> int:
     """Take any whole number type (of numpy too), but no truth value, no text and no float."""
     if isinstance(value, bool) or not hasattr(value, "__index__"):
         raise PydanticCustomError("whole_number_wanted", "a whole number is wanted")
-    return operator.index(value)  # pyright: ignore[reportArgumentType]
+    try:
+        return operator.index(value)  # pyright: ignore[reportArgumentType]
+    except TypeError:  # an array of several numbers, or of floats
+        raise PydanticCustomError("whole_number_wanted", "a whole number is wanted") from None
 
 
 Float = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_as_float)]

@@ -72,7 +72,8 @@ def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
     """Stroke at which every notch is closed (mm), infinite where that is not known beforehand.
 
     Where every notch closes against its spine, a tendon on the wall shortens by the notch's
-    travel times its lever.
+    travel times its lever. One that a closing notch draws in shortens as that notch opens, without
+    end.
     """
     reach = np.full(chain.tendons, np.inf)
     rods = jax.tree.map(np.asarray, chain.rods)
@@ -83,8 +84,8 @@ def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
         if isinstance(group, WallArc):
             weights = of_rod(chain.rods, fibre_stretch(constant(group.across)))
             slope = np.einsum("ntc,nic,ni->nt", weights, rods.basis[..., 0], rods.length)
-            loss = np.asarray(group.present) * np.maximum(-slope * travel[:, None], 0.0)
-            reach[list(group.numbers)] = loss.sum(axis=0)
+            loss = np.asarray(group.present) * -slope * travel[:, None]
+            reach[list(group.numbers)] = np.where(loss < 0.0, np.inf, loss).sum(axis=0)
     return reach
 
 
@@ -97,7 +98,28 @@ def command_residual(
     tension >= 0, stroke set free >= stroke demanded, product 0.
     """
     scale = chain.drawn_stiffness
-    pressed = base_tension + scale * (command.value - stroke(chain, base_tension, base))
-    by_stroke = base_tension - jnp.where(pressed >= 0.0, pressed, 0.0)
-    by_tension = base_tension - command.value
-    return command.either(by_stroke, by_tension) / scale
+    missing = stroke(chain, base_tension, base) - command.value
+    # Told apart, not subtracted from one another: beside a large tension the rest would be lost.
+    by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)
+    by_tension = (base_tension - command.value) / scale
+    return command.either(by_stroke, by_tension)
+
+
+# Tension up to which the stroke of an inextensible tendon is followed, in forces that close a
+# notch.
+_MOST_CLOSING_FORCES = 1e5
+
+
+def bearable(
+    chain: Chain, command: Command, base_tension: Float[Array, " t"]
+) -> Bool[Array, ""] | bool:
+    """Whether tensions that were found for strokes are far from what any robot can bear.
+
+    An inextensible tendon can be drawn no further once the shape can't give; its tension would
+    then be whatever rounding makes of it. One that stretches bounds its tension itself.
+    """
+    if command.by_stroke is None:
+        return True
+    most = _MOST_CLOSING_FORCES * chain.closing_force
+    most = jnp.where(chain.axial_stiffness < jnp.inf, jnp.inf, most)
+    return jnp.all(jnp.where(command.by_stroke, base_tension, 0.0) <= most)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.chain import Chain
-from notchflex.statics.actuation import Command, command_residual, stroke
+from notchflex.statics.actuation import Command, bearable, command_residual, stroke
 from notchflex.statics.element import Memory, Unknowns, heights, pressed
 from notchflex.statics.play import played
 from notchflex.statics.sweep import Step, linear_step
@@ -173,7 +173,8 @@ def newton(
             stroke=stroke(chain, point.base_tension, at.base),
             residual=largest,
             iterations=best.iterations + 1,
-            converged=solved | (largest < _ROUNDING * tolerance),
+            converged=(solved | (largest < _ROUNDING * tolerance))
+            & bearable(chain, command, point.base_tension),
         )
 
         def again() -> tuple[Point, Array]:

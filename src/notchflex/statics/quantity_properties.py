@@ -89,7 +89,7 @@ class PathQuantities:
     def tip_position(self) -> Float[np.ndarray, "s 3"]:
         """Tip position, mm, shape (s, 3).
 
-        Position of the tip (the end of the last uncut section) in the base frame.
+        Position of the tip (the end of the last uncut section) in the world.
         """
         return self.quantity("tip_position")
 
@@ -97,7 +97,7 @@ class PathQuantities:
     def tip_rotation(self) -> Float[np.ndarray, "s 3 3"]:
         """Tip rotation, shape (s, 3, 3).
 
-        Rotation matrix of the tip in the base frame.
+        Rotation matrix of the tip in the world.
         """
         return self.quantity("tip_rotation")
 
@@ -424,7 +424,7 @@ class EquilibriumQuantities:
     def tip_position(self) -> Float[np.ndarray, " 3"]:
         """Tip position, mm, shape (3,).
 
-        Position of the tip (the end of the last uncut section) in the base frame.
+        Position of the tip (the end of the last uncut section) in the world.
         """
         return self.quantity("tip_position")
 
@@ -432,7 +432,7 @@ class EquilibriumQuantities:
     def tip_rotation(self) -> Float[np.ndarray, "3 3"]:
         """Tip rotation, shape (3, 3).
 
-        Rotation matrix of the tip in the base frame.
+        Rotation matrix of the tip in the world.
         """
         return self.quantity("tip_rotation")
 

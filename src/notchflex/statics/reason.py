@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Int
 
+from notchflex._jax import constant, jax
 from notchflex.statics.actuation import drawn_when_closed
+from notchflex.statics.prepare import Prepared
+from notchflex.statics.run import run
 
 if TYPE_CHECKING:  # for the type only: a path tells its reasons
     from notchflex.statics.path import EquilibriumPath
@@ -14,6 +19,10 @@ if TYPE_CHECKING:  # for the type only: a path tells its reasons
 # A stroke is followed up to the last good state before the last notch closes, which leaves it
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
+# Axial stiffnesses, in forces that close a notch, each ten times the one before. Where nothing but
+# stretch lets a tendon be drawn so far, the second step changes its tension about ten times as much
+# as the first; where the shape fixes the tension, a tenth as much.
+_STIFFNESSES, _GROWS = (1e2, 1e3, 1e4), 3.0
 
 
 def why_not(path: EquilibriumPath, step: int) -> str:
@@ -50,6 +59,20 @@ def why_not(path: EquilibriumPath, step: int) -> str:
             f"fixes no tension; {last}; command a smaller stroke, or a tension, or give the "
             "tendon a finite axial_stiffness"
         )
+    held = _drawn_by_stretch_alone(path, step)
+    if len(held) == 1:
+        return (
+            f"the robot can't shorten tendon {held[0] + 1} by so much, so this stroke fixes no "
+            f"tension; {last}; command a smaller stroke, or a tension, or give the tendon a "
+            "finite axial_stiffness"
+        )
+    if len(held):
+        numbers = " and ".join(str(number + 1) for number in held)
+        return (
+            f"the strokes of tendons {numbers} contradict each other: no shape lets inextensible "
+            f"tendons be drawn so far at once, so they fix no tension; {last}; command other "
+            "strokes, or a tension, or give the tendons a finite axial_stiffness"
+        )
     part = 100.0 * float(path.run.reached[step])
     return (
         f"no equilibrium found beyond {part:.3g} % of the way from the state before "
@@ -63,6 +86,31 @@ def _past_closing(path: EquilibriumPath, step: int) -> bool:
     reach = drawn_when_closed(path.chain)
     inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
     return bool((inextensible & (path.load.stroke[step] >= reach)).any())
+
+
+def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:
+    """Return the inextensible tendons, from 0, that no shape of the robot lets be drawn so far.
+
+    Solved once more with tendons that stretch, their tension grows as their stiffness does.
+    """
+    chain = path.chain
+    inextensible = np.isinf(np.asarray(chain.axial_stiffness))
+    asked = inextensible & np.isfinite(path.load.stroke[step])
+    tensions: list[np.ndarray] = []
+    for forces in _STIFFNESSES if asked.any() else ():
+        stiffness = np.where(inextensible, forces * chain.closing_force, chain.axial_stiffness)
+        softer = Prepared(dataclasses.replace(chain, axial_stiffness=constant(stiffness)))
+        command = jax.tree.map(lambda leaf: np.asarray(leaf)[step : step + 1], path.commands)
+        start = jax.tree.map(lambda leaf: np.asarray(leaf)[step], path.run.solved)
+        came = run(softer, command, start, path.settings, each_from_start=True)
+        if not came.converged[0]:
+            return np.zeros(0, int)
+        tensions.append(came.quantity("tension")[0])
+    if not tensions:
+        return np.zeros(0, int)
+    least = 1e-3 * float(chain.closing_force)
+    first, second = np.diff(tensions, axis=0)
+    return np.flatnonzero(asked & (second > np.maximum(_GROWS * first, least)))
 
 
 __all__ = ["why_not"]

@@ -76,5 +76,10 @@ class Straight(TendonGroup):
 
 
 def turning(before: Float[Array, " d"], after: Float[Array, " d"]) -> Float[Array, ""]:
-    """Angle between two unit directions, exact for small angles, with slope 0 at zero."""
-    return jnp.atan2(guarded_norm(moment_of(before, after)), jnp.sum(before * after))
+    """Angle between two unit directions, exact for small angles, with slope 0 at zero.
+
+    A span without length has no direction (its vector is 0) and turns nothing, with slope 0.
+    """
+    sine, cosine = guarded_norm(moment_of(before, after)), jnp.sum(before * after)
+    nowhere = (sine == 0.0) & (cosine == 0.0)
+    return jnp.atan2(sine, jnp.where(nowhere, 1.0, cosine))
