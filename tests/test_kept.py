@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
+from notchflex import _store
 from notchflex._jax import jax, jnp
 from notchflex._kept import Kept
-from notchflex.cli import compile_cache
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(Kept, "folder", tmp_path)
+    monkeypatch.setenv(_store.VARIABLE, str(tmp_path))
     monkeypatch.setattr(Kept, "loaded", {})
-    return tmp_path
+    return _store.program_folder()
 
 
 @pytest.fixture
@@ -67,8 +67,9 @@ def test_a_spoilt_file_is_made_again(folder, process, traced, spoil):
     assert traced == [2, 2]
 
 
-def test_a_folder_that_cannot_be_written_costs_only_time(folder, process, monkeypatch):
-    monkeypatch.setattr(Kept, "folder", folder / "not" / "there")
+def test_a_folder_that_cannot_be_made_costs_only_time(tmp_path, process, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv(_store.VARIABLE, str(tmp_path / "file" / "inside"))
     np.testing.assert_array_equal(process()(np.arange(3.0), 2)["grown"], [0.0, 2.0, 6.0])
 
 
@@ -85,19 +86,3 @@ def test_a_file_that_cannot_be_replaced_leaves_nothing_beside_it(folder, process
     file.mkdir()
     process()(np.arange(3.0), 2)
     assert list(folder.iterdir()) == [file]
-
-
-def test_a_folder_of_the_user_is_made_and_has_one_of_its_own_for_each_processor(
-    tmp_path, monkeypatch
-):
-    monkeypatch.setattr(Kept, "folder", None)
-    monkeypatch.setenv(compile_cache.VARIABLE, str(tmp_path / "own"))
-    compile_cache.use_compile_cache()
-    assert Kept.folder.is_dir()
-    assert Kept.folder.parent == tmp_path / "own"
-    monkeypatch.setattr(compile_cache, "_machine", lambda: "other")
-    before = Kept.folder
-    compile_cache.use_compile_cache()
-    assert Kept.folder != before
-    monkeypatch.setenv(compile_cache.VARIABLE, "gs://somewhere")
-    assert compile_cache.cache_folder() is None

@@ -121,7 +121,21 @@ def test_a_new_load_or_robot_of_the_same_shape_needs_no_new_program(wrist: nf.Ro
     nf.simulate(wrist, nf.pull(0.0, 2.0, steps=17).release())
     nf.simulate(nf.load_robot("pacheco2021-b-specimen"), nf.stroke_path(0.0, 1.0, steps=40))
     nf.simulate(wrist.with_value("notch[2].depth", 1.3), nf.pull(0.0, 2.0, steps=3))
+    for notches in (1, 4, 7):
+        shorter = wrist.replace(notch=wrist.notches[:1] * notches, tendon=(nf.Tendon(0.7),))
+        assert nf.solve(shorter, nf.Load(tension=0.5)).converged
     assert run_module._follow.count() == compiled
+
+
+def test_wrists_of_one_to_forty_notches_share_four_programs(wrist: nf.Robot) -> None:
+    programs = set()
+    for notches in (1, 3, 7, 8, 15, 16, 24, 31, 32, 40):
+        longer = wrist.replace(notch=wrist.notches[:1] * notches, tendon=(nf.Tendon(0.7),))
+        state = nf.solve(longer, nf.Load(tension=0.3)).raise_if_failed()
+        programs.add(state.path.prepared.long.known_form)
+        alone = nf.solve_batch(longer, [nf.Load(tension=0.3)])  # a program without added flexures
+        assert state.total_angle == pytest.approx(alone["total_angle"][0], abs=1e-12)
+    assert len(programs) <= 4
 
 
 def test_huge_and_tiny_loads(wrist: nf.Robot) -> None:
