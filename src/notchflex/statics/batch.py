@@ -30,18 +30,8 @@ from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.outputs import DEFAULT_OUTPUTS, known_outputs
 from notchflex.statics.packing import Form
 from notchflex.statics.prepare import Prepared, lengthened
+from notchflex.statics.quantities import BY_BODY, BY_FLEXURE
 from notchflex.statics.solve import prepared_for
-
-_BY_FLEXURE = (
-    "notch_angle",
-    "chord_angle",
-    "notch_moment",
-    "outer_strain",
-    "peak_strain",
-    "gap",
-    "contact_force",
-)
-_BY_BODY = ("body_position", "body_rotation")
 
 # Rows of a piece at most, by how many rows there are.
 _PIECES = {0: 64, 512: 256, 8192: 2048}
@@ -282,8 +272,8 @@ class _Table:
 
 def _of_own(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
     """Values by flexure or body with NaN where a robot has none, rows and steps as leading axes."""
-    own = flexures + (name in _BY_BODY)
-    if name in (*_BY_FLEXURE, *_BY_BODY) and (own < values.shape[2]).any():
+    own = flexures + (name in BY_BODY)
+    if name in (*BY_FLEXURE, *BY_BODY) and (own < values.shape[2]).any():
         beyond = np.arange(values.shape[2]) >= own[:, None]
         values[np.broadcast_to(beyond[:, None], values.shape[:3])] = np.nan
     return values

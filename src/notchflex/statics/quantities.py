@@ -150,7 +150,7 @@ class Quantities(NamedTuple):
     stored_energy: Float[Array, "*s"]
 
 
-_BY_FLEXURE = (
+BY_FLEXURE = (
     "notch_angle",
     "chord_angle",
     "notch_moment",
@@ -160,7 +160,7 @@ _BY_FLEXURE = (
     "contact_force",
 )
 # With so many axes behind that of the bodies.
-_BY_BODY = {"body_position": 1, "body_rotation": 2}
+BY_BODY = {"body_position": 1, "body_rotation": 2}
 _BY_CONTACT = (
     "span_tension",
     "contact_log_ratio",
@@ -323,10 +323,10 @@ def of_own(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
         name: Name of the quantity, one of `Shape` or `Quantities`.
         values: Its values with any leading axes, of a chain that may have more flexures.
     """
-    if name in _BY_FLEXURE:
+    if name in BY_FLEXURE:
         return values[..., : chain.flexures]
-    if name in _BY_BODY:
-        return values[(..., slice(chain.flexures + 1), *(slice(None),) * _BY_BODY[name])]
+    if name in BY_BODY:
+        return values[(..., slice(chain.flexures + 1), *(slice(None),) * BY_BODY[name])]
     if name not in _BY_CONTACT:
         return values
     met = np.asarray(chain.contacts)
