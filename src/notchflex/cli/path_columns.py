@@ -40,7 +40,7 @@ MEANINGS = {
     "notch_angle": f"notch angle, base to tip ({CLOSED} closed)",
     "total_angle": "total bending angle",
     "total_chord_angle": "sum of the chord angles",
-    "tip_position": "tip position in the base frame",
+    "tip_position": "tip position in the world",
     "strain": "largest strain of all notches",
 }
 """What the legend says; other quantities are called by their titles."""
