@@ -117,7 +117,7 @@ class Prepared:
         return Shape.form(self.chain.flexures, self.chain.tendons)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=6)
 def prepared(
     robot: Robot,
     level: str = "tendons",
