@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from notchflex._store import VARIABLE
 from notchflex.errors import InputError
 
 _FIRST = """
@@ -82,9 +83,10 @@ def _environment() -> dict[str, str]:
 
 
 def _python(code: str) -> float:
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=_environment(), capture_output=True, text=True
-    )
+    with tempfile.TemporaryDirectory() as folder:  # no programs are kept there yet
+        environment = _environment() | {VARIABLE: folder}
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True)
     if done.returncode:
         raise InputError(f"a measuring process failed: {done.stderr.strip()[-500:]}")
     return float(done.stdout)
