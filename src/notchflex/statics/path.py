@@ -99,6 +99,8 @@ class EquilibriumPath(PathQuantities, Displayed):
         Steps that were not tried repeat the last one that was: the solver leaves their rows empty.
         """
         values = np.asarray(self.run.quantity(name))
+        if len(self) == 1:  # always tried
+            return values
         tried = np.asarray(self.run.tried)
         if tried.all():
             return values

@@ -13,7 +13,7 @@ from notchflex._jax import constant
 from notchflex.chain import Chain, assemble, padded
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
-from notchflex.statics.capacity import capacity, lengthen, places_within
+from notchflex.statics.capacity import capacity, lengthen
 from notchflex.statics.known import KnownForm
 from notchflex.statics.packing import Form
 from notchflex.statics.quantities import Shape
@@ -66,14 +66,6 @@ class Prepared:
         """Loads packed for the long chain, and the form of one of them."""
         own, form = self.command_form(commands), self.long.command_form(commands)
         return lengthen(own.pack(commands, leading=1), own, form), form
-
-    @cached_property
-    def columns(self) -> np.ndarray:
-        """Where two states and their shape are in a row of those of the long chain."""
-        state = places_within(self.state, self.long.state)
-        shape = places_within(self.shape, self.long.shape)
-        size = self.long.state.size
-        return np.concatenate([state, size + state, 2 * size + shape])
 
     @cached_property
     def rest(self) -> Solved:

@@ -17,7 +17,7 @@ from notchflex._jax import jax, jnp
 from notchflex._native import native
 from notchflex.chain import Chain
 from notchflex.statics.actuation import Command
-from notchflex.statics.capacity import lengthen
+from notchflex.statics.capacity import lengthen, places_within
 from notchflex.statics.known import KnownForm
 from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form, lane_sizes
@@ -38,11 +38,10 @@ class Run:
         self, prepared: Prepared, start: np.ndarray, table: np.ndarray, count: int
     ) -> None:
         """Take what the program returned for the long chain."""
-        self._prepared, self.first, self._count = prepared, start, count
-        self._table, self._long = table[:, prepared.columns], table
+        self._prepared, self.first, self._table, self._count = prepared, start, table, count
 
     def _told(self, number: int) -> np.ndarray:
-        return self._long[:, number - _TOLD]
+        return self._table[:, number - _TOLD]
 
     @cached_property
     def residual(self) -> Float[np.ndarray, " s"]:
@@ -79,16 +78,19 @@ class Run:
         """Part of the way at which the last of them began."""
         return self._told(6)
 
-    @property
+    @cached_property
     def states(self) -> Float[np.ndarray, "s state"]:
         """The last solved state at each load, packed: its own, or as far as it was followed."""
-        return self._table[:, : self._prepared.state.size]
+        return self._own_state(0)
 
-    @property
+    @cached_property
     def between(self) -> Float[np.ndarray, "s state"]:
         """The state before the last part of the way to each load, packed."""
-        size = self._prepared.state.size
-        return self._table[:, size : 2 * size]
+        return self._own_state(self._prepared.long.state.size)
+
+    def _own_state(self, start: int) -> Float[np.ndarray, "s state"]:
+        own, long = self._prepared.state, self._prepared.long.state
+        return self._table[:, start + places_within(own, long)]
 
     @cached_property
     def solved(self) -> Solved:
@@ -108,8 +110,10 @@ class Run:
         """What is reported of each state, by its name in `Shape` or `Quantities`."""
         if name not in Shape._fields:
             return self._more[name][1:]
-        packed = self._table[:, 2 * self._prepared.state.size :]
-        return self._prepared.shape.leaf(packed, Shape._fields.index(name))
+        long = self._prepared.long
+        packed = self._table[:, 2 * long.state.size : -_TOLD]
+        values = long.shape.leaf(packed, Shape._fields.index(name))
+        return of_own(self._prepared.chain, name, values)
 
     def before(self, name: str) -> np.ndarray:
         """A quantity of the state before the first load; of the shape only tension and stroke."""
