@@ -259,3 +259,27 @@ def test_values_that_do_not_fit_are_said():
     assert np.isnan(jax.grad(lambda depth: deep({"notch.depth": depth})["total_angle"][1])(5.0))
     with pytest.raises(nf.InputError, match="no output"):
         nf.differentiable(bend.robot, nf.pull(0.0, 1.0, 2), ["tension"], outputs=["angle"])
+
+
+@pytest.mark.parametrize(
+    ("loads", "parameter"),
+    [(nf.pull(0.5, 1.0, steps=2), "tension"), (nf.stroke_path(0.1, 0.5, steps=2), "stroke")],
+)
+def test_a_value_that_is_no_number_is_not_taken_for_none(loads, parameter):
+    """Inside a compiled program it gives no converged state and no slope; outside it is refused."""
+    bend = nf.differentiable(nf.load_robot("pacheco2021-a"), loads, [parameter])
+    values = {parameter: jnp.asarray(bend.start[parameter]).at[0, 0].set(jnp.nan)}
+    with pytest.raises(nf.InputError, match="finite"):
+        bend(values)
+    found = jax.jit(bend)(values)
+    assert not found["converged"].any()
+    assert np.isnan(found["total_angle"]).all()
+    slopes = jax.jit(jax.grad(lambda given: bend(given)["total_angle"][-1]))(values)
+    assert np.isnan(slopes[parameter]).all()
+
+
+@pytest.mark.parametrize("values", [[1.0], 3, "tension"])
+def test_values_come_by_name(values):
+    bend = nf.differentiable(nf.load_robot("pacheco2021-a"), nf.pull(1.0, 1.0, steps=1), "tension")
+    with pytest.raises(nf.InputError, match="by name"):
+        bend(values)

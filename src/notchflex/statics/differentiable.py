@@ -231,6 +231,10 @@ class Differentiable:
 
     def _taken(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Values of all parameters, in their shapes."""
+        if values is not None and not isinstance(values, Mapping):
+            raise InputError(
+                f"give values as a table by name of the parameter; got {shown(values)}"
+            )
         given = dict(values or {})
         wrong = [name for name in given if name not in self.start]
         if wrong:
@@ -320,6 +324,8 @@ class _Solver:
 
     def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
         """The path at some values; the last one is kept, as its derivatives are asked for next."""
+        if not np.isfinite(flat).all():  # a tension that is no number would mean a slack tendon
+            raise InputError("values must be finite numbers")
         key = flat.tobytes()
         if self.last is None or self.last[0] != key:
             self.last = key, self._of._path(self._named(flat))  # pyright: ignore[reportPrivateUsage]
