@@ -269,7 +269,7 @@ def test_a_value_that_is_no_number_is_not_taken_for_none(loads, parameter):
     """Inside a compiled program it gives no converged state and no slope; outside it is refused."""
     bend = nf.differentiable(nf.load_robot("pacheco2021-a"), loads, [parameter])
     values = {parameter: jnp.asarray(bend.start[parameter]).at[0, 0].set(jnp.nan)}
-    with pytest.raises(nf.InputError, match="finite"):
+    with pytest.raises(nf.InputError):
         bend(values)
     found = jax.jit(bend)(values)
     assert not found["converged"].any()

@@ -231,10 +231,8 @@ class Differentiable:
 
     def _taken(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Values of all parameters, in their shapes."""
-        if values is not None and not isinstance(values, Mapping):
-            raise InputError(
-                f"give values as a table by name of the parameter; got {shown(values)}"
-            )
+        if not isinstance(values, Mapping | None):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise InputError(f"give values by name of the parameter; got {shown(values)}")
         given = dict(values or {})
         wrong = [name for name in given if name not in self.start]
         if wrong:
