@@ -346,7 +346,7 @@ class _Solver:
                 varied = np.array(value)
                 varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
                 more = self._packed({**values, name: varied})[size:].reshape(steps, -1)
-                yield more - base, None
+                yield more - base, np.zeros(size) if of.numbers else None  # one program for all
 
     def _by_number(self, values: Mapping[str, np.ndarray], name: str) -> np.ndarray:
         """Change of chain and loads by a number of the robot.

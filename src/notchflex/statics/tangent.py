@@ -62,11 +62,13 @@ class PathTangents:
         """
         long = self.path.prepared.long
         form = long.known_form
-        change = np.zeros(form.size) if chain is None else form.pack(chain)
+        varies = chain is not None
+        change = form.pack(chain) if varies else np.zeros(1)
         remembers = np.array([1.0 if self.remembers else 0.0])
         rows = (False, False, False, False, *(True,) * 6)
         given = (np.zeros(long.state.size), long.known_vector, change, remembers)
-        found = _tangent.along(rows, *given, *self._steps(loads), *self._forms, self.outputs)
+        others = (*self._forms, self.outputs, varies)
+        found = _tangent.along(rows, *given, *self._steps(loads), *others)
         return {name: self._own(name, values) for name, values in found.items()}
 
     def _steps(self, loads: Float[np.ndarray, "s command"]) -> Sequence[np.ndarray]:
@@ -115,19 +117,25 @@ def _tangent(
     command_form: Form,
     state_form: Form,
     outputs: tuple[str, ...],
+    varies: bool,
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
-    """Change of a solved state, which is carried to the next, and of what is reported of it."""
+    """Change of a solved state, which is carried to the next, and of what is reported of it.
+
+    The program for loads alone, where the chain does not vary, is a fifth shorter.
+    """
     solved, halfway = state_form.unpack(state), state_form.unpack(between)
     way = Way(halfway, how[0], how[1].astype(int), how[2] > 0.0)
 
-    def told(chain: Array, load: Array, before: Array) -> tuple[Array, dict[str, Array]]:
-        own, last = chain_form.unpack(chain), state_form.unpack(before)
+    def told(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
+        own, last = chain_form.unpack(varied), state_form.unpack(before)
         command: Command = command_form.unpack(load)
         found = answering(own, command, last, solved, way)
         return state_form.pack(found), reported(own, found, outputs)
 
-    changes = (chain_change, load_change, remembers[0] * last_change)
-    return jax.jvp(told, (chain, load, before), changes)[1]
+    at, changes = (load, before), (load_change, remembers[0] * last_change)
+    if varies:
+        at, changes = (*at, chain), (*changes, chain_change)
+    return jax.jvp(told, at, changes)[1]
 
 
 __all__ = ["PathTangents"]
