@@ -74,14 +74,16 @@ def commands(body: str) -> None:
 
 @contextlib.contextmanager
 def empty_folder() -> Iterator[None]:
-    """Work in a folder that is gone afterwards."""
-    before = Path.cwd()
+    """Work in a folder that is gone afterwards, where tables are as wide as in any pipe."""
+    before, columns = Path.cwd(), os.environ.pop("COLUMNS", None)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
             yield
         finally:
             os.chdir(before)
+            if columns is not None:
+                os.environ["COLUMNS"] = columns
 
 
 if __name__ == "__main__":
