@@ -12,7 +12,7 @@ import platform
 import stat
 import sys
 import warnings
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import cache, lru_cache
 from pathlib import Path
@@ -166,12 +166,10 @@ def _opened(folder: Path) -> Generator[int | None]:
         os.close(at)
 
 
-def _private(found: os.stat_result, is_kind: object) -> bool:
+def _private(found: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
     """Whether a file or folder is the user's own and nobody else can write to it."""
-    right_kind = callable(is_kind) and bool(is_kind(found.st_mode))
-    if not _POSIX:
-        return right_kind
-    return right_kind and found.st_uid == os.geteuid() and not found.st_mode & _OTHERS_WRITE
+    own = not _POSIX or (found.st_uid == os.geteuid() and not found.st_mode & _OTHERS_WRITE)
+    return is_kind(found.st_mode) and own
 
 
 def _open(folder: Path, at: int | None, name: str, flags: int = os.O_RDONLY) -> int:

@@ -55,7 +55,7 @@ def followed(
     """Follow a path of loads, and tell of every state what is asked.
 
     Beside `run` this is a second loop over a path, and stays one: `run` goes on or starts anew,
-    skips what only fills up its table (a branch that rows side by side would both take), and packs
+    skips what comes after a failure (a branch that rows side by side would both take), and packs
     all that a path may be asked for later; here nothing is kept but what is asked for.
 
     Args:

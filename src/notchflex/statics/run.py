@@ -34,11 +34,9 @@ _TOLD = 7
 class Run:
     """States of many loads, loads as leading axis."""
 
-    def __init__(
-        self, prepared: Prepared, start: np.ndarray, table: np.ndarray, count: int
-    ) -> None:
+    def __init__(self, prepared: Prepared, start: np.ndarray, table: np.ndarray) -> None:
         """Take what the program returned for the long chain."""
-        self._prepared, self.first, self._table, self._count = prepared, start, table, count
+        self._prepared, self.first, self._table = prepared, start, table
 
     def _told(self, number: int) -> np.ndarray:
         return self._table[:, number - _TOLD]
@@ -151,7 +149,6 @@ def run(
     Returns:
         One entry per load.
     """
-    count = len(commands.value)
     options = _options(settings, each_from_start)
     long = prepared.long
     packed, form = prepared.long_commands(commands)
@@ -163,7 +160,7 @@ def run(
         carried = np.append(start_row, 1.0)
     rows = (False, False, True, False, False)
     table = _follow.along(rows, carried, long.known_vector, packed, start_row, options, *forms)
-    return Run(prepared, first, table, count)
+    return Run(prepared, first, table)
 
 
 def lips(

@@ -7,7 +7,6 @@ such directions one after the other; so the program is compiled once, however ma
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -66,32 +65,28 @@ class PathTangents:
         change = form.pack(chain) if varies else np.zeros(1)
         remembers = np.array([1.0 if self.remembers else 0.0])
         rows = (False, False, False, False, *(True,) * 6)
+        before, states, between, how = self._states
+        packed, command_form = self._packed
         given = (np.zeros(long.state.size), long.known_vector, change, remembers)
-        others = (*self._forms, self.outputs, varies)
-        found = _tangent.along(rows, *given, *self._steps(loads), *others)
+        steps = (before, states, packed, loads, between, how)
+        others = (form, command_form, long.state, self.outputs, varies)
+        found = _tangent.along(rows, *given, *steps, *others)
         return {name: self._own(name, values) for name, values in found.items()}
 
-    def _steps(self, loads: Float[np.ndarray, "s command"]) -> Sequence[np.ndarray]:
-        """What the program needs of every step, with the change of the loads in its place."""
-        before, states, packed, between, how = self._solved
-        return before, states, packed, np.ascontiguousarray(loads), between, how
+    @cached_property
+    def _packed(self) -> tuple[np.ndarray, Form]:
+        """The loads packed for the long chain, and the form of one of them."""
+        return self.path.prepared.long_commands(self.path.commands)
 
     @cached_property
-    def _solved(self) -> Sequence[np.ndarray]:
+    def _states(self) -> tuple[np.ndarray, ...]:
+        """States before, at and between the loads, for the long chain, and how they were found."""
         ready, came = self.path.prepared, self.path.run
         assert isinstance(came, Run)
-        state, form = ready.state, ready.long.state
         before = np.concatenate([came.first[None], came.states[:-1]])
-        states, between = came.states, came.between
-        long = [lengthen(one, state, form) for one in (before, states, between)]
+        every = (before, came.states, came.between)
         how = np.stack([came.part_before, came.parts, self.path.converged], axis=1)
-        packed, _ = ready.long_commands(self.path.commands)
-        return long[0], long[1], packed, long[2], how
-
-    @cached_property
-    def _forms(self) -> tuple[KnownForm, Form, Form]:
-        long = self.path.prepared.long
-        return long.known_form, self.path.prepared.long_commands(self.path.commands)[1], long.state
+        return (*(lengthen(one, ready.state, ready.long.state) for one in every), how)
 
     def _own(self, name: str, values: np.ndarray) -> np.ndarray:
         own = of_own(self.path.chain, name, values)
