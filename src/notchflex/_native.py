@@ -15,10 +15,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from notchflex import _store
+from notchflex import _shipped, _store
 from notchflex._jax import jax, jnp
 from notchflex._kept import Kept, making
-from notchflex.native import Program, UnknownHereError, processor, program
+from notchflex.native import Program, Source, UnknownHereError, processor, source
 
 # Rows that XLA's programs are made for; more are cut up, fewer filled up.
 _PIECES = (64, 256, 1024)
@@ -61,6 +61,19 @@ class CompiledFunction:
         return cls(Program(code, tuple(sizes), room, rows), form)
 
 
+def _content_of(written: Source, form: Any) -> bytes:
+    """A program's text and the form of what it returns, as bytes."""
+    head = json.dumps([written.sizes, written.room, written.by_row, form])
+    return f"{head}\n{written.text}".encode()
+
+
+def _source_of(content: bytes) -> tuple[Source, Any]:
+    """What `_content_of` wrote."""
+    head, _, text = content.decode().partition("\n")
+    sizes, room, by_row, form = json.loads(head)
+    return Source(text, tuple(sizes), room, None if by_row is None else tuple(by_row)), form
+
+
 def _form(tree: Any) -> Any:
     """Return a tree of arrays (tuples and dictionaries) as plain data."""
     if isinstance(tree, dict):
@@ -95,6 +108,8 @@ class Native:
     made: ClassVar[OrderedDict[Any, CompiledFunction | None]] = OrderedDict()
     compiled: ClassVar[int] = 0
     """How many programs this process has compiled, not read from disk."""
+    traced: ClassVar[int] = 0
+    """How many of them it has traced, not found in the package."""
 
     def __init__(
         self, function: Callable[..., Any], vectors: int, long: Callable[..., Sequence[int]]
@@ -183,14 +198,36 @@ class Native:
         others: tuple[Any, ...],
     ) -> CompiledFunction | None:
         """The program, from disk or made and put there; None where XLA must make it."""
-        key = repr((self._name, how, by_row, shapes, others, processor()))
-        content = _store.read(key)
+        key = repr((self._name, how, by_row, shapes, others))
+        own = f"{key} {processor()}"
+        content = _store.read(own)
         if content is not None:
             return CompiledFunction.from_bytes(content)
+        written = self._source(key, how, by_row, shapes, others)
+        if written is None:
+            return None
+        text, form = written
+        Native.compiled += 1
+        found = CompiledFunction(text.compiled(), form)
+        _store.write(own, found.to_bytes())
+        return found
+
+    def _source(
+        self,
+        key: str,
+        how: str,
+        by_row: tuple[bool, ...] | None,
+        shapes: Sequence[Any],
+        others: tuple[Any, ...],
+    ) -> tuple[Source, Any] | None:
+        """The program's text and the form of what it returns: shipped, or written now."""
+        content = _shipped.read(key)
+        if content is not None:
+            return _source_of(content)
         given = [np.zeros(shape) for shape in shapes]
         function = partial(self._with, others)
         try:
-            made, tree = program(
+            written, tree = source(
                 function, given, self._long(*others), by_row, carries=how == "along"
             )
         except UnknownHereError as error:
@@ -200,12 +237,12 @@ class Native:
                 stacklevel=2,
             )
             return None
-        Native.compiled += 1
-        if Native.compiled % _TRACES == 0:
+        Native.traced += 1
+        if Native.traced % _TRACES == 0:
             jax.clear_caches()
-        found = CompiledFunction(made, _form(tree))
-        _store.write(key, found.to_bytes())
-        return found
+        form = _form(tree)
+        _shipped.record(key, lambda: _content_of(written, form))
+        return written, form
 
     def _with(self, others: tuple[Any, ...], *vectors: Any) -> Any:
         return self._function(*vectors, *others)

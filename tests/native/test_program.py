@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from notchflex._jax import jax, jnp
-from notchflex.native import UnknownHereError, program
+from notchflex.native import UnknownHereError, source
 
 # Fewer than a vector's lanes, as many, more, and several vectors.
 SIZES = (1, 2, 3, 8, 13, 27, 40)
@@ -15,6 +15,11 @@ ROUNDING = 1e-13
 
 def given(size):
     return np.random.default_rng(size).normal(size=6 * size + 4)
+
+
+def program(*arguments):
+    written, tree = source(*arguments)
+    return written.compiled(), tree
 
 
 def single(function, *arrays, long):
