@@ -21,8 +21,10 @@ class RecordPrograms(BuildHookInterface):
             return
         root = Path(self.root)
         self.folder = tempfile.TemporaryDirectory()
+        # pip hands the build's libraries to its processes by the same variable.
+        paths = [str(root / "src"), *filter(None, [os.environ.get("PYTHONPATH")])]
         settings = {
-            "PYTHONPATH": str(root / "src"),
+            "PYTHONPATH": os.pathsep.join(paths),
             "NOTCHFLEX_RECORD_PROGRAMS": self.folder.name,
             "NOTCHFLEX_OPTIMISATION": "0",
             "JAX_COMPILATION_CACHE_DIR": "",
