@@ -16,7 +16,7 @@ class RecordPrograms(BuildHookInterface):
     """Puts programs into the wheel; an editable installation gets none."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Run the typical calls; a wheel without programs is complete, only its first calls wait."""
+        """Run the typical calls; without their programs only first calls take longer."""
         if version == "editable":
             return
         root = Path(self.root)

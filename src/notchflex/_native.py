@@ -18,7 +18,7 @@ import numpy as np
 from notchflex import _shipped, _store
 from notchflex._jax import jax, jnp
 from notchflex._kept import Kept, making
-from notchflex.native import Program, Source, UnknownHereError, processor, source
+from notchflex.native import Program, UnknownHereError, machine_code, processor, source
 
 # Rows that XLA's programs are made for; more are cut up, fewer filled up.
 _PIECES = (64, 256, 1024)
@@ -32,13 +32,15 @@ class CompiledFunction:
     """A program, and the form of what it returns.
 
     Args:
-        program: The program.
-        form: The returned tree with a shape and a kind of numbers for every array; see `_form`.
+        content: What `_content` returned, with machine code; plain data, nothing that is run when
+            it is read.
     """
 
-    def __init__(self, program: Program, form: Any) -> None:
-        """Take both."""
-        self.program, self.form = program, form
+    def __init__(self, content: bytes) -> None:
+        """Read it."""
+        head, code = _parts(content)
+        *own, self.form = head
+        self.program = Program(code, *own)
 
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
         """Return what the function returns, in NumPy's arrays."""
@@ -46,32 +48,16 @@ class CompiledFunction:
         rows = () if self.program.by_row is None else flat[0].shape[:1]
         return _filled(self.form, iter(flat), rows)
 
-    def to_bytes(self) -> bytes:
-        """Return it as bytes; plain data and machine code, nothing that is run when it is read."""
-        own = self.program
-        head = json.dumps([own.sizes, own.room, own.by_row, self.form])
-        return head.encode() + b"\n" + own.code
 
-    @classmethod
-    def from_bytes(cls, content: bytes) -> CompiledFunction:
-        """Read what `to_bytes` wrote."""
-        head, _, code = content.partition(b"\n")
-        sizes, room, by_row, form = json.loads(head)
-        rows = None if by_row is None else tuple(by_row)
-        return cls(Program(code, tuple(sizes), room, rows), form)
+def _content(head: Sequence[Any], body: bytes) -> bytes:
+    """A program as bytes: what it takes and returns, and its text or machine code."""
+    return json.dumps(head).encode() + b"\n" + body
 
 
-def _content_of(written: Source, form: Any) -> bytes:
-    """A program's text and the form of what it returns, as bytes."""
-    head = json.dumps([written.sizes, written.room, written.by_row, form])
-    return f"{head}\n{written.text}".encode()
-
-
-def _source_of(content: bytes) -> tuple[Source, Any]:
-    """What `_content_of` wrote."""
-    head, _, text = content.decode().partition("\n")
-    sizes, room, by_row, form = json.loads(head)
-    return Source(text, tuple(sizes), room, None if by_row is None else tuple(by_row)), form
+def _parts(content: bytes) -> tuple[list[Any], bytes]:
+    """The head and the body of what `_content` returned."""
+    head, _, body = content.partition(b"\n")
+    return json.loads(head), body
 
 
 def _form(tree: Any) -> Any:
@@ -201,16 +187,15 @@ class Native:
         key = repr((self._name, how, by_row, shapes, others))
         own = f"{key} {processor()}"
         content = _store.read(own)
-        if content is not None:
-            return CompiledFunction.from_bytes(content)
-        written = self._source(key, how, by_row, shapes, others)
-        if written is None:
-            return None
-        text, form = written
-        Native.compiled += 1
-        found = CompiledFunction(text.compiled(), form)
-        _store.write(own, found.to_bytes())
-        return found
+        if content is None:
+            written = self._source(key, how, by_row, shapes, others)
+            if written is None:
+                return None
+            Native.compiled += 1
+            head, text = _parts(written)
+            content = _content(head, machine_code(text.decode()))
+            _store.write(own, content)
+        return CompiledFunction(content)
 
     def _source(
         self,
@@ -219,15 +204,15 @@ class Native:
         by_row: tuple[bool, ...] | None,
         shapes: Sequence[Any],
         others: tuple[Any, ...],
-    ) -> tuple[Source, Any] | None:
-        """The program's text and the form of what it returns: shipped, or written now."""
+    ) -> bytes | None:
+        """The program as text: shipped, or written now; None where XLA must make it."""
         content = _shipped.read(key)
         if content is not None:
-            return _source_of(content)
+            return content
         given = [np.zeros(shape) for shape in shapes]
         function = partial(self._with, others)
         try:
-            written, tree = source(
+            made, tree = source(
                 function, given, self._long(*others), by_row, carries=how == "along"
             )
         except UnknownHereError as error:
@@ -240,9 +225,9 @@ class Native:
         Native.traced += 1
         if Native.traced % _TRACES == 0:
             jax.clear_caches()
-        form = _form(tree)
-        _shipped.record(key, lambda: _content_of(written, form))
-        return written, form
+        content = _content([made.sizes, made.room, by_row, _form(tree)], made.text.encode())
+        _shipped.record(key, content)
+        return content
 
     def _with(self, others: tuple[Any, ...], *vectors: Any) -> Any:
         return self._function(*vectors, *others)

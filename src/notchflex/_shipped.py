@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import lzma
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 from notchflex import _store
@@ -30,11 +29,11 @@ def read(key: str) -> bytes | None:
         return None
 
 
-def record(key: str, content: Callable[[], bytes]) -> None:
+def record(key: str, content: bytes) -> None:
     """Keep content under a key where a wheel is being built."""
     folder = os.environ.get(RECORD)
     if folder:
-        (Path(folder) / _name(key)).write_bytes(lzma.compress(content(), preset=2))
+        (Path(folder) / _name(key)).write_bytes(lzma.compress(content, preset=2))
 
 
 def _name(key: str) -> str:

@@ -73,7 +73,7 @@ def _plain_passes() -> Generator[None]:
             llvm.set_option("notchflex", f"{option}={theirs}")
 
 
-def compiled(text: str) -> bytes:
+def machine_code(text: str) -> bytes:
     """Machine code of a program.
 
     Args:
@@ -86,14 +86,15 @@ def compiled(text: str) -> bytes:
         return machine.emit_object(llvm.parse_assembly(head + text))
 
 
-def loaded(code: bytes) -> Callable[[int, int, int, int], None]:
+def loaded(code: bytes) -> Callable[[bytes, bytes, int, int], None]:
     """The program of some machine code.
 
     Args:
-        code: What `compiled` returned, on the same kind of processor.
+        code: What `machine_code` returned, on the same kind of processor.
 
     Returns:
-        A function of four addresses or numbers: pointers given, pointers to results, memory, rows.
+        A function of addresses given, addresses of results, the address of memory, and the number
+        of rows.
     """
     with _lock:
         machine = _machine()
@@ -106,4 +107,4 @@ def loaded(code: bytes) -> Callable[[int, int, int, int], None]:
     return function
 
 
-__all__ = ["compiled", "loaded", "processor"]
+__all__ = ["loaded", "machine_code", "processor"]

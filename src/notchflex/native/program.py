@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from struct import pack
 from typing import Any
 
@@ -18,36 +18,28 @@ import numpy as np
 
 from notchflex._jax import jax
 from notchflex.native.emit import Emitter
-from notchflex.native.machine import compiled, loaded
+from notchflex.native.machine import loaded
 from notchflex.native.read import Reader
 
 _own = threading.local()
 
 
-@dataclass(frozen=True, eq=False)
 class Program:
     """A program that may be called from several threads at once.
 
-    Attributes:
-        code: Its machine code.
+    Args:
+        code: Its machine code; it is read and not kept.
         sizes: How many numbers each result has, by row where there are rows.
         room: How much memory it needs, in numbers.
         by_row: Which arrays have a row of numbers for every row of a batch; None without rows.
     """
 
-    code: bytes
-    sizes: tuple[int, ...]
-    room: int
-    by_row: tuple[bool, ...] | None
-    _function: Callable[..., None] = field(init=False)
-
-    def __post_init__(self) -> None:
+    def __init__(
+        self, code: bytes, sizes: Sequence[int], room: int, by_row: Sequence[bool] | None
+    ) -> None:
         """Make it ready to be called."""
-        object.__setattr__(self, "_function", loaded(self.code))
-
-    def __reduce__(self) -> Any:
-        """Pickled without what belongs to this process."""
-        return Program, (self.code, self.sizes, self.room, self.by_row)
+        self.sizes, self.room, self.by_row = sizes, room, by_row
+        self._function = loaded(code)
 
     def __call__(self, given: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Run it.
@@ -77,7 +69,7 @@ def _addresses(arrays: Sequence[np.ndarray]) -> bytes:
 def _address(array: np.ndarray) -> int:
     # Through the buffer it takes a fifth of the time; buffers of read-only arrays are refused.
     if array.size and array.flags.writeable:
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+        return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
     return array.__array_interface__["data"][0]
 
 
@@ -98,19 +90,13 @@ class Source:
 
     Attributes:
         text: The program, in LLVM's language.
-        sizes: As of `Program`.
-        room: As of `Program`.
-        by_row: As of `Program`.
+        sizes: How many numbers each result has, as `Program` takes it.
+        room: How much memory it needs, in numbers.
     """
 
     text: str
     sizes: tuple[int, ...]
     room: int
-    by_row: tuple[bool, ...] | None
-
-    def compiled(self) -> Program:
-        """Return the program for this processor."""
-        return Program(compiled(self.text), self.sizes, self.room, self.by_row)
 
 
 def source(
@@ -147,8 +133,7 @@ def source(
     else:
         read = reader.batch(closed, by_row)
     emitter = Emitter(read)
-    rows = None if by_row is None else tuple(by_row)
-    return Source(emitter.source, tuple(read.sizes), emitter.arena.size + 64, rows), tree
+    return Source(emitter.source, tuple(read.sizes), emitter.arena.size + 64), tree
 
 
 __all__ = ["Program", "Source", "source"]
