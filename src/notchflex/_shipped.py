@@ -36,9 +36,14 @@ def record(key: str, content: bytes) -> None:
         (Path(folder) / _name(key)).write_bytes(lzma.compress(content, preset=2))
 
 
+def count() -> int:
+    """Return how many programs the package carries."""
+    return sum(1 for _ in FOLDER.glob("*.xz"))
+
+
 def _name(key: str) -> str:
     digest = hashlib.sha256(f"{_store.code_digest()} {key}".encode())
     return f"{digest.hexdigest()[:32]}.xz"
 
 
-__all__ = ["FOLDER", "RECORD", "read", "record"]
+__all__ = ["FOLDER", "RECORD", "count", "read", "record"]
