@@ -167,7 +167,6 @@ def _print(found: dict[str, Any]) -> None:
         console.print(table)
 
     missing = "not installed"
-    none = "no programs; they come with a wheel, not with an editable installation"
     device = found["device"]
     cache = found["compile_cache"]
     section(
@@ -191,7 +190,7 @@ def _print(found: dict[str, Any]) -> None:
             )
             if cache["folder"]
             else ("programs", "compiled in every process, not kept"),
-            ("shipped", f"{cache['shipped']} programs of typical calls" if cache["shipped"] else none),
+            ("shipped", f"{cache['shipped']} programs of typical calls; only a wheel carries them"),
         ],
     )
     section("\nExtras", [(name, _extra_words(extra)) for name, extra in found["extras"].items()])
