@@ -1,8 +1,0 @@
-"""A small compiler: programs that JAX has traced, as vector code for this processor."""
-
-from notchflex.native.graph import UnknownHereError
-from notchflex.native.items import WIDTH
-from notchflex.native.machine import processor
-from notchflex.native.program import Program, program
-
-__all__ = ["WIDTH", "Program", "UnknownHereError", "processor", "program"]
