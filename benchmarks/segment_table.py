@@ -1,13 +1,13 @@
-"""Make src/notchflex/mechanics/section/segment_table.csv with sectionproperties (half an hour, 2 cores).
+"""Make segment_table.csv of notchflex.mechanics.section with sectionproperties (half an hour).
 
     python benchmarks/segment_table.py --raw FILE     # writes the table
     python benchmarks/segment_table.py 0.864 0.7      # prints one section: r_i, depth over r_o
 
 Torsion constant and (Trefftz) shear centre of the annular segment of outer radius 1 at Chebyshev
-nodes of the coordinates that `notchflex.mechanics.section.segment_torsion` interpolates over, by warping
-analysis with quadratic triangles, three across the wall and smaller where it tapers. Divided by
-the estimates of `segment_estimates` and fitted by least squares. FILE keeps the values of the
-analysis: a second run only fits, or goes on where the mesher crashed.
+nodes of the coordinates that `segment_torsion.py` there interpolates over, by warping analysis with
+quadratic triangles, three across the wall and smaller where it tapers. Divided by the estimates of
+`segment_estimates` and fitted by least squares, on 2 cores. FILE keeps the values of the analysis:
+a second run only fits, or goes on where the mesher crashed.
 """
 
 import sys

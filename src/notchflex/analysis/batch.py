@@ -16,16 +16,17 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from lanewise import WIDTH
-from notchflex._summary import Displayed, Summary
+from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.batch_rows import followed_row
 from notchflex.analysis.outputs import DEFAULT_OUTPUTS, known_outputs
 from notchflex.analysis.solve import prepared_for
 from notchflex.errors import InputError
-from notchflex.loads import Load
+from notchflex.loads import Load, LoadPath
 from notchflex.loads.command import command, filled
 from notchflex.loads.conversion import load_path
-from notchflex.loads.load_path import LoadPath, joined_paths
+from notchflex.loads.load_path import joined_paths
 from notchflex.loads.validation import shown, whole
+from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.derived.quantities import BY_BODY, BY_FLEXURE
 from notchflex.solver.newton import DEFAULT, Settings
@@ -65,9 +66,22 @@ class Batch(Displayed, Mapping[str, np.ndarray]):
         return len(self._arrays)
 
     def _summary(self) -> Summary:
-        from notchflex.results.summary import batch_summary
-
-        return batch_summary(self)
+        rows: list[tuple[str, str]] = []
+        count = 0
+        for name, array in self.items():
+            count = len(array)
+            quantity = QUANTITIES.get(name)
+            unit = f" {quantity.python_unit}" if quantity and quantity.python_unit else ""
+            shape = "×".join(map(str, array.shape))
+            if array.dtype == bool:
+                text = f"{int(array.sum())} of {array.size} true"
+            elif np.isfinite(array).any():
+                text = f"{short(float(np.nanmin(array)))} to {short(float(np.nanmax(array)))}{unit}"
+            else:
+                text = "no number"
+            rows.append((name, f"{shape}, {text}"))
+        title = f"Batch of {count} row{'s' * (count != 1)}"
+        return Summary(title, rows, "[name] is the array of one output")
 
 
 def solve_batch(

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from notchflex.errors import InputError
-from notchflex.loads import Load
+from notchflex.loads import Load, LoadPath
 from notchflex.loads.applied import follows, is_planar, is_unloaded
 from notchflex.loads.command import command
 from notchflex.loads.conversion import load_path
-from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.chain import tendons_in_plane
-from notchflex.mechanics.flexure import LEVELS
+from notchflex.mechanics.flexure import LEVELS, MOST_REFINEMENT
 from notchflex.results.equilibrium import Equilibrium
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.state import SavedState, State, check_robot, fitted
@@ -19,8 +18,6 @@ from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import Prepared, prepared
 from notchflex.solver.programs.run import run
-
-MOST_REFINEMENT = 3
 
 
 def simulate(

@@ -133,7 +133,7 @@ def build() -> App:
         name = verb.replace("-", "_")
         plural = "s" if examples.count("notchflex ") > 1 else ""
         app.command(
-            f"notchflex.cli.{name}:{name}",
+            f"notchflex.cli.verbs.{name}:{name}",
             name=verb,
             help=text,
             sort_key=order,

@@ -1,12 +1,11 @@
-"""What is done to a robot, step by step: its tendons pulled or drawn, external loads."""
+"""Loads on a robot one after the other, as arrays over the steps."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain
-from math import isfinite, isnan, nan
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -15,55 +14,8 @@ from jaxtyping import Int
 from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
 from notchflex.loads.external import EXTERNAL, NOTHING, BodyForce, ExternalLoad
-from notchflex.loads.validation import number, shown, table, vector
-
-_FORM = "a number, or one entry per tendon with None where nothing is commanded"
-_TURN = "rotation vector, rad"
-_BASE_TURN = ("base_rotation", _TURN)
-_NO_TURN = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, repr=False)
-class Load(ExternalLoad):
-    """One load on a robot.
-
-    Args:
-        tension: Tension at the base of every tendon, N. A single number pulls the first tendon;
-            a sequence has one entry per tendon, None where its tension is not commanded.
-        stroke: Tendon drawn out at the base since the free robot, mm; in the same form.
-        base_rotation: Rotation vector of the base in the world, rad.
-        tip_force: Force at the tip, N; in the world, or in the tip's frame if `following`.
-        tip_moment: Moment at the tip, N mm; in the same frame.
-        tip_point: Where the tip force acts and the tip mass hangs, from the tip (the end of the
-            last uncut length, on the tube axis), in the tip's frame, mm.
-        following: Whether tip force and tip moment turn with the tip.
-        body_forces: Forces and moments on single bodies, each a `BodyForce`.
-        tip_mass: Mass that hangs at the tip point, g.
-        gravity: Acceleration of gravity in the world, m/s^2. Given, the robot's own weight counts
-            where its material has a density. Not given, a tip mass hangs along (0, 0, -9.81).
-
-    A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
-
-    Raises:
-        InputError: A load from outside is not of its form; tensions and strokes are checked when
-            the robot is known.
-
-    Example:
-        >>> Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
-        Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
-    """
-
-    tension: float | Sequence[float | None] | None = None
-    stroke: float | Sequence[float | None] | None = None
-    base_rotation: Sequence[float] = _NO_TURN
-
-    def __repr__(self) -> str:
-        """What is given, and nothing of what is not; tendons first."""
-        ordered = sorted(fields(self), key=lambda one: bool(one.kw_only))
-        values = {one.name: getattr(self, one.name) for one in ordered}
-        unlike = {one.name for one in ordered if repr(values[one.name]) != repr(one.default)}
-        given = (f"{name}={value!r}" for name, value in values.items() if name in unlike)
-        return f"Load({', '.join(given)})"
+from notchflex.loads.load import BASE_TURN, Load
+from notchflex.loads.validation import shown, table, vector
 
 
 @dataclass(frozen=True, repr=False)
@@ -87,7 +39,7 @@ class LoadPath(Displayed):
         """Check shapes and numbers."""
         tension = np.atleast_2d(table(self.tension, "tension"))
         stroke = np.atleast_2d(table(self.stroke, "stroke"))
-        base_rotation = np.array(vector(self.base_rotation, "base_rotation", _TURN))
+        base_rotation = np.array(vector(self.base_rotation, *BASE_TURN))
         if tension.shape != stroke.shape or tension.ndim != 2:
             raise InputError(
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
@@ -302,60 +254,12 @@ def joined_paths(paths: Sequence[LoadPath]) -> LoadPath:
     )
 
 
-def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
-    """Bring loads of any form to one path for a robot of so many tendons.
-
-    Args:
-        loads: A path, one load, or loads in order.
-        tendons: Number of tendons of the robot.
-
-    Returns:
-        The path, every tendon named.
-
-    Raises:
-        InputError: Too many entries, numbers that are no loads, a base that turns on the way.
-    """
-    if isinstance(loads, LoadPath):
-        return loads.for_tendons(tendons)
-    every = [loads] if isinstance(loads, Load) else _several(loads)
-    turns = {
-        _NO_TURN if load.base_rotation is _NO_TURN else vector(load.base_rotation, *_BASE_TURN)
-        for load in every
-    }
-    if len(turns) > 1:
-        raise InputError("base_rotation must be the same for all loads of a path")
-    tension = [_entries(load.tension, tendons, "tension") for load in every]
-    stroke = [_entries(load.stroke, tendons, "stroke") for load in every]
-    given = np.array(tension), np.array(stroke), np.array(turns.pop())
-    external = tuple(load.external for load in every)
-    entries = zip(chain.from_iterable(tension), chain.from_iterable(stroke), strict=True)
-    if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
-        return LoadPath(*given, external)  # which says what is wrong
-    return LoadPath.checked(*given, external)
-
-
 def _as_given(values: np.ndarray) -> float | list[float | None] | None:
     """Return one entry per tendon as a `Load` takes them: a number for a single tendon."""
     entries = [None if isnan(value) else value for value in values.tolist()]
     if all(entry is None for entry in entries):
         return None
     return entries[0] if len(entries) == 1 else entries
-
-
-def _several(loads: Any) -> list[Load]:
-    """Loads in order, one or more."""
-    try:
-        every = list(loads)
-    except TypeError:
-        raise InputError(
-            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {shown(loads)}"
-        ) from None
-    if not every:
-        raise InputError("there are no loads; give at least one")
-    for load in every:
-        if not isinstance(load, Load):
-            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
-    return every
 
 
 def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
@@ -380,27 +284,4 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     return given or (NOTHING,) * steps
 
 
-def _entries(value: Any, tendons: int, what: str) -> list[float]:
-    """One number per tendon, NaN where nothing is commanded."""
-    if value is None:
-        return [nan] * tendons
-    if hasattr(value, "__array__"):
-        value = np.asarray(value).tolist()
-    several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    given: list[Any] = list(value) if several else [value]
-    if len(given) > tendons:
-        raise InputError(
-            f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "
-            f"give at most {tendons}"
-        )
-    entries = [nan] * tendons
-    for i, entry in enumerate(given):
-        if entry is None:
-            continue
-        entries[i] = number(entry, what, _FORM)
-        if not isfinite(entries[i]):
-            raise InputError(f"{what} must be finite; got {shown(entry)}")
-    return entries
-
-
-__all__ = ["Load", "LoadPath", "joined_paths", "load_path"]
+__all__ = ["LoadPath", "joined_paths"]

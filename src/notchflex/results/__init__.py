@@ -1,6 +1,6 @@
-"""Results as tables and files: one table of quantities gives names, units and texts to all.
+"""Results: equilibria and paths, the registry of quantities, tables and files.
 
-Reading and writing need NumPy and are loaded on first use: `notchflex --help` passes by here.
+What computes, reads or writes is loaded on first use: `notchflex --help` passes by here.
 """
 
 from importlib import import_module
@@ -10,12 +10,37 @@ from notchflex.results.quantities.quantity import Quantity
 from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
+    from notchflex.results.equilibrium import ConvergenceError, Equilibrium
     from notchflex.results.files.io import read_path, save_path
     from notchflex.results.files.table import read_table
+    from notchflex.results.path import EquilibriumPath
+    from notchflex.results.recorded import BEFORE, TOLD, Recorded
+    from notchflex.results.state import SavedState, State
 
-__all__ = ["QUANTITIES", "Quantity", "read_path", "read_table", "save_path"]
+__all__ = [
+    "BEFORE",
+    "QUANTITIES",
+    "TOLD",
+    "ConvergenceError",
+    "Equilibrium",
+    "EquilibriumPath",
+    "Quantity",
+    "Recorded",
+    "SavedState",
+    "State",
+    "read_path",
+    "read_table",
+    "save_path",
+]
 
-_HOME = {"read_path": "carry", "save_path": "carry", "read_table": "table"}
+_HOME = {
+    **dict.fromkeys(("ConvergenceError", "Equilibrium"), "equilibrium"),
+    "EquilibriumPath": "path",
+    **dict.fromkeys(("BEFORE", "TOLD", "Recorded"), "recorded"),
+    **dict.fromkeys(("SavedState", "State"), "state"),
+    **dict.fromkeys(("read_path", "save_path"), "files.io"),
+    "read_table": "files.table",
+}
 
 
 def __getattr__(name: str) -> object:

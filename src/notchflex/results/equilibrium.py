@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # for the types only: a path hands out its states
     from matplotlib.axes import Axes
     from xarray import Dataset
 
-    from notchflex.plotting import Picture
+    from notchflex._plot import Picture
     from notchflex.results.path import EquilibriumPath
 
 

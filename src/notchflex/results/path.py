@@ -12,9 +12,9 @@ from jaxtyping import Float, Int
 
 from notchflex._jax import constant
 from notchflex._summary import Displayed, Summary
+from notchflex.loads import LoadPath
 from notchflex.loads.applied import out_of_frame
 from notchflex.loads.command import Command, command
-from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.motion import rotation_about
 from notchflex.results.equilibrium import ConvergenceError, Equilibrium
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset
 
-    from notchflex.plotting import Picture
+    from notchflex._plot import Picture
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -18,7 +18,7 @@ from notchflex.robot.tube import Tube
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from notchflex.plotting import Picture
+    from notchflex._plot import Picture
 
     AnyNotch: TypeAlias = Notch
     AnyMaterial: TypeAlias = Material

@@ -4,8 +4,8 @@ Tension ratios, contact forces and base tensions are eliminated: a contact that 
 tendon, one that slides keeps its tension ratio at the bound, which moves with the shape. The
 stiffness is not symmetric then.
 
-The rows of every flexure are those of Newton's linear step (`linearisation.py`). What is carried along the
-chain is put in here flexure by flexure, for many states at once.
+The rows of every flexure are those of Newton's linear step (`linearisation.py`). What is carried
+along the chain is put in here flexure by flexure, for many states at once.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ __all__ = [
     "exposed",
 ]
 
-_HOME = {"Controls": "controls", "Session": "session", "Viewer": "viewer", "Way": "way"}
+_HOME = {"Controls": "controls", "Session": "session", "Viewer": "viewer", "Way": "target_queue"}
 
 
 def __getattr__(name: str) -> Any:

@@ -16,7 +16,7 @@ from notchflex.viewer.page.notes import beyond, kept_between
 from notchflex.viewer.page.page import Page
 from notchflex.viewer.reach import STRETCH, Reach, reach_of
 from notchflex.viewer.scene.scene import Scene
-from notchflex.viewer.scene.scene.shown import Shown
+from notchflex.viewer.scene.shown import Shown
 from notchflex.viewer.server.address import HOST, PORT, check_host, check_installed
 from notchflex.viewer.server.origin import bracketed
 from notchflex.viewer.server.serving import serve

@@ -1,4 +1,4 @@
-"""The slopes of a rod's pose, written out in mechanics/flexure/rod_kinematics.py, against JAX's derivatives of it."""
+"""The slopes of a rod's pose (mechanics/flexure/rod_kinematics.py) against JAX's derivatives."""
 
 from __future__ import annotations
 

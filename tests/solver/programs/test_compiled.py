@@ -7,7 +7,7 @@ import pytest
 
 import notchflex as nf
 from notchflex._jax import jax, jnp
-from notchflex.solver.programs import store as _store
+from notchflex.solver.programs import store
 from notchflex.solver.programs.compiled import Native
 
 
@@ -82,7 +82,7 @@ def test_programs_not_used_for_longest_are_let_go(monkeypatch):
 
 
 def test_programs_are_kept_and_what_is_no_program_is_not_taken(tmp_path, monkeypatch):
-    monkeypatch.setenv(_store.VARIABLE, str(tmp_path))
+    monkeypatch.setenv(store.VARIABLE, str(tmp_path))
     monkeypatch.setattr(Native, "made", OrderedDict())
     traced = []
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from notchflex._jax import jax, jnp
-from notchflex.solver.programs import store as _store
+from notchflex.solver.programs import store
 from notchflex.solver.programs.kept_xla import Kept
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setenv(_store.VARIABLE, str(tmp_path))
+    monkeypatch.setenv(store.VARIABLE, str(tmp_path))
     monkeypatch.setattr(Kept, "loaded", {})
-    return _store.program_folder()
+    return store.program_folder()
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_a_spoilt_file_is_made_again(folder, process, traced, spoil):
 
 def test_a_folder_that_cannot_be_made_costs_only_time(tmp_path, process, monkeypatch):
     (tmp_path / "file").write_text("")
-    monkeypatch.setenv(_store.VARIABLE, str(tmp_path / "file" / "inside"))
+    monkeypatch.setenv(store.VARIABLE, str(tmp_path / "file" / "inside"))
     np.testing.assert_array_equal(process()(np.arange(3.0), 2)["grown"], [0.0, 2.0, 6.0])
 
 

@@ -7,16 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from notchflex._summary import Displayed, Summary
+from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.closing_loads.edges import edge_closing
 from notchflex.analysis.closing_loads.search import ClosingStatus, closing_tensions
 from notchflex.loads.command import tensions_alone
 from notchflex.mechanics.chain import Chain, assemble
 from notchflex.mechanics.contact import closing_travel, free_angle
+from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.prepare import Prepared, prepared
 from notchflex.solver.programs.run import lips
+
+_ANGLE = QUANTITIES["total_angle"]
+_MOST_ROWS = 12
 
 
 @dataclass(frozen=True, repr=False)
@@ -42,9 +46,17 @@ class Closing(Displayed):
     peak_strain: Float[np.ndarray, " n"]
 
     def _summary(self) -> Summary:
-        from notchflex.results.summary import closing_summary
-
-        return closing_summary(self)
+        rows = [
+            (
+                f"notch {notch + 1}",
+                f"{short(float(angle) * _ANGLE.scale)} {_ANGLE.unit}, "
+                + (f"{short(float(tension))} N" if tension == tension else "no tension found"),
+            )
+            for notch, (angle, tension) in enumerate(zip(self.angle, self.tension, strict=True))
+        ]
+        left = len(rows) - _MOST_ROWS
+        hint = f"and {left} more notches" if left > 0 else ""
+        return Summary("Closing of every notch", rows[:_MOST_ROWS], hint)
 
 
 def closing(robot: Robot) -> Closing:

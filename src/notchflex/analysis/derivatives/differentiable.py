@@ -20,10 +20,9 @@ from notchflex.analysis.derivatives.tangent import PathTangents
 from notchflex.analysis.outputs import known_outputs
 from notchflex.analysis.solve import check_refinement, prepared_for
 from notchflex.errors import InputError
-from notchflex.loads import Load
+from notchflex.loads import Load, LoadPath
 from notchflex.loads.command import command
 from notchflex.loads.conversion import load_path
-from notchflex.loads.load_path import LoadPath
 from notchflex.loads.validation import robot_given, shown
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot

@@ -1,8 +1,8 @@
 """How the states of a solved path change with the numbers they were found from.
 
 One compiled program follows one direction of change along the path, through the memory of the
-contacts (forward derivatives by the implicit function theorem, `solver/sensitivity.py`). Jacobians are
-such directions one after the other; so the program is compiled once, however many there are.
+contacts (forward derivatives by the implicit function theorem, `solver/sensitivity.py`). Jacobians
+are such directions one after the other; so the program is compiled once, however many there are.
 """
 
 from __future__ import annotations

@@ -13,11 +13,10 @@ from notchflex._jax import constant
 from notchflex.analysis.derivatives.kinks import Kink, kinks
 from notchflex.analysis.derivatives.tangent import PathTangents
 from notchflex.analysis.solve import check_refinement
-from notchflex.loads import Load
+from notchflex.loads import Load, LoadPath
 from notchflex.loads.applied import Applied
 from notchflex.loads.command import Command, command
 from notchflex.loads.conversion import load_path
-from notchflex.loads.load_path import LoadPath
 from notchflex.loads.validation import robot_given
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot

@@ -161,9 +161,9 @@ def parse_body_force(text: str, following: bool = False) -> dict[str, Any]:
 
 def put_on(path: LoadPath, loads: dict[str, Any]) -> LoadPath:
     """Return the path with the loads of `parse_loads` on all its steps."""
-    from notchflex import statics
+    from notchflex.loads import BodyForce
 
-    forces: list[BodyForce] = [statics.BodyForce(**one) for one in loads.get("body_forces", ())]
+    forces: list[BodyForce] = [BodyForce(**one) for one in loads.get("body_forces", ())]
     loads = {name: value for name, value in loads.items() if name != "body_forces"}
     return path.loaded(**loads, body_forces=forces or None)
 

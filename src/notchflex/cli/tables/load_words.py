@@ -43,7 +43,7 @@ def in_words(load: ExternalLoad) -> str:
     """Say what acts from outside.
 
     Example:
-        >>> from notchflex.loads.external import ExternalLoad
+        >>> from notchflex.loads import ExternalLoad
         >>> in_words(ExternalLoad(tip_force=(0.0, 0.1, 0.0), following=True, tip_mass=20.0))
         'tip force (0, 0.1, 0) N following the tip, tip mass 20 g'
     """

@@ -39,9 +39,9 @@ def doctor(*, clear_cache: ClearCache = False, json: JsonFile = None, quiet: Qui
     if json is not None:
         check_output(json, "--json")
     if clear_cache:
-        from notchflex.solver.programs import store as _store
+        from notchflex.solver.programs import store
 
-        removed = _store.clear()
+        removed = store.clear()
         terminal.note(f"removed {removed.programs} programs, {removed.size / 1e6:.1f} MB")
     with terminal.working("computing a sum that is known"):
         found = examination()
@@ -65,15 +65,14 @@ def doctor(*, clear_cache: ClearCache = False, json: JsonFile = None, quiet: Qui
 def examination() -> dict[str, Any]:
     """Return what `doctor` has found out, as plain values."""
     from notchflex.cli.compile_cache import use_compile_cache
-    from notchflex.solver.programs import shipped as _shipped
-    from notchflex.solver.programs import store as _store
+    from notchflex.solver.programs import shipped, store
 
     use_compile_cache()
     from notchflex._canary import canary
     from notchflex._jax import jax
 
     sum_of_squares = canary()
-    folder, kept = _store.program_folder(), _store.usage()
+    folder, kept = store.program_folder(), store.usage()
     return {
         "program": "notchflex",
         "version": __version__,
@@ -93,8 +92,8 @@ def examination() -> dict[str, Any]:
             "folder": None if folder is None else str(folder),
             "programs": kept.programs,
             "bytes": kept.size,
-            "most_bytes": _store.MOST_BYTES,
-            "shipped": _shipped.count(),
+            "most_bytes": store.MOST_BYTES,
+            "shipped": shipped.count(),
         },
     }
 

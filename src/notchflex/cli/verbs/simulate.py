@@ -180,19 +180,20 @@ def simulate(
         turn = np.radians(parse_vector(base_rotation, "--base-rotation", "angles in deg"))
 
     with terminal.counting(f"solving {len(tensions)} steps of {chosen.name}") as counted:
-        from notchflex import statics
+        from notchflex import analysis
         from notchflex.cli.compile_cache import use_compile_cache
+        from notchflex.loads import LoadPath
 
         use_compile_cache()
         start = None if from_state is None else _start(from_state)
-        pulled = statics.LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
+        pulled = LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
         pulled = put_on(pulled, loads)
         paths: dict[str, EquilibriumPath] = {}
         for number, (label, one) in enumerate(robots.items()):
             if number:
                 counted(number, len(robots))
             state = None if number else start
-            paths[label] = statics.simulate(one, pulled, from_state=state, refinement=finer)
+            paths[label] = analysis.simulate(one, pulled, from_state=state, refinement=finer)
     write_files(paths, outputs, title)
     if STANDARD_OUTPUT not in (json, csv) and not quiet:
         from notchflex.cli.tables.path_table import print_beside, print_path
@@ -207,9 +208,9 @@ def simulate(
 
 def _start(file: str) -> SavedState:
     """Read the state to go on from; warn where nothing shows which robot it belongs to."""
-    from notchflex import statics
+    from notchflex.results import State
 
-    state = statics.State.load(file)
+    state = State.load(file)
     if state.description is None:
         terminal.warn(
             f"{file} was written by an older notchflex and does not hold the values of its robot; "

@@ -2,7 +2,7 @@
 
 Rows are paths of loads: one step from rest, or all steps of a pull with friction that remembers.
 They run side by side over the cores; derivatives go through the solution (implicit function
-theorem, `statics.sensitivity`).
+theorem, `solver.sensitivity`).
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.outputs import followed
 from notchflex.analysis.solve import prepared_for
 from notchflex.errors import InputError
+from notchflex.loads import LoadPath
 from notchflex.loads.applied import is_unloaded
 from notchflex.loads.command import Command, filled
-from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.chain import Chain
 from notchflex.results.path import command
 from notchflex.robot import Robot

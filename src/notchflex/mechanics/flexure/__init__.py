@@ -1,7 +1,7 @@
 """Flexures: one notch becomes a short rod with a few strain modes."""
 
 from notchflex._packages import import_all
-from notchflex.mechanics.flexure.build import LEVELS, stack, with_level
+from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.plane import flattened
 from notchflex.mechanics.flexure.registry import rod
@@ -27,6 +27,7 @@ import_all(__name__, __path__)
 
 __all__ = [
     "LEVELS",
+    "MOST_REFINEMENT",
     "Elastica",
     "FlexureState",
     "Rod",

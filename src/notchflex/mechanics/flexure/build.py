@@ -15,6 +15,9 @@ from notchflex.mechanics.flexure.rod import Rod
 LEVELS = ("tendons", "plane", "space")
 """For which loads a chain is assembled: tendons alone, loads in the plane of bending, or any."""
 
+MOST_REFINEMENT = 3
+"""How many times more modes than for usual loads a flexure can have."""
+
 _HAT = ("turn", "step", "node_turn")
 _AT_NODES = (
     "reference_strain",

@@ -31,5 +31,5 @@ def rod(notch: Any, tube: Tube, refinement: int = 0) -> Rod:
     del tube, refinement
     raise TypeError(
         f"no rod is registered for a notch of type {type(notch).__name__}; "
-        "add one to notchflex/flexure with @rod.register"
+        "add one to notchflex/mechanics/flexure with @rod.register"
     )

@@ -27,5 +27,5 @@ def section_law(material: Any) -> SectionLaw:
     """
     raise TypeError(
         f"no section law is registered for a material of type {type(material).__name__}; "
-        "add one to notchflex/material with @section_law.register"
+        "add one to notchflex/mechanics/material with @section_law.register"
     )

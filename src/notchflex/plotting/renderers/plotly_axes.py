@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.output import Picture
 from notchflex.plotting.renderers.plotly_marks import POINT
 from notchflex.plotting.sheet import (
     BELOW,
@@ -20,6 +19,7 @@ from notchflex.plotting.sheet import (
     Level,
     Line,
     Panel,
+    Sheet,
     Stripe,
     Upright,
 )
@@ -111,7 +111,7 @@ def _range(panels: Sequence[Panel], axis: int) -> list[float] | None:
     return [low - room, high + room]
 
 
-def ranges_of(picture: Picture) -> list[Ranges]:
+def ranges_of(picture: Sheet) -> list[Ranges]:
     """Return what part of the plane every panel shows.
 
     Panels of one scale show the same part, and panels that share an axis the same of that axis.

@@ -11,7 +11,6 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from notchflex.plotting.output import Picture
 from notchflex.plotting.renderers.labels import for_paper, heading_lines, translated
 from notchflex.plotting.sheet import (
     BELOW,
@@ -25,6 +24,7 @@ from notchflex.plotting.sheet import (
     Line,
     Note,
     Panel,
+    Sheet,
     Stripe,
     Upright,
 )
@@ -33,7 +33,7 @@ from notchflex.plotting.style import DIVERGING, house_style, new_figure, rgb
 ELEVATION, AZIMUTH = 18.0, -60.0
 
 
-def figure_of(picture: Picture) -> Figure:
+def figure_of(picture: Sheet) -> Figure:
     """Return a picture as a figure of matplotlib."""
     heading = heading_lines(picture.title, picture.width)
     picture = translated(picture, for_paper)

@@ -10,7 +10,6 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from notchflex._extras import need
-from notchflex.plotting.output import Picture
 from notchflex.plotting.renderers.labels import for_browser, heading_lines, translated
 from notchflex.plotting.renderers.plotly_axes import (
     FONT,
@@ -23,7 +22,7 @@ from notchflex.plotting.renderers.plotly_axes import (
 )
 from notchflex.plotting.renderers.plotly_marks import area_trace, draw_item, line_trace
 from notchflex.plotting.renderers.plotly_space import draw_in_space, scene_of
-from notchflex.plotting.sheet import BELOW, BESIDE, Area, Bars, Correlations, Panel
+from notchflex.plotting.sheet import BELOW, BESIDE, Area, Bars, Correlations, Panel, Sheet
 from notchflex.results.files.writing import write_text
 
 INCH = 64.0
@@ -38,7 +37,7 @@ _BESIDE, _BETWEEN = 150.0, 78.0
 _LETTER, _HEADING_LINE = 7.0, 22.0
 
 
-def interactive_of(picture: Picture) -> Any:
+def interactive_of(picture: Sheet) -> Any:
     """Return a picture as a figure of plotly.
 
     Raises:
@@ -123,7 +122,7 @@ def interactive_of(picture: Picture) -> Any:
     return figure
 
 
-def save_html(picture: Picture, target: str | FilePath) -> None:
+def save_html(picture: Sheet, target: str | FilePath) -> None:
     """Write a picture as one HTML file that works without a network.
 
     Raises:
@@ -147,7 +146,7 @@ def save_html(picture: Picture, target: str | FilePath) -> None:
     write_text(target, text.replace("<head>", head, 1))
 
 
-def _places(picture: Picture) -> tuple[list[Place], float, float]:
+def _places(picture: Sheet) -> tuple[list[Place], float, float]:
     """Where every panel stands, and width and height of the whole in pixels."""
     rows, columns = picture.shape
     beside = [

@@ -1,6 +1,6 @@
 """Typed properties for every quantity of a path and of an equilibrium.
 
-Written by `docs/make/quantity_properties.py` from `results/quantities/registry.py`: change it there.
+Written by `docs/make/quantity_properties.py` from `results/quantities/registry.py`: change that.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
-"""Where a tendon leaves one body and enters the next: the openings that a notch has in the wall."""
+"""Where a tendon leaves one body and enters the next: an opening that a notch has in the wall."""
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:  # for the type only: `kinds` imports this file
-    from notchflex.robot.kinds import Notch
+from typing import NamedTuple
 
 
 class Opening(NamedTuple):
@@ -41,23 +37,3 @@ class Opening(NamedTuple):
         if self.side_deg is None:
             return False
         return math.cos(math.radians(direction_deg - self.side_deg)) > 1.0 - 1e-9
-
-
-def openings_along(
-    notches: Sequence["Notch"], direction_deg: float
-) -> Iterator[tuple[int, Opening]]:
-    """Follow one side of the tube: the bodies that a tendon there enters, base to tip.
-
-    Args:
-        notches: Every notch of a robot, base to tip, each with `repeat` 1.
-        direction_deg: Side of the tube on which the tendon runs [deg].
-
-    Returns:
-        The number of each body (1 behind the first notch) and the opening that leads into it; the
-        tendon comes to it from the body named before, at first from body 0, the base.
-    """
-    neighbours = (None, *notches, None)
-    for number, notch in enumerate(notches, start=1):
-        for opening in notch.openings(neighbours[number - 1], neighbours[number + 1]):
-            if opening.admits(direction_deg):
-                yield number, opening

@@ -17,8 +17,7 @@ import numpy as np
 
 from lanewise import Program, UnknownHereError, machine_code, processor, source
 from notchflex._jax import jax, jnp
-from notchflex.solver.programs import shipped as _shipped
-from notchflex.solver.programs import store as _store
+from notchflex.solver.programs import shipped, store
 from notchflex.solver.programs.kept_xla import Kept, making
 
 # Rows that XLA's programs are made for; more are cut up, fewer filled up.
@@ -187,7 +186,7 @@ class Native:
         """The program, from disk or made and put there; None where XLA must make it."""
         key = repr((self._name, how, by_row, shapes, others))
         own = f"{key} {processor()}"
-        content = _store.read(own)
+        content = store.read(own)
         if content is None:
             written = self._source(key, how, by_row, shapes, others)
             if written is None:
@@ -195,7 +194,7 @@ class Native:
             Native.compiled += 1
             head, text = _parts(written)
             content = _content(head, machine_code(text.decode()))
-            _store.write(own, content)
+            store.write(own, content)
         return CompiledFunction(content)
 
     def _source(
@@ -207,7 +206,7 @@ class Native:
         others: tuple[Any, ...],
     ) -> bytes | None:
         """The program as text: shipped, or written now; None where XLA must make it."""
-        content = _shipped.read(key)
+        content = shipped.read(key)
         if content is not None:
             return content
         given = [np.zeros(shape) for shape in shapes]
@@ -227,7 +226,7 @@ class Native:
         if Native.traced % _TRACES == 0:
             jax.clear_caches()
         content = _content([made.sizes, made.room, by_row, _form(tree)], made.text.encode())
-        _shipped.record(key, content)
+        shipped.record(key, content)
         return content
 
     def _with(self, others: tuple[Any, ...], *vectors: Any) -> Any:

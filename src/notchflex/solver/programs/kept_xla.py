@@ -3,7 +3,7 @@
 JAX's own cache keeps what XLA makes of a program, but to find it there the program is traced and
 lowered first, which takes longer than all else that a short command does. Here the whole program
 is found by what it was made from: the source code, the versions, and the forms of its arguments.
-JAX serialises an executable by pickle only; `_store` takes files of the user alone.
+JAX serialises an executable by pickle only; `store.py` takes files of the user alone.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from jax.experimental.compilation_cache import compilation_cache
 
 from notchflex._jax import jax, jit
-from notchflex.solver.programs import store as _store
+from notchflex.solver.programs import store
 
 _CALLED = re.compile(r'custom_call_target="([^"]+)"')
 making = threading.RLock()
@@ -71,7 +71,7 @@ class Kept:
 
     def _found(self, told: str, arguments: tuple[Any, ...], arrays: list[Any]) -> tuple[Any, Any]:
         """The program of that description, from the folder or made and put there; its result."""
-        program = _loaded(_store.read(told))
+        program = _loaded(store.read(told))
         if program is not None:
             try:
                 return program, program(*arrays)
@@ -82,7 +82,7 @@ class Kept:
             program = lowered.compile()
         stored = _stored(program)
         if stored is not None:
-            _store.write(told, stored)
+            store.write(told, stored)
         return program, program(*arrays)
 
 

@@ -13,12 +13,12 @@ import lzma
 import os
 from pathlib import Path
 
-from notchflex.solver.programs import store as _store
+from notchflex.solver.programs import store
 
 RECORD = "NOTCHFLEX_RECORD_PROGRAMS"
 """Environment variable: the folder to which the text of every program is written."""
 
-FOLDER = Path(__file__).parent / "shipped_programs"
+FOLDER = store.PACKAGE / "shipped_programs"
 
 
 def read(key: str) -> bytes | None:
@@ -42,7 +42,7 @@ def count() -> int:
 
 
 def _name(key: str) -> str:
-    digest = hashlib.sha256(f"{_store.code_digest()} {key}".encode())
+    digest = hashlib.sha256(f"{store.code_digest()} {key}".encode())
     return f"{digest.hexdigest()[:32]}.xz"
 
 

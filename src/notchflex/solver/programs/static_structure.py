@@ -26,8 +26,8 @@ class KnownForm:
     """How the numbers of a chain that are not known are laid out in a vector of floats.
 
     Known are zeros that a chain has at every flexure because of how it is made
-    (`mechanics/chain/structure.py`), and whole numbers and flags that are the same at every flexure. Numbers
-    of the rest lie flexure after flexure, as programs read them.
+    (`mechanics/chain/structure.py`), and whole numbers and flags that are the same at every
+    flexure. Numbers of the rest lie flexure after flexure, as programs read them.
 
     Forms are kept, as `Form` keeps its own.
 

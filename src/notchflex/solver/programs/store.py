@@ -15,8 +15,12 @@ import warnings
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import cache, lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
+
+PACKAGE = Path(__file__).parents[2]
+"""Folder of notchflex."""
 
 VARIABLE = "JAX_COMPILATION_CACHE_DIR"
 """Environment variable: the folder to keep programs in; empty for none."""
@@ -26,8 +30,8 @@ MOST_BYTES = 256 * 2**20
 
 _DIGEST = 32  # bytes
 _PREFIX = "program-"
-# Folders of the package whose code no program is made from.
-_NOT_COMPILED = {"bench", "cli", "comparison", "plotting", "results", "viewer"}
+# Folders of notchflex whose code no program is made from. All of `lanewise` makes programs.
+_NOT_COMPILED = {"bench", "cli", "plotting", "viewer"}
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _POSIX = hasattr(os, "geteuid") and os.open in os.supports_dir_fd
 
@@ -115,14 +119,17 @@ def clear() -> Usage:
 @cache
 def code_digest() -> str:
     """Return a digest of the code that programs are made from."""
-    root = os.path.dirname(__file__)
+    compiler = find_spec("lanewise")
+    assert compiler is not None
+    assert compiler.submodule_search_locations is not None
     code = hashlib.sha256()
-    for folder, inner, files in os.walk(root):  # every process does this; pathlib takes longer
-        inner[:] = sorted(one for one in inner if folder != root or one not in _NOT_COMPILED)
-        for name in sorted(one for one in files if one.endswith(".py")):
-            path = os.path.join(folder, name)
-            with open(path, "rb", buffering=0) as file:
-                code.update(os.path.relpath(path, root).encode() + b"\0" + file.read() + b"\0")
+    for root in (os.fspath(PACKAGE), compiler.submodule_search_locations[0]):
+        for folder, inner, files in os.walk(root):  # every process does this; pathlib takes longer
+            inner[:] = sorted(one for one in inner if folder != root or one not in _NOT_COMPILED)
+            for name in sorted(one for one in files if one.endswith(".py")):
+                path = os.path.join(folder, name)
+                with open(path, "rb", buffering=0) as file:
+                    code.update(os.path.relpath(path, root).encode() + b"\0" + file.read() + b"\0")
     return code.hexdigest()
 
 
@@ -251,6 +258,7 @@ def _machine() -> str:
 
 __all__ = [
     "MOST_BYTES",
+    "PACKAGE",
     "VARIABLE",
     "Usage",
     "chosen_folder",

@@ -5,7 +5,7 @@ Marks lie outside the tube, beside what they mark: the wall would hide them wher
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from notchflex.plotting.shapes.bent import Bent
 from notchflex.results import EquilibriumPath
 from notchflex.viewer.scene.colours import CLOSED, TENDON, UNKNOWN, linear, of_contacts
-
-if TYPE_CHECKING:
-    from notchflex.viewer.scene.scene.shown import Shown
+from notchflex.viewer.scene.shown import Shown
 
 # All as parts of the outer radius of the tube: thickness of tendons, radius of marks, and how far
 # their centres are from the tube axis.

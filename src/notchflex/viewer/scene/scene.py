@@ -6,7 +6,6 @@ base, in mm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from notchflex.viewer.reach import GRAVITY, Reach, round_up
 from notchflex.viewer.scene.camera import Eye, first_eye, framed, quaternions
 from notchflex.viewer.scene.colours import LOAD, METAL, linear, of_strain
 from notchflex.viewer.scene.marks import Marks
+from notchflex.viewer.scene.shown import Shown
 from notchflex.viewer.scene.skins import PIECES, Skin, at_rest, skins
 from notchflex.viewer.scene.solids import body_solids
 
@@ -37,17 +37,6 @@ SEE_THROUGH = 0.35
 # Where lamps stand, and how bright they are.
 _LIGHTS = (((0.6, -1.0, 0.8), 1.6), ((-1.0, -0.3, 0.5), 0.7), ((0.3, 1.0, 0.4), 0.7))
 ROOT = "/robot"
-
-
-@dataclass
-class Shown:
-    """What a person wants to see."""
-
-    tendons: bool = True
-    contacts: bool = True
-    frames: bool = True
-    loads: bool = True
-    see_through: bool = False
 
 
 class Scene:
