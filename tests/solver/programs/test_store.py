@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import warnings
+from types import SimpleNamespace
 
 import pytest
 
@@ -150,3 +151,18 @@ print(Native.compiled, repr(float(state.total_angle)))
     assert int(first[0]) == 1
     assert int(second[0]) == 0
     assert first[1] == second[1]
+
+
+def test_programs_are_found_by_the_code_of_mechanics_and_compiler(monkeypatch, tmp_path):
+    digest = store.code_digest.__wrapped__
+    before = digest()
+    assert before == digest()
+    (tmp_path / "compiler.py").write_text("changed = True\n")
+    changed = SimpleNamespace(submodule_search_locations=[str(tmp_path)])
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "find_spec", lambda name: changed if name == "lanewise" else None)
+        assert digest() != before
+    (tmp_path / "solver").mkdir()
+    (tmp_path / "solver" / "newton.py").write_text("changed = True\n")
+    monkeypatch.setattr(store, "PACKAGE", tmp_path)
+    assert digest() != before
