@@ -238,7 +238,7 @@ class LoadPath(Displayed):
         )
 
 
-def joined_paths(paths: Sequence[LoadPath]) -> LoadPath:
+def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
     """Paths for equally many tendons one after the other, as one.
 
     Raises:
@@ -284,4 +284,4 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     return given or (NOTHING,) * steps
 
 
-__all__ = ["LoadPath", "joined_paths"]
+__all__ = ["LoadPath", "join_paths"]

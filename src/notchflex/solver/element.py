@@ -50,12 +50,12 @@ class Memory(NamedTuple):
     bound: tuple[Float[Array, "*n t 2"], ...]
 
 
-def heights(chain: Chain) -> Float[Array, " n"]:
+def notch_heights(chain: Chain) -> Float[Array, " n"]:
     """Length of every flexure, mm: the scale of lengths."""
     return jnp.sum(chain.rods.length, axis=-1)
 
 
-def driven(
+def trial_log_ratio(
     chain: Chain,
     log_ratio: Float[Array, "n t 2"],
     slid: Float[Array, "n t 2"],
@@ -63,22 +63,22 @@ def driven(
     k: int,
 ) -> Float[Array, "n t 2"]:
     """Log ratios as slip drives them, before their bound stops them, of the k-th group."""
-    slip = (slid - memory.slid[k]) / heights(chain)[:, None, None]
+    slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
     return log_ratio + RATE * (slip - (log_ratio - memory.log_ratio[k]) / STICTION)
 
 
-def between(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
+def clip_symmetric(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
     """Clip to +-limit; at a tie the limit is followed, so that a contact at rest can slide."""
     return jnp.where(value >= limit, limit, jnp.where(value <= -limit, -limit, value))
 
 
-def at_bound(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
+def bound_side(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
     """+1 where a log ratio lies on its upper bound, -1 on its lower, 0 inside."""
     near = 1e-9
     return jnp.where(value >= limit - near, 1, jnp.where(value <= -limit + near, -1, 0))
 
 
-def pressed(
+def is_active(
     stiffness: Float[Array, " n"],
     closes: Float[Array, "n l"],
     force: Float[Array, "n l"],
@@ -93,6 +93,6 @@ def signorini(
 ) -> Float[Array, "n l"]:
     """What is left of Signorini's condition as one equation, scaled to be a part of a height."""
     stiffness = chain.lip_stiffness
-    by_force = force / (stiffness * heights(chain))[:, None]
-    by_gap = gap / heights(chain)[:, None]
-    return jnp.where(pressed(stiffness, closes, force, gap), by_gap, by_force)
+    by_force = force / (stiffness * notch_heights(chain))[:, None]
+    by_gap = gap / notch_heights(chain)[:, None]
+    return jnp.where(is_active(stiffness, closes, force, gap), by_gap, by_force)

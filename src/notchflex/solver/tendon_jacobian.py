@@ -15,11 +15,11 @@ from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.motion import Motion, angular, skew, turned
 from notchflex.mechanics.tendon import TendonGroup
 from notchflex.solver.element import Unknowns
-from notchflex.solver.layout import Units
-from notchflex.solver.residual import Evaluation, picked
+from notchflex.solver.residual import Evaluation, select_anchors
+from notchflex.solver.row_layout import UnitRows
 
 
-class Moves(NamedTuple):
+class RelativeMotionJacobian(NamedTuple):
     """How bodies move: rows at every flexure.
 
     Attributes:
@@ -32,7 +32,7 @@ class Moves(NamedTuple):
     turn: Float[Array, "n a z"] | None
 
 
-class Strand(NamedTuple):
+class TendonJacobian(NamedTuple):
     """A group of tendons: rows at every flexure.
 
     Attributes:
@@ -58,7 +58,7 @@ class Strand(NamedTuple):
     stretch: Float[Array, "n t z"] | None
 
 
-class Opening(NamedTuple):
+class ContactJacobian(NamedTuple):
     """A kind of lips: rows at every flexure.
 
     Attributes:
@@ -71,28 +71,30 @@ class Opening(NamedTuple):
     wrench: Float[Array, "n l w short"] | None
 
 
-def moves_of(chain: Chain, at: Evaluation, unit: Units) -> Moves:
+def relative_motion_jacobian(
+    chain: Chain, at: Evaluation, unit: UnitRows
+) -> RelativeMotionJacobian:
     """How the bodies move."""
     pose, twist = at.flexure.pose, at.flexure.twist
     if pose is None or twist is None:
-        return Moves([], None)
+        return RelativeMotionJacobian([], None)
     own = unit.of_modes(twist)
     relative = [own]
     inside = jax.vmap(Motion.twist_inside, (0, None))
     for older in unit.motions:
         relative.append(own - inside(pose, older))
     if not len(unit.turn):
-        return Moves(relative, None)
+        return RelativeMotionJacobian(relative, None)
     axes = len(unit.turn)
     before = jax.vmap(_turn_inside, (0, None))(pose.rotation, unit.turn)
-    return Moves(relative, unit.spread(own[:, :axes]) + before)
+    return RelativeMotionJacobian(relative, unit.spread(own[:, :axes]) + before)
 
 
 def _turn_inside(rotation: Array, axis: Array) -> Array:
     return turned(rotation.T, axis)
 
 
-def _of_anchors(moves: Moves, back: Array) -> Float[Array, "n t w short"]:
+def _of_anchors(moves: RelativeMotionJacobian, back: Array) -> Float[Array, "n t w short"]:
     """Motion relative to the anchor of each tendon or lip."""
     found = moves.relative[0][:, None]
     for number, rows in enumerate(moves.relative[1:], start=2):
@@ -105,7 +107,7 @@ def _by_relative(
 ) -> Any:
     """Slopes of a crossing or touch by the motion relative to the anchor, as last axis."""
     size = chain.rods.basis.shape[-2]
-    anchors = picked(at.anchors, group.back)
+    anchors = select_anchors(at.anchors, group.back)
     assert anchors is not None  # acts_on_bodies asks for them
 
     def one(own: Any, rod: Rod, flexure: Any, seen: Motion) -> Any:
@@ -122,7 +124,7 @@ def _by_relative(
 def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) -> Any:
     """Slopes of a crossing by the modes of the flexure where the anchor stays, as last axis."""
     with_pose = at.anchors is not None and group.acts_on_bodies
-    anchors = picked(at.anchors, group.back) if with_pose else None
+    anchors = select_anchors(at.anchors, group.back) if with_pose else None
 
     def one(own: Any, rod: Rod, memory: Any, seen: Motion | None, at_modes: Array) -> Any:
         def moved(varied: Array) -> Any:
@@ -134,9 +136,14 @@ def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) ->
     return jax.vmap(one)(group, chain.rods, chain.memory, anchors, modes)
 
 
-def strand_of(
-    chain: Chain, k: int, unknowns: Unknowns, at: Evaluation, unit: Units, moves: Moves
-) -> Strand:
+def tendon_jacobian(
+    chain: Chain,
+    k: int,
+    unknowns: Unknowns,
+    at: Evaluation,
+    unit: UnitRows,
+    moves: RelativeMotionJacobian,
+) -> TendonJacobian:
     """What the k-th group of tendons does."""
     group, span = chain.groups[k], at.spans[k]
     crossing = span.crossing
@@ -156,13 +163,13 @@ def strand_of(
         turning.append(unit.of_modes(both))
     log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
     runs = group.runs[..., None]
-    passed_on = span.passed_on[..., None]
+    tension_ratio = span.tension_ratio[..., None]
     gap_tension = runs * (
-        passed_on[:, :, 0] * unit.tension[k][None]
+        tension_ratio[:, :, 0] * unit.tension[k][None]
         - span.gap_tension[..., None] * log_ratio[None, :, 0]
     )
     body_tension = (
-        passed_on[:, :, 1] * gap_tension - span.body_tension[..., None] * log_ratio[None, :, 1]
+        tension_ratio[:, :, 1] * gap_tension - span.body_tension[..., None] * log_ratio[None, :, 1]
     )
     in_body = body_tension * group.body_length[..., None]
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
@@ -177,7 +184,7 @@ def strand_of(
         stretch = unit.stretch[k][None] + here
         at_exit = drawn + stretch / stiffness
         at_entry = beyond + (unit.stretch[k][None] + in_body) / stiffness
-    return Strand(
+    return TendonJacobian(
         turning=cast("Array", sum(turning)),
         wrench=wrench,
         log_ratio=log_ratio,
@@ -189,14 +196,16 @@ def strand_of(
     )
 
 
-def opening_of(chain: Chain, k: int, at: Evaluation, unit: Units, moves: Moves) -> Opening:
+def contact_jacobian(
+    chain: Chain, k: int, at: Evaluation, unit: UnitRows, moves: RelativeMotionJacobian
+) -> ContactJacobian:
     """What the k-th kind of lips does."""
     group, touch = chain.lips[k], at.touches[k]
     if touch.slope is not None:
-        return Opening(unit.of_modes(touch.slope), None)
+        return ContactJacobian(unit.of_modes(touch.slope), None)
     slopes = _by_relative(chain, at, group, type(group).touch)
     move = _of_anchors(moves, group.back)
-    return Opening(
+    return ContactJacobian(
         jnp.einsum("nlw,nlwz->nlz", slopes.gap, move),
         jnp.einsum("nlvw,nlwz->nlvz", slopes.wrench, move),
     )

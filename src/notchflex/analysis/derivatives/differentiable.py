@@ -17,18 +17,18 @@ from notchflex.analysis.derivatives.callback import outputs_function
 from notchflex.analysis.derivatives.kinks import Kink, kinks
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.derivatives.tangent import PathTangents
-from notchflex.analysis.outputs import known_outputs
-from notchflex.analysis.solve import check_refinement, prepared_for
+from notchflex.analysis.outputs import check_outputs
+from notchflex.analysis.solve import check_refinement, prepare_for
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import command
+from notchflex.loads.command import make_commands
 from notchflex.loads.conversion import load_path
 from notchflex.loads.validation import robot_given, shown
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import Prepared, prepared
+from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run
 
 _TENDONS = ("tension", "stroke")
@@ -105,7 +105,7 @@ def differentiable(
             start[name] = np.array([getattr(one, name) for one in path.external])
     start = {name: jnp.asarray(start[name], float) for name in names}
     return Differentiable(
-        robot, path, start, known_outputs(outputs), settings or DEFAULT, refinement
+        robot, path, start, check_outputs(outputs), settings or DEFAULT, refinement
     )
 
 
@@ -207,7 +207,7 @@ class Differentiable:
         """Solve the path at some values."""
         robot, load = self._robot(values), self._load(values)
         ready = self._prepared(robot)
-        loads = command(load, robot, ready.chain)
+        loads = make_commands(load, robot, ready.chain)
         came = run(ready, loads, None, self.settings, each_from_start=False)
         return EquilibriumPath(robot, load, ready, came, settings=self.settings)
 
@@ -269,13 +269,13 @@ class Differentiable:
     def _tip(self) -> tuple[str, ...]:
         return tuple(name for name in _TIP if name in self.start)
 
-    def _prepared(self, robot: Robot) -> Prepared:
+    def _prepared(self, robot: Robot) -> PreparedChain:
         if self._tip:  # may point anywhere
-            return prepared(robot, "space", loaded=True, refinement=self.refinement, flat=False)
-        return prepared_for(robot, self.load, None, self.refinement)
+            return prepare(robot, "space", loaded=True, refinement=self.refinement, flat=False)
+        return prepare_for(robot, self.load, None, self.refinement)
 
     @cached_property
-    def ready(self) -> Prepared:
+    def ready(self) -> PreparedChain:
         """The robot as it is, as arrays."""
         return self._prepared(self.robot)
 
@@ -347,7 +347,7 @@ class _Solver:
         """Change of loads and chain, packed for the long chain, per unit of every value."""
         values, of = self._named(flat), self._of
         steps = len(of.load)
-        size = of.ready.long.chain_form.size
+        size = of.ready.long.chain_layout.size
         for name, value in values.items():
             if name in of.numbers:
                 change = self._by_number(values, name)
@@ -384,10 +384,10 @@ class _Solver:
         """The long chain and all loads as one vector."""
         of = self._of
         robot, load = of._robot(values), of._load(values)  # pyright: ignore[reportPrivateUsage]
-        ready = of._prepared(robot)  # pyright: ignore[reportPrivateUsage]
-        if ready.chain_form is not of.ready.chain_form:
+        ready = of._prepare(robot)  # pyright: ignore[reportPrivateUsage]
+        if ready.chain_layout is not of.ready.chain_layout:
             raise InputError("with these values the robot has another form; it must stay the same")
-        loads, _ = ready.long_commands(command(load, robot, ready.chain))
+        loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
         return np.concatenate([ready.long.vector, loads.ravel()])
 
 

@@ -205,7 +205,7 @@ def _crossed(turn: Array, vector: Array) -> Array:
     return jnp.cross(turn, jnp.broadcast_to(vector, turn.shape), axis=1)
 
 
-def pull_change(
+def geometric_stiffness(
     rod: Rod, modes: Float[Array, " modes"], own: Bent, wrench: Float[Array, " w"]
 ) -> Float[Array, "modes modes"]:
     """How what a wrench on the distal body does to each mode changes with the modes.
@@ -251,7 +251,7 @@ def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:
 
 
 def _order_of_turns(rod: Rod, own: Bent, at_end: Float[Array, " 6"]) -> Float[Array, "modes modes"]:
-    """What `pull_change` has in space alone, where a turn after another is not the other after it.
+    """Part of `geometric_stiffness` in space alone, where turns do not commute.
 
     The slopes of the turns change with the modes: from place to place by those before, within each
     step by the slope of the exponential and by the pairs of Magnus's series.

@@ -127,7 +127,7 @@ def flexure_state(
     )
 
 
-def held_by_strains(
+def material_tangent(
     rod: Rod, law: SectionLaw, memory: Any, modes: Float[Array, " modes"]
 ) -> Float[Array, "modes modes"]:
     """Change of what the strains do to each mode (`internal`), per unit of mode."""

@@ -12,7 +12,7 @@ from notchflex._jax import constant, jnp
 from notchflex.mechanics.chain import Chain
 
 
-class Units(NamedTuple):
+class UnitRows(NamedTuple):
     """Rows of one 1 each, for every number that may change, in the order of the rows' axis.
 
     How bodies move depends on few of them: rows of motions are short, over the modes and the
@@ -56,7 +56,7 @@ def _padded(rows: Array, behind: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Layout:
+class RowLayout:
     """Where everything stands among the numbers that may change at one flexure.
 
     Of a tendon beyond come back the length that is set free and the stretch (tension times length).
@@ -98,7 +98,7 @@ class Layout:
         """
         return self.wrench if self.turn and self.follows else self.turn
 
-    def units(self) -> Units:
+    def units(self) -> UnitRows:
         """Unit rows of everything, in order."""
         wrench = [self.wrench] * self.older
         sizes = [
@@ -119,15 +119,15 @@ class Layout:
             [next(rows) for _ in group] for group in sizes
         )
         strokes = stretch if self.by_stroke else None
-        return Units(
+        return UnitRows(
             modes[0], lips, log_ratio, older, turn[0], tension, handed, far[0], drawn, strokes
         )
 
 
-def layout(chain: Chain, *, by_stroke: bool) -> Layout:
+def row_layout(chain: Chain, *, by_stroke: bool) -> RowLayout:
     """The layout of a chain whose tendons are given by tension alone, or some by stroke."""
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
-    return Layout(
+    return RowLayout(
         modes=chain.stiffness.shape[-1],
         lips=tuple(group.closes.shape[-1] for group in chain.lips),
         tendons=tuple(len(group.numbers) for group in chain.groups),
