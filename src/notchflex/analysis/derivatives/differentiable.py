@@ -384,7 +384,7 @@ class _Solver:
         """The long chain and all loads as one vector."""
         of = self._of
         robot, load = of._robot(values), of._load(values)  # pyright: ignore[reportPrivateUsage]
-        ready = of._prepare(robot)  # pyright: ignore[reportPrivateUsage]
+        ready = of._prepared(robot)  # pyright: ignore[reportPrivateUsage]
         if ready.chain_layout is not of.ready.chain_layout:
             raise InputError("with these values the robot has another form; it must stay the same")
         loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
