@@ -1,4 +1,4 @@
-"""What the actuators demand of the tendons at the base: a tension, or a stroke."""
+"""Conditions of the actuators on the tendons at the base: a tension, or a stroke."""
 
 from __future__ import annotations
 
@@ -14,63 +14,73 @@ from notchflex.mechanics.tendon.wall_arc import WallArc
 from notchflex.solver.residual import BaseReaction
 
 
-def stroke(
-    chain: Chain, base_tension: Float[Array, " t"], base: BaseReaction
-) -> Float[Array, " t"]:
+def stroke(chain: Chain, base_tension: Float[Array, " t"], base: BaseReaction) -> Array:
     """Tendon drawn out at the base since the free robot (mm), with the file's stiffness."""
-    stretch = base.stretch + base_tension * chain.free_length
-    return base.drawn + stretch / chain.axial_stiffness
+    tension_length = base.tension_length + base_tension * chain.free_length
+    return base.released_length + tension_length / chain.axial_stiffness
 
 
 def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
-    """Stroke at which every notch is closed (mm), infinite where that is not known beforehand.
+    """Stroke at which every notch is closed (mm), infinite where no formula gives it.
 
     Where every notch closes against its spine, a tendon on the wall shortens by the notch's
     travel times its lever. One that a closing notch draws in shortens as that notch opens, without
     end.
     """
-    reach = np.full(chain.tendons, np.inf)
+    closing = np.full(chain.tendons, np.inf)
     rods = jax.tree.map(np.asarray, chain.rods)
     travel = closing_travel(rods)
     if not np.isfinite(travel).all():
-        return reach
+        return closing
     for group in chain.groups:
         if isinstance(group, WallArc):
             weights = of_rod(chain.rods, fibre_stretch(constant(group.across)))
             slope = np.einsum("ntc,nic,ni->nt", weights, rods.basis[..., 0], rods.length)
             loss = np.asarray(group.present) * -slope * travel[:, None]
-            reach[list(group.numbers)] = np.where(loss < 0.0, np.inf, loss).sum(axis=0)
-    return reach
+            closing[list(group.numbers)] = np.where(loss < 0.0, np.inf, loss).sum(axis=0)
+    return closing
 
 
 def command_residual(
     chain: Chain, command: Command, base_tension: Float[Array, " t"], base: BaseReaction
 ) -> Float[Array, " t"]:
-    """How far the tendons are from what is demanded, scaled to be comparable with angles.
+    """Deviation of the tendons from their command, scaled to be comparable with angles.
 
-    A tendon drawn by stroke is slack where the robot has set free more than is drawn:
-    tension >= 0, stroke set free >= stroke demanded, product 0.
+    A tendon driven by stroke is slack where the robot has released more than is drawn:
+    tension >= 0, stroke released >= stroke commanded, product 0.
     """
     scale = chain.drawn_stiffness
     missing = stroke(chain, base_tension, base) - command.value
-    # Told apart, not subtracted from one another: beside a large tension the rest would be lost.
+    # A switch, not a difference: beside a large tension the rest would be lost.
     by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)
     by_tension = (base_tension - command.value) / scale
     return command.either(by_stroke, by_tension)
 
 
-# Tension up to which the stroke of an inextensible tendon is followed, in forces that close a
-# notch.
+def command_slopes(
+    chain: Chain, command: Command, base_tension: Float[Array, " t"], base: BaseReaction
+) -> tuple[Float[Array, "t t"], Float[Array, "t t"], Float[Array, "t t"]]:
+    """Slopes of `command_residual` by base tension, released length and tension times length."""
+
+    def residual(tension: Array, released_length: Array, tension_length: Array) -> Array:
+        moved = BaseReaction(released_length, tension_length, base.external)
+        return command_residual(chain, command, tension, moved)
+
+    at = (base_tension, base.released_length, base.tension_length)
+    return jax.jacfwd(residual, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, at))
+
+
+# Largest tension for the stroke of an inextensible tendon, in forces that close a notch.
 _MOST_CLOSING_FORCES = 1e5
 
 
 def tension_is_bounded(
     chain: Chain, command: Command, base_tension: Float[Array, " t"]
 ) -> Bool[Array, ""] | bool:
-    """Whether tensions that were found for strokes are far from what any robot can bear.
+    """Whether the tensions of tendons driven by stroke are below what any robot could bear.
 
-    An inextensible tendon can be drawn no further once the shape can't give; its tension would
-    then be whatever rounding makes of it. One that stretches bounds its tension itself.
+    An inextensible tendon cannot be drawn further once the shape is rigid; its tension would then
+    be determined by rounding. One that stretches bounds its tension itself.
     """
     if command.by_stroke is None:
         return True

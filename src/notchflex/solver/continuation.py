@@ -1,4 +1,4 @@
-"""From one solved state to the next: the load at once, or in parts where that fails."""
+"""Load steps: from one solved state to the next, the whole load at once or in substeps."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from notchflex._jax import constant, jax, jnp
 from notchflex.loads.applied import BodyLoads
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.element import Memory, Unknowns
+from notchflex.solver.element import Iterate, Memory, Unknowns
 from notchflex.solver.friction_predictor import predict_log_ratios
-from notchflex.solver.newton import Iterate, NewtonResult, Settings, newton
+from notchflex.solver.newton import NewtonResult, Settings, newton
 
 
 class SolverState(NamedTuple):
@@ -22,9 +22,9 @@ class SolverState(NamedTuple):
 
     Attributes:
         point: Unknowns and base tensions.
-        memory: What the contacts remember, as of this state.
+        memory: History of the contacts, as of this state.
         stroke: Tendon drawn out at the base, mm.
-        applied: Other loads on the bodies; None for a chain assembled for tendons alone.
+        applied: External loads on the bodies; None for a chain assembled for tendons alone.
     """
 
     point: Iterate
@@ -34,17 +34,17 @@ class SolverState(NamedTuple):
 
 
 class LoadStepResult(NamedTuple):
-    """What came of one load.
+    """Result of one load step.
 
     Attributes:
         solved: The last solved state: that of the load, or as far as it could be followed.
-        residual: Largest scaled imbalance of the last attempt.
-        iterations: Newton iterations, all parts together.
+        residual: Largest scaled residual of the last attempt.
+        iterations: Newton iterations, all substeps together.
         converged: Whether the load was reached.
-        reached: Part of the way from the state before to the load that was reached.
-        parts: How many parts of the way were solved one after the other.
-        between: The state before the last of them, whose memory the contacts had in it.
-        part_before: Part of the way at which that state is.
+        reached: Fraction of the load step that was reached.
+        parts: Number of substeps that converged.
+        between: The state before the last substep, whose history the contacts had in it.
+        part_before: Fraction of the load step at that state.
     """
 
     solved: SolverState
@@ -57,15 +57,15 @@ class LoadStepResult(NamedTuple):
     part_before: Float[Array, ""]
 
 
-# A state on the way, of which memory alone is left, need not be within the tolerance, but within
-# this multiple of it, and this imbalance.
-_ON_THE_WAY, _AT_MOST = 1e3, 1e-10
-# Part of the way at which the other loads are on, where they come before the tendons.
-_LOADS_ON = 0.5
+# Of a state before the last substep only the history is kept: it need not be within the tolerance,
+# but within this multiple of it, and this residual.
+_SUBSTEP_TOLERANCE, _SUBSTEP_RESIDUAL = 1e3, 1e-10
+# Fraction of a load step at which the external loads are complete, where they come first.
+_EXTERNAL_COMPLETE = 0.5
 
 
 def at_rest(chain: Chain) -> SolverState:
-    """The free robot with slack tendons that have not yet slid."""
+    """Return the free robot with slack tendons that have not yet slid."""
     none = tuple(constant(np.zeros((*group.present.shape, 2))) for group in chain.groups)
     unknowns = Unknowns(
         modes=constant(np.zeros(chain.stiffness.shape)),
@@ -77,7 +77,7 @@ def at_rest(chain: Chain) -> SolverState:
 
 
 def unloaded(chain: Chain) -> BodyLoads | None:
-    """No loads on any body, as a chain takes them."""
+    """Return the absence of loads on all bodies, in the form of the chain."""
     if not chain.loaded:
         return None
     bodies = chain.flexures + 1
@@ -87,76 +87,56 @@ def unloaded(chain: Chain) -> BodyLoads | None:
 
 
 def solve_load_step(
-    chain: Chain,
-    command: Command,
-    last: SolverState,
-    settings: Settings,
+    chain: Chain, command: Command, last: SolverState, settings: Settings
 ) -> LoadStepResult:
     """Follow a load from a solved state.
 
-    The whole way is tried first. Where Newton's method fails, the way is halved until it
-    succeeds, and lengthened again after; memory is kept only of parts that converged.
+    The whole step is tried first. Where Newton's method fails, the step is halved until it
+    succeeds, and doubled again after; only substeps that converged enter the friction history.
 
-    Where all tendons are slack before, other loads come on first, with slack tendons, and then all
-    tensions together: half the way each.
+    Where all tendons are slack before, external loads come first, with slack tendons, and then all
+    tensions together: half the load step each.
 
     Args:
         chain: The chain.
         command: The load.
         last: The solved state before.
-        settings: How hard to try.
+        settings: Tolerance and limits.
 
     Returns:
-        What came of it.
+        The result.
     """
-    loads_first = _loads_first(chain, last)
+    external_first = _external_first(chain, last)
 
-    def attempt(solved: SolverState, part: Array) -> tuple[NewtonResult, Command]:
-        wanted = interpolate_command(chain, command, last, part)
-        tension = wanted.either(solved.point.base_tension, wanted.value)
-        guess = predict_log_ratios(chain, solved.point.base_tension, tension, solved.memory)
-        start = Iterate(solved.point.unknowns._replace(log_ratio=guess), tension)
-        before = solved.point.base_tension
-        enough = jnp.minimum(_ON_THE_WAY * settings.tolerance, _AT_MOST)
-        enough = jnp.where(part < 1.0, enough, 0.0)
-        found = newton(chain, wanted, solved.memory, before, start, settings, enough)
-        return found, wanted
-
-    def going(state: tuple[LoadStepResult, Array, Array]) -> Bool[Array, ""]:
-        advanced, part, tries = state
+    def proceed(state: tuple[LoadStepResult, Array, Array]) -> Bool[Array, ""]:
+        result, part, tries = state
         return (
-            ~advanced.converged
+            ~result.converged
             & (part >= settings.smallest_load_step)
             & (tries < settings.max_load_steps)
-            & (advanced.iterations < settings.max_all_iterations)
+            & (result.iterations < settings.max_all_iterations)
         )
 
-    def follow(state: tuple[LoadStepResult, Array, Array]) -> tuple[LoadStepResult, Array, Array]:
-        advanced, part, tries = state
-        stop = jnp.where(loads_first & (advanced.reached < _LOADS_ON), _LOADS_ON, 1.0)
-        aim = jnp.minimum(advanced.reached + part, stop)
-        found, wanted = attempt(advanced.solved, aim)
-        remembered = Memory(found.point.unknowns.log_ratio, found.slid, found.bound)
-        solved = jax.tree.map(
-            lambda old, new: jnp.where(found.converged, new, old),
-            advanced.solved,
-            SolverState(found.point, remembered, found.stroke, wanted.applied),
+    def substep(state: tuple[LoadStepResult, Array, Array]) -> tuple[LoadStepResult, Array, Array]:
+        result, part, tries = state
+        first = external_first & (result.reached < _EXTERNAL_COMPLETE)
+        stop = jnp.where(first, _EXTERNAL_COMPLETE, 1.0)
+        aim = jnp.minimum(result.reached + part, stop)
+        target = interpolate_command(chain, command, last, aim)
+        new = _solve_substep(chain, target, result.solved, settings, aim)
+        memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound)
+        keep = partial(jax.tree.map, lambda old, new_leaf: jnp.where(new.converged, new_leaf, old))
+        result = LoadStepResult(
+            solved=keep(result.solved, SolverState(new.point, memory, new.stroke, target.applied)),
+            residual=new.residual,
+            iterations=result.iterations + new.iterations,
+            converged=new.converged & (aim >= 1.0),
+            reached=jnp.where(new.converged, aim, result.reached),
+            parts=result.parts + new.converged,
+            between=keep(result.between, result.solved),
+            part_before=jnp.where(new.converged, result.reached, result.part_before),
         )
-        advanced = LoadStepResult(
-            solved=solved,
-            residual=found.residual,
-            iterations=advanced.iterations + found.iterations,
-            converged=found.converged & (aim >= 1.0),
-            reached=jnp.where(found.converged, aim, advanced.reached),
-            parts=advanced.parts + found.converged,
-            between=jax.tree.map(
-                lambda old, new: jnp.where(found.converged, new, old),
-                advanced.between,
-                advanced.solved,
-            ),
-            part_before=jnp.where(found.converged, advanced.reached, advanced.part_before),
-        )
-        return advanced, jnp.where(found.converged, 2.0 * part, 0.5 * part), tries + 1
+        return result, jnp.where(new.converged, 2.0 * part, 0.5 * part), tries + 1
 
     start = LoadStepResult(
         solved=last,
@@ -168,32 +148,43 @@ def solve_load_step(
         between=last,
         part_before=jnp.zeros(()),
     )
-    advanced, _, _ = jax.lax.while_loop(going, follow, (start, jnp.ones(()), jnp.zeros((), int)))
-    return advanced
+    return jax.lax.while_loop(proceed, substep, (start, jnp.ones(()), jnp.zeros((), int)))[0]
+
+
+def _solve_substep(
+    chain: Chain, target: Command, solved: SolverState, settings: Settings, aim: Array
+) -> NewtonResult:
+    """Solve for a command near a solved state, from the predicted log ratios."""
+    before = solved.point.base_tension
+    tension = target.either(before, target.value)
+    log_ratio = predict_log_ratios(chain, before, tension, solved.memory)
+    start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), tension)
+    enough = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
+    enough = jnp.where(aim < 1.0, enough, 0.0)
+    return newton(chain, target, solved.memory, before, start, settings, enough)
 
 
 def interpolate_command(
     chain: Chain, command: Command, last: SolverState, part: Float[Array, ""]
 ) -> Command:
-    """The command at a part of the way from a solved state; exactly the wanted one at its end."""
-    loads_first = _loads_first(chain, last)
+    """Interpolate between a solved state and a command; exactly the command at the end."""
+    external_first = _external_first(chain, last)
     from_here = command.either(last.stroke, last.point.base_tension)
-    for_loads = jnp.where(loads_first, jnp.minimum(2.0 * part, 1.0), part)
-    for_tendons = jnp.where(loads_first, jnp.maximum(2.0 * part - 1.0, 0.0), part)
-    only_loads = loads_first & (for_tendons == 0.0)
-    return Command(
-        value=jnp.where(only_loads, 0.0, between(from_here, command.value, for_tendons)),
-        by_stroke=None if command.by_stroke is None else command.by_stroke & ~only_loads,
-        applied=jax.tree.map(partial(between, part=for_loads), last.applied, command.applied),
-    )
+    external = jnp.where(external_first, jnp.minimum(2.0 * part, 1.0), part)
+    tendons = jnp.where(external_first, jnp.maximum(2.0 * part - 1.0, 0.0), part)
+    only_external = external_first & (tendons == 0.0)
+    by_stroke = None if command.by_stroke is None else command.by_stroke & ~only_external
+    value = jnp.where(only_external, 0.0, _interpolate(from_here, command.value, tendons))
+    applied = jax.tree.map(partial(_interpolate, part=external), last.applied, command.applied)
+    return Command(value, by_stroke, applied)
 
 
-def _loads_first(chain: Chain, last: SolverState) -> Bool[Array, ""]:
-    """Whether other loads come on before the tendons."""
+def _external_first(chain: Chain, last: SolverState) -> Bool[Array, ""]:
+    """Whether external loads come before the tendons."""
     slack = jnp.all(last.point.base_tension == 0.0)
     return slack if chain.loaded else jnp.array(False)
 
 
-def between(start: Float[Array, ...], end: Float[Array, ...], part: Array) -> Array:
-    """A value at a part of the way from one to another; exactly the other at its end."""
+def _interpolate(start: Float[Array, ...], end: Float[Array, ...], part: Array) -> Array:
+    """A value at a fraction of the way from one to another; exactly the other at its end."""
     return jnp.where(part >= 1.0, end, start + part * (end - start))

@@ -1,7 +1,7 @@
-"""What is sought and remembered at every flexure, and the two laws with a switch in them.
+"""Unknowns and history of every flexure, and its two laws with a switch: contact and friction.
 
-Contact and friction are conditions of the kind "one of two"; both are written as one equation that
-Newton's method can take, and solved together with the balance.
+Both are complementarity conditions, each written as one equation that Newton's method solves
+together with the balance.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import jnp
 from notchflex.mechanics.chain import Chain
 
-# The memory law x = clip(x + rate (slip - (x - x_prev) / stiction)). The rate is how strongly slip
-# drives the logarithm while Newton searches, and drops out at the solution; the stiction only
+# The friction law x = clip(x + rate (slip - (x - x_prev) / stiction)). The rate is how strongly
+# slip changes the log ratio while Newton searches, and drops out at the solution; the stiction only
 # keeps the equation regular where a slack tendon makes the tension ratio meaningless. Both are
-# per slip in heights of the notch, so that a robot of another size is solved alike.
+# per slip in heights of the notch, so that a scaled robot is solved alike.
 RATE = 8.0
 STICTION = 1e15
 
@@ -26,7 +26,7 @@ class Unknowns(NamedTuple):
 
     Attributes:
         modes: Amplitudes of the strain modes.
-        lip_force: Contact forces of the lips, N, for each kind of lips.
+        lip_force: Contact forces, N, for each kind of contacts.
         log_ratio: ln(tension on the base side / tip side) at both edges of the gap, for each
             group of tendons.
     """
@@ -36,13 +36,20 @@ class Unknowns(NamedTuple):
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
 
 
+class Iterate(NamedTuple):
+    """A guess or a solution: the unknowns and the base tensions, N."""
+
+    unknowns: Unknowns
+    base_tension: Float[Array, " t"]
+
+
 class Memory(NamedTuple):
-    """What the contacts remember of the last solved state.
+    """History of the friction contacts, as of the last solved state.
 
     Attributes:
         log_ratio: Their log ratios.
         slid: Tendon slid over them, mm.
-        bound: Their largest log ratios, which only help to guess the next state.
+        bound: Their largest log ratios, for the predictor of the next state alone.
     """
 
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
@@ -62,13 +69,13 @@ def trial_log_ratio(
     memory: Memory,
     k: int,
 ) -> Float[Array, "n t 2"]:
-    """Log ratios as slip drives them, before their bound stops them, of the k-th group."""
+    """Log ratios of the k-th group as slip drives them, before they are clipped to their bound."""
     slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
     return log_ratio + RATE * (slip - (log_ratio - memory.log_ratio[k]) / STICTION)
 
 
 def clip_symmetric(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
-    """Clip to +-limit; at a tie the limit is followed, so that a contact at rest can slide."""
+    """Clip to +-limit; at a tie the result is the limit, so that a contact at rest can slide."""
     return jnp.where(value >= limit, limit, jnp.where(value <= -limit, -limit, value))
 
 
@@ -84,14 +91,14 @@ def is_active(
     force: Float[Array, "n l"],
     gap: Float[Array, "n l"],
 ) -> Bool[Array, "n l"]:
-    """Which lips press, by Signorini's condition: force >= 0, gap >= 0, product 0."""
+    """Which contacts press, by Signorini's condition: force >= 0, gap >= 0, product 0."""
     return (force - stiffness[:, None] * gap > 0.0) & (closes > 0.0)
 
 
 def signorini(
     chain: Chain, closes: Float[Array, "n l"], force: Float[Array, "n l"], gap: Float[Array, "n l"]
 ) -> Float[Array, "n l"]:
-    """What is left of Signorini's condition as one equation, scaled to be a part of a height."""
+    """Residual of Signorini's condition as one equation, as a part of the notch's height."""
     stiffness = chain.lip_stiffness
     by_force = force / (stiffness * notch_heights(chain))[:, None]
     by_gap = gap / notch_heights(chain)[:, None]

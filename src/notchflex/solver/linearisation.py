@@ -1,19 +1,18 @@
-"""Every flexure's balance made linear: how its imbalance answers what changes around it.
+"""Linearisation of every flexure's residual, as rows over what changes around it.
 
-All changes are written as rows over the numbers that may change at one flexure: its own unknowns,
-what is carried on to it from the base side, and what comes back from the tip side. Motions of
-bodies are counted relative to the body before, forces along with the body they act on, so that a
-robot that only turns as a whole changes nothing. What is carried on are
+The columns are the unknowns of the flexure, what is carried to it from the base side, and what
+comes from the tip side. Motions of bodies are relative to the body before, forces act along the
+body: a rotation of the whole robot changes nothing. Carried from the base side are
 
     the motion of bodies further back, as far as spans reach; the turn of the body against the base,
     where external loads keep their direction; the tensions
 
-and what comes back are
+and from the tip side come
 
-    the wrenches of spans and lips that end beyond; those of the loads, or their moments alone;
-    tendon set free and stretched.
+    the wrenches of spans and contacts that end beyond; those of the external loads, or their
+    moments alone; the released lengths of the tendons and their tension times length.
 
-Only the geometry of a span, a contact or a rod is differentiated by JAX, on its own.
+JAX differentiates only the geometry of a span, a contact or a rod, each on its own.
 """
 
 from __future__ import annotations
@@ -49,11 +48,31 @@ from notchflex.solver.tendon_jacobian import (
 
 
 class LinearisedRows(NamedTuple):
-    """Rows of all flexures, each over (own unknowns, carried, from beyond)."""
+    """Rows of all flexures, each over (own unknowns, carried, from beyond).
+
+    Attributes:
+        residual: Of the residual.
+        onward: Of what is carried on to the next flexure.
+        behind: Of what is handed back to the flexure before.
+    """
 
     residual: Float[Array, "n u z"]
     onward: Float[Array, "n c z"]
     behind: Float[Array, "n b z"]
+
+
+class _Linearisation(NamedTuple):
+    """A state, and the jacobians of its bodies, tendons and contacts."""
+
+    chain: Chain
+    unknowns: Unknowns
+    memory: Memory
+    applied: BodyLoads | None
+    at: Evaluation
+    unit: UnitRows
+    motion: RelativeMotionJacobian
+    tendons: list[TendonJacobian]
+    contacts: list[ContactJacobian]
 
 
 def linearise(
@@ -64,67 +83,73 @@ def linearise(
     at: Evaluation,
     form: RowLayout,
 ) -> LinearisedRows:
-    """Rows of all flexures.
+    """Linearise the residual of all flexures.
 
     Args:
         chain: The chain.
-        unknowns: Where it is.
-        memory: What its contacts remember.
-        applied: Other loads on the bodies.
-        at: Its evaluation there.
-        form: What the rows are over.
+        unknowns: Its unknowns.
+        memory: History of its contacts.
+        applied: External loads on the bodies.
+        at: Evaluation there.
+        form: Layout of the rows.
+
+    Returns:
+        The rows.
     """
-    unit = form.units()
-    moves = relative_motion_jacobian(chain, at, unit)
+    unit = form.unit_rows()
+    motion = relative_motion_jacobian(chain, at, unit)
     tendons = [
-        tendon_jacobian(chain, k, unknowns, at, unit, moves) for k in range(len(chain.groups))
+        tendon_jacobian(chain, k, unknowns, at, unit, motion) for k in range(len(chain.groups))
     ]
-    contacts = [contact_jacobian(chain, k, at, unit, moves) for k in range(len(chain.lips))]
+    contacts = [contact_jacobian(chain, k, at, unit, motion) for k in range(len(chain.lips))]
+    here = _Linearisation(chain, unknowns, memory, applied, at, unit, motion, tendons, contacts)
+    balance, behind = _balance_rows(here)
+    residual = [balance / chain.stiffness[..., None], *_contact_rows(here)]
+    residual += [_friction_rows(here, k) for k in range(len(tendons))]
+    onward = [-unit.spread(motion.relative[number]) for number in range(form.older)]
+    onward += [] if motion.turn is None else [motion.turn]
+    onward += [tendon.carried for tendon in tendons]
+    behind += [tendon.released_length for tendon in tendons]
+    behind += [one.tension_length for one in tendons if one.tension_length is not None]
+    return LinearisedRows(*(_stack(chain, rows, form) for rows in (residual, onward, behind)))
+
+
+def _stack(chain: Chain, rows: list[Array], form: RowLayout) -> Float[Array, "n k z"]:
+    """Rows below each other; none where there are no rows."""
+    if not rows:
+        return jnp.zeros((chain.flexures, 0, form.unknowns + form.carried + form.beyond))
+    return jnp.concatenate(rows, axis=1)
+
+
+def _balance_rows(here: _Linearisation) -> tuple[Float[Array, "n m z"], list[Array]]:
+    """Rows of the balance of modes, and of the wrenches handed back."""
+    chain, at, unit = here.chain, here.at, here.unit
     elastic = chain.elastic
     if elastic is None:
         elastic = jax.vmap(material_tangent, in_axes=(0, None, 0, 0))(
-            chain.rods, chain.law, chain.memory, unknowns.modes
+            chain.rods, chain.law, chain.memory, here.unknowns.modes
         )
         elastic = _never_singular(chain, elastic)
     behind: list[Array] = []
-
-    def by_modes(rows: Array) -> Array:
-        return unit.spread(unit.of_modes(rows))
-
-    if at.wrenches is not None:
+    if at.wrenches is None:
+        balance = unit.spread(unit.of_modes(elastic))
+    else:
         assert at.flexure.bent is not None
         elastic = elastic - jax.vmap(geometric_stiffness)(
-            chain.rods, unknowns.modes, at.flexure.bent, at.wrenches.whole
+            chain.rods, here.unknowns.modes, at.flexure.bent, at.wrenches.resultant
         )
-        whole, behind = _forces(chain, unknowns, applied, at, unit, moves, tendons, contacts)
-        balance = by_modes(elastic) - jnp.einsum("nwm,nwz->nmz", at.flexure.twist, whole)
-    else:
-        balance = by_modes(elastic)
-    for tendon, span in zip(tendons, at.spans, strict=True):
+        resultant, behind = _wrench_rows(here)
+        balance = unit.spread(unit.of_modes(elastic)) - jnp.einsum(
+            "nwm,nwz->nmz", at.flexure.twist, resultant
+        )
+    for tendon, span in zip(here.tendons, at.spans, strict=True):
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, tendon.gap_tension)
     for group, touch, force in zip(chain.lips, at.touches, unit.lips, strict=True):
         if touch.slope is not None:
             closing = group.closes[..., None] * touch.slope
             balance = balance - jnp.einsum("nlm,lz->nmz", closing, force)
-    height = notch_heights(chain)[:, None, None]
-    stiff = chain.lip_stiffness[:, None, None]
-    residual = [balance / chain.stiffness[..., None]]
-    for group, touch, force, own, contact in zip(
-        chain.lips, at.touches, unknowns.lip_force, unit.lips, contacts, strict=True
-    ):
-        presses = is_active(chain.lip_stiffness, group.closes, force, touch.gap)[..., None]
-        closing = unit.spread(contact.gap)
-        residual.append(jnp.where(presses, closing / height, own[None] / (stiff * height)))
-    residual += [
-        _friction(chain, k, unknowns, memory, at, unit, tendon) for k, tendon in enumerate(tendons)
-    ]
-    onward = [-unit.spread(moves.relative[number]) for number in range(form.older)]
-    onward += [] if moves.turn is None else [moves.turn]
-    onward += [tendon.carried for tendon in tendons]
-    behind += [tendon.drawn for tendon in tendons]
-    behind += [tendon.stretch for tendon in tendons if tendon.stretch is not None]
-    return LinearisedRows(*(_stacked(chain, rows, form) for rows in (residual, onward, behind)))
+    return balance, behind
 
 
 # A mode that resists by less than this part of its stiffness at rest is taken to resist so much:
@@ -133,89 +158,108 @@ _LEAST_SLOPE = 1e-8
 
 
 def _never_singular(chain: Chain, elastic: Float[Array, "n m m"]) -> Float[Array, "n m m"]:
-    """Keep a plateau of the material's law from leaving a mode without a pivot.
+    """Keep a plateau of the material law from leaving a mode without a pivot.
 
     Just beyond the strain where plastic hardening begins (exp(b / x) at x = 0) the law is flat to
     the last digit. The modes are eliminated first, so their pivots must not vanish there, though
     friction makes the whole system regular; without friction the step becomes long but finite, and
     the limits of a step apply to it.
     """
-    own = jnp.diagonal(elastic, axis1=1, axis2=2)
+    diagonal = jnp.diagonal(elastic, axis1=1, axis2=2)
     least = _LEAST_SLOPE * chain.stiffness
-    missing = jnp.where(jnp.abs(own) < least, least, 0.0)
+    missing = jnp.where(jnp.abs(diagonal) < least, least, 0.0)
     return elastic + jax.vmap(jnp.diag)(missing)
 
 
-def _stacked(chain: Chain, rows: list[Array], form: RowLayout) -> Float[Array, "n k z"]:
-    """Rows below each other; the flexures as leading axis, also where all have the same."""
-    if not rows:
-        return jnp.zeros((chain.flexures, 0, form.unknowns + form.carried + form.beyond))
-    return jnp.concatenate(rows, axis=1)
+def _contact_rows(here: _Linearisation) -> list[Array]:
+    """Rows of Signorini's condition, for every kind of contacts."""
+    chain, rows = here.chain, list[Array]()
+    height = notch_heights(chain)[:, None, None]
+    stiffness = chain.lip_stiffness[:, None, None]
+    for group, touch, force, unit_force, contact in zip(
+        chain.lips,
+        here.at.touches,
+        here.unknowns.lip_force,
+        here.unit.lips,
+        here.contacts,
+        strict=True,
+    ):
+        active = is_active(chain.lip_stiffness, group.closes, force, touch.gap)[..., None]
+        closing = here.unit.spread(contact.gap)
+        rows.append(jnp.where(active, closing / height, unit_force[None] / (stiffness * height)))
+    return rows
 
 
-def _forces(
-    chain: Chain,
-    unknowns: Unknowns,
-    applied: BodyLoads | None,
-    at: Evaluation,
-    unit: UnitRows,
-    moves: RelativeMotionJacobian,
-    tendons: list[TendonJacobian],
-    contacts: list[ContactJacobian],
-) -> tuple[Float[Array, "n w z"], list[Array]]:
-    """Rows of all that acts on the distal body and beyond, and of what is handed back."""
-    wrenches, pose = at.wrenches, at.flexure.pose
+def _wrench_rows(here: _Linearisation) -> tuple[Float[Array, "n w z"], list[Array]]:
+    """Rows of the resultant on the distal body and beyond, and of the wrenches handed back."""
+    chain, unit, wrenches = here.chain, here.unit, here.at.wrenches
     assert wrenches is not None
-    assert pose is not None
-    ending = jnp.zeros((*wrenches.ending.shape, unit.modes.shape[-1]))
-    for group, span, tendon in zip(chain.groups, at.spans, tendons, strict=True):
+    terminating = _terminating_rows(here)
+    resultant = terminating[:, 0]
+    if unit.transmitted:
+        resultant = resultant + unit.transmitted[0][None]
+    behind = []
+    for number in range(1, chain.window):
+        rows = terminating[:, number]
+        if number < len(unit.transmitted):
+            rows = rows + unit.transmitted[number][None]
+        beyond = wrenches.terminating[:, number] + wrenches.transmitted[:, number]
+        behind.append(_hand_back(here, rows, beyond))
+    if here.applied is not None and here.motion.turn is not None:
+        external = _external_rows(here, here.motion.turn)
+        resultant = resultant + external
+        back = _hand_back(here, external, cast("Array", wrenches.external))
+        behind.append(back if chain.follows else back[:, : here.motion.turn.shape[1]])
+    return resultant, behind
+
+
+def _terminating_rows(here: _Linearisation) -> Float[Array, "n window w z"]:
+    """Rows of the wrenches of spans and contacts that end at the distal body."""
+    chain, at, unit = here.chain, here.at, here.unit
+    assert at.wrenches is not None
+    terminating = jnp.zeros((*at.wrenches.terminating.shape, unit.modes.shape[-1]))
+    for group, span, tendon in zip(chain.groups, at.spans, here.tendons, strict=True):
         if tendon.wrench is not None and span.crossing.wrench is not None:
             along = tendon.gap_tension[:, :, None] * span.crossing.wrench[..., None]
             pull = along + unit.spread(span.gap_tension[..., None, None] * tendon.wrench)
-            ending = ending - jnp.einsum("ntwz,ntk->nkwz", pull, span_mask(chain, group.back))
-    for group, touch, force, own, contact in zip(
-        chain.lips, at.touches, unknowns.lip_force, unit.lips, contacts, strict=True
+            reach = span_mask(chain, group.back)
+            terminating = terminating - jnp.einsum("ntwz,ntk->nkwz", pull, reach)
+    for group, touch, force, unit_force, contact in zip(
+        chain.lips, at.touches, here.unknowns.lip_force, unit.lips, here.contacts, strict=True
     ):
         if contact.wrench is not None and touch.wrench is not None:
-            along = own[None, :, None] * touch.wrench[..., None]
+            along = unit_force[None, :, None] * touch.wrench[..., None]
             along = along + unit.spread(force[..., None, None] * contact.wrench)
             push = group.closes[..., None, None] * along
-            ending = ending + jnp.einsum("nlwz,nlk->nkwz", push, span_mask(chain, group.back))
-    whole = ending[:, 0]
-    if unit.handed:
-        whole = whole + unit.handed[0][None]
-    back = jax.vmap(Motion.wrench)
+            reach = span_mask(chain, group.back)
+            terminating = terminating + jnp.einsum("nlwz,nlk->nkwz", push, reach)
+    return terminating
 
-    def handed_back(rows: Array, wrench: Array) -> Array:
-        """Rows of a wrench that goes along with the distal body, seen from the body before."""
-        turning = jax.vmap(wrench_turn)(wrench)
-        turned = jnp.einsum("nvw,nwz->nvz", turning, moves.relative[0])
-        return back(pose, rows + unit.spread(turned))
 
-    behind = []
-    for number in range(1, chain.window):
-        rows = ending[:, number]
-        if number < len(unit.handed):
-            rows = rows + unit.handed[number][None]
-        beyond = wrenches.ending[:, number] + wrenches.handed[:, number]
-        behind.append(handed_back(rows, beyond))
-    if applied is not None and moves.turn is not None and at.rotation is not None:
-        on_bodies = jax.tree.map(lambda leaf: leaf[1:], applied)
-        turns = jax.vmap(_by_turn)(at.rotation, on_bodies)
-        total = cast("Array", wrenches.outside)
-        own = jnp.einsum("nwa,naz->nwz", turns, moves.turn)
-        axes = moves.turn.shape[1]
-        if chain.follows:
-            outside = unit.outside[None] + own
-        else:
-            # All forces together keep their direction: they turn against the body.
-            against = -jax.vmap(wrench_turn)(total)[:, axes:, :axes]
-            forces = jnp.einsum("nwa,naz->nwz", against, moves.turn)
-            outside = jnp.concatenate([unit.outside[None] + own[:, :axes], forces], axis=1)
-        whole = whole + outside
-        back_here = handed_back(outside, total)
-        behind.append(back_here if chain.follows else back_here[:, :axes])
-    return whole, behind
+def _hand_back(
+    here: _Linearisation, rows: Float[Array, "n w z"], wrench: Float[Array, "n w"]
+) -> Float[Array, "n w z"]:
+    """Rows of a wrench that moves with the distal body, in the frame of the body before."""
+    turning = jax.vmap(wrench_turn)(wrench)
+    turned = jnp.einsum("nvw,nwz->nvz", turning, here.motion.relative[0])
+    pose = cast("Motion", here.at.flexure.pose)
+    return jax.vmap(Motion.wrench)(pose, rows + here.unit.spread(turned))
+
+
+def _external_rows(here: _Linearisation, turn: Float[Array, "n a z"]) -> Float[Array, "n w z"]:
+    """Rows of the external loads on the distal body and beyond."""
+    chain, at, unit = here.chain, here.at, here.unit
+    assert at.wrenches is not None
+    assert at.wrenches.external is not None
+    on_bodies = jax.tree.map(lambda leaf: leaf[1:], here.applied)
+    on_body = jnp.einsum("nwa,naz->nwz", jax.vmap(_by_turn)(at.rotation, on_bodies), turn)
+    if chain.follows:
+        return unit.external[None] + on_body
+    # All forces together keep their direction: they turn against the body.
+    axes = turn.shape[1]
+    against = -jax.vmap(wrench_turn)(at.wrenches.external)[:, axes:, :axes]
+    forces = jnp.einsum("nwa,naz->nwz", against, turn)
+    return jnp.concatenate([unit.external[None] + on_body[:, :axes], forces], axis=1)
 
 
 def _by_turn(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
@@ -228,30 +272,23 @@ def _by_turn(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
     return jax.jacfwd(at_turn)(jnp.zeros(axes))
 
 
-def _friction(
-    chain: Chain,
-    k: int,
-    unknowns: Unknowns,
-    memory: Memory,
-    at: Evaluation,
-    unit: UnitRows,
-    tendon: TendonJacobian,
-) -> Float[Array, "n 2t z"]:
-    """Rows of the memory law of both edges."""
-    group, span, own = chain.groups[k], at.spans[k], unknowns.log_ratio[k]
+def _friction_rows(here: _Linearisation, k: int) -> Float[Array, "n 2t z"]:
+    """Rows of the friction law of both edges, of the k-th group."""
+    chain, span, tendon = here.chain, here.at.spans[k], here.tendons[k]
     exit_turning, entry_turning = span.crossing.exit_turning, span.crossing.entry_turning
     none, one = jnp.zeros_like(exit_turning), jnp.ones_like(exit_turning)
     slopes = [
-        jax.jvp(chain.friction.bounds, (exit_turning, entry_turning), way)[1]
-        for way in ((one, none), (none, one))
+        jax.jvp(chain.friction.bounds, (exit_turning, entry_turning), direction)[1]
+        for direction in ((one, none), (none, one))
     ]
     # Edges, then the turning angles that they depend on.
     slope = jnp.stack([jnp.stack(by_one, axis=-1) for by_one in slopes], axis=-1)
-    limit = jnp.einsum("ntes,nstz->ntez", slip_mask(group)[..., None] * slope, tendon.turning)
-    limit = unit.spread(limit)
+    slope = slip_mask(chain.groups[k])[..., None] * slope
+    limit = here.unit.spread(jnp.einsum("ntes,nstz->ntez", slope, tendon.turning))
     height = notch_heights(chain)[:, None, None, None]
     stuck = -RATE * (tendon.at_edges / height - tendon.log_ratio[None] / STICTION)
-    value, bound = trial_log_ratio(chain, own, span.slid, memory, k), span.bound
+    log_ratio = here.unknowns.log_ratio[k]
+    value, bound = trial_log_ratio(chain, log_ratio, span.slid, here.memory, k), span.bound
     upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
     slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)
     rows = jnp.where(upper | lower, slides, stuck)

@@ -1,4 +1,4 @@
-"""Newton's method on the whole chain, from a state near the answer, with a line search."""
+"""Newton's method with a line search on the whole chain, from a state near the solution."""
 
 from __future__ import annotations
 
@@ -15,21 +15,25 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
 from notchflex.solver.block_elimination import NewtonStep, linear_step
-from notchflex.solver.element import Memory, Unknowns, is_active, notch_heights
-from notchflex.solver.friction_predictor import predict_log_ratios
+from notchflex.solver.element import Iterate, Memory
 from notchflex.solver.residual import Evaluation, evaluate
+from notchflex.solver.step_limits import (
+    LARGEST_LOG_RATIO,
+    limit_closing,
+    limit_slack,
+    predict_contacts,
+)
 
 
 class Settings(Pytree, eq=True):
-    """How hard the solver tries.
+    """Tolerance and limits of the solver.
 
     Attributes:
-        tolerance: Largest scaled imbalance (about an angle, rad) of a solved state.
+        tolerance: Largest scaled residual (about an angle, rad) of a solved state.
         max_iterations: Newton iterations for one load step.
-        max_load_steps: Parts a load may be cut into before the solver gives up.
-        smallest_load_step: Smallest such part, of the whole load.
-        max_all_iterations: Newton iterations for a load, all its parts together: a load that no
-            shape can bear is given up after a while.
+        max_load_steps: Substeps that a load may be divided into.
+        smallest_load_step: Smallest substep, as a fraction of the whole load.
+        max_all_iterations: Newton iterations for a load, all its substeps together.
     """
 
     tolerance: float = 1e-13
@@ -45,31 +49,24 @@ class Settings(Pytree, eq=True):
 
     @classmethod
     def of(cls, numbers: Float[Array, " settings"]) -> Settings:
-        """Settings of a compiled program, from all numbers in order."""
+        """Return the settings of a compiled program, from all numbers in order."""
         return cls(*cast("list[Any]", [numbers[i] for i in range(len(numbers))]))
 
 
 DEFAULT = Settings()
 
 
-class Iterate(NamedTuple):
-    """A guess or an answer: the unknowns and the base tensions."""
-
-    unknowns: Unknowns
-    base_tension: Float[Array, " t"]
-
-
 class NewtonResult(NamedTuple):
-    """Where Newton's method ended.
+    """Result of Newton's method.
 
     Attributes:
-        point: The answer, or the last guess.
+        point: The solution, or the last guess.
         slid: Tendon slid over the contacts there, mm.
         bound: Largest log ratios of the contacts there.
         stroke: Tendon drawn out at the base there, mm.
-        residual: Largest scaled imbalance there.
-        iterations: Iterations taken.
-        converged: Whether the imbalance is within the tolerance.
+        residual: Largest scaled residual there.
+        iterations: Number of iterations.
+        converged: Whether the residual is within the tolerance.
     """
 
     point: Iterate
@@ -82,36 +79,48 @@ class NewtonResult(NamedTuple):
 
 
 class _Search(NamedTuple):
-    """State of the search: the best point, and the part of a step that is tried from it."""
+    """State of the line search.
+
+    Attributes:
+        best: The best point so far.
+        allowed: Norm of the residual that the next point must not exceed.
+        step: Step from the best point.
+        fraction: Fraction of the step that is tried next.
+        tries: Number of points tried from the best one.
+        terminate: Whether the search is over.
+    """
 
     best: NewtonResult
     allowed: Float[Array, ""]
     step: Iterate
-    part: Float[Array, ""]
+    fraction: Float[Array, ""]
     tries: Int[Array, ""]
-    over: Bool[Array, ""]
+    terminate: Bool[Array, ""]
 
 
-# A step may turn a flexure by so much (rad) and change a log ratio by so much; beyond, the
-# linear model says nothing of use. Both are far above what a good step needs.
+class _Problem(NamedTuple):
+    """What is solved: a command on a chain, after a state with base tensions `before` (N)."""
+
+    chain: Chain
+    command: Command
+    memory: Memory
+    before: Float[Array, " t"]
+
+
+# A step may turn a flexure by so much (rad); as `LARGEST_LOG_RATIO`.
 _LARGEST_TURN = 0.5
-_LARGEST_LOG_RATIO = 1.0
 _TRIES = 7
-# The first steps are taken whole, whatever they do to the imbalance: where a tendon turns round,
+# The first steps are taken whole, whatever they do to the residual: where a tendon turns round,
 # all its contacts must leave their bound at once, and the way there is not downhill.
 _UNLIMITED = 8
-# With a stroke given, contacts are put by the play operator in so many first iterations, while the
-# imbalance is above this.
-_PLAYED = 15
-_PLAYED_ABOVE = 1e-4
-# A state whose imbalance has stopped falling at this multiple of the tolerance is as good as
+# With a stroke commanded, the predictor sets the contacts in so many first iterations, while the
+# residual is above this.
+_PREDICTED = 15
+_PREDICTED_ABOVE = 1e-4
+# A state whose residual has stopped falling at this multiple of the tolerance is as good as
 # rounding allows.
 _ROUNDING = 100.0
 _LARGEST_GROWTH = 1e4
-# Lips are brought together by a little more than their gap, so that they count as closed: by this
-# part of the gap, and of the notch's height. Without the latter a gap that is a rounding error
-# would hold every step up at itself, and the lips would neither close nor open.
-_BEYOND, _OVERLAP = 1e-6, 1e-12
 
 
 def newton(
@@ -126,186 +135,138 @@ def newton(
     """Find the equilibrium under a command near a starting point.
 
     Every pass of the loop evaluates one point: the start, a full Newton step, or half of the
-    part tried before where that did not lessen the imbalance.
+    fraction tried before where that did not lessen the residual.
 
     Args:
         chain: The chain.
-        command: What is demanded of the tendons.
-        memory: What the contacts remember; not changed.
+        command: Tensions and strokes commanded, external loads.
+        memory: History of the contacts; not changed.
         before: Base tensions of the last solved state, N.
         start: Where to begin.
-        settings: How hard to try.
-        enough: Imbalance that is small enough, should it be above the tolerance.
+        settings: Tolerance and limits.
+        enough: Residual that is small enough, should it be above the tolerance.
 
     Returns:
-        The result; a failure is told by `converged`, never raised.
+        The result; `converged` is false after a failure.
     """
-    # Rounding grows with the moments that must balance, so the tolerance does, within reason.
-    height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
-    softest = jnp.min(jnp.where(chain.rods.idle > 0.0, jnp.inf, chain.stiffness))
-    turn_per_newton = height / softest
-    largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
-    growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
-    tolerance = settings.tolerance * growth
+    tolerance = _tolerance(chain, start, settings)
     small_enough = jnp.maximum(tolerance, enough)
+    problem = _Problem(chain, command, memory, before)
 
-    def searching(search: _Search) -> Bool[Array, ""]:
-        return ~search.over & (search.best.iterations <= settings.max_iterations)
+    def proceed(search: _Search) -> Bool[Array, ""]:
+        return ~search.terminate & (search.best.iterations <= settings.max_iterations)
 
     def iterate(search: _Search) -> _Search:
         best = search.best
-        point = jax.tree.map(lambda at, by: at + search.part * by, best.point, search.step)
-        here = (point.unknowns, memory, point.base_tension)
-        at = evaluate(chain, *here, command.applied)
-        demand = command_residual(chain, command, point.base_tension, at.base)
-        residual = ravel_pytree((at.residual, demand))[0]
-        largest, size = jnp.max(jnp.abs(residual)), jnp.linalg.norm(residual)
+        y = jax.tree.map(lambda at, by: at + search.fraction * by, best.point, search.step)
+        at = evaluate(chain, y.unknowns, memory, y.base_tension, command.applied)
+        demand = command_residual(chain, command, y.base_tension, at.base)
+        fx = ravel_pytree((at.residual, demand))[0]
+        largest, size = jnp.max(jnp.abs(fx)), jnp.linalg.norm(fx)
         unlimited = (best.iterations < _UNLIMITED) & (best.residual >= _ROUNDING * tolerance)
         falls = size <= search.allowed
         better = falls | (unlimited & jnp.isfinite(size))
         near = best.residual < _ROUNDING * tolerance
         at_rounding = near & (largest >= best.residual) & ~falls
-        taken = better | (jnp.isfinite(size) & (search.tries >= _TRIES) & ~at_rounding)
-        solved = taken & (largest < small_enough)
-        found = NewtonResult(
-            point=point,
-            slid=tuple(span.slid for span in at.spans),
-            bound=tuple(span.bound for span in at.spans),
-            stroke=stroke(chain, point.base_tension, at.base),
-            residual=largest,
-            iterations=best.iterations + 1,
-            converged=(solved | (largest < _ROUNDING * tolerance))
-            & tension_is_bounded(chain, command, point.base_tension),
+        accept = better | (jnp.isfinite(size) & (search.tries >= _TRIES) & ~at_rounding)
+        solved = accept & (largest < small_enough)
+        within = solved | (largest < _ROUNDING * tolerance)
+        new = _result(chain, command, y, at, largest, best.iterations + 1, within)
+        step, fraction = jax.lax.cond(
+            accept & ~solved,
+            lambda: _next_step(problem, new, at, best.iterations),
+            lambda: (search.step, 0.5 * search.fraction),
         )
-
-        def again() -> tuple[Iterate, Array]:
-            step = linear_step(chain, command, *here, at)
-            step = _moderate(chain, point, step)
-            # Where strokes are given, contacts that turn round must not be held up on their way.
-            stops = command.by_stroke is None
-            stopped = partial(_stopped_by_lips, chain, point.unknowns, at, step)
-            turning = stopped(jnp.ones(())) if stops else step
-            turn = jnp.max(jnp.abs(turning.unknowns.modes))
-            logs = [jnp.max(jnp.abs(leaf), initial=0.0) for leaf in step.unknowns.log_ratio]
-            log_ratio = jnp.max(jnp.array([0.0, *logs]))
-            by_turn = jnp.minimum(1.0, _LARGEST_TURN / turn)
-            whole = jnp.minimum(by_turn, _LARGEST_LOG_RATIO / log_ratio)
-            if stops:
-                step = stopped(whole)
-                return Iterate(step.unknowns, step.base_tension), whole
-            assert command.by_stroke is not None
-            early = (
-                jnp.any(command.by_stroke) & (best.iterations < _PLAYED) & (largest > _PLAYED_ABOVE)
-            )
-            limits = memory._replace(bound=found.bound)
-
-            def contacts_put() -> NewtonStep:
-                return _contacts_put(chain, command, limits, before, point, step, whole, by_turn)
-
-            chosen = jax.lax.cond(early, contacts_put, lambda: step)
-            part = jnp.where(early, by_turn, whole)
-            return Iterate(chosen.unknowns, chosen.base_tension), part
-
-        step, part = jax.lax.cond(taken & ~solved, again, lambda: (search.step, 0.5 * search.part))
         return _Search(
-            best=jax.tree.map(lambda old, new: jnp.where(taken, new, old), best, found),
-            allowed=jnp.where(taken, (1.0 - 1e-4) * size, search.allowed),
+            best=jax.tree.map(lambda old, new: jnp.where(accept, new, old), best, new),
+            allowed=jnp.where(accept, (1.0 - 1e-4) * size, search.allowed),
             step=step,
-            part=part,
-            tries=jnp.where(taken, 0, search.tries + 1),
-            over=solved | at_rounding | (~taken & (search.tries >= _TRIES)),
+            fraction=fraction,
+            tries=jnp.where(accept, 0, search.tries + 1),
+            terminate=solved | at_rounding | (~accept & (search.tries >= _TRIES)),
         )
 
+    return jax.lax.while_loop(proceed, iterate, _begin(problem, start)).best
+
+
+def _begin(problem: _Problem, start: Iterate) -> _Search:
+    """The search before anything is evaluated: its first point is the start."""
     nowhere = NewtonResult(
         point=start,
-        slid=memory.slid,
-        bound=memory.bound,
-        stroke=jnp.zeros(chain.tendons),
+        slid=problem.memory.slid,
+        bound=problem.memory.bound,
+        stroke=jnp.zeros(problem.chain.tendons),
         residual=jnp.array(jnp.inf),
         iterations=jnp.array(-1),
         converged=jnp.array(False),
     )
-    search = _Search(
+    return _Search(
         best=nowhere,
         allowed=jnp.array(jnp.inf),
         step=jax.tree.map(jnp.zeros_like, start),
-        part=jnp.ones(()),
+        fraction=jnp.ones(()),
         tries=jnp.zeros((), int),
-        over=jnp.array(False),
+        terminate=jnp.array(False),
     )
-    return jax.lax.while_loop(searching, iterate, search).best
 
 
-def _moderate(chain: Chain, point: Iterate, step: NewtonStep) -> NewtonStep:
-    """A step that changes log ratios of slack tendons by no more than is of use.
-
-    Without tension they act on nothing, and a contact that sticks would throw them about: all that
-    matters is which way it slides. The rest of the step need not be shortened for their sake.
-    """
-    slack = (point.base_tension == 0.0) & (step.base_tension == 0.0)
-    logs = tuple(
-        jnp.where(
-            slack[jnp.array(group.numbers)][None, :, None],
-            jnp.clip(own, -_LARGEST_LOG_RATIO, _LARGEST_LOG_RATIO),
-            own,
-        )
-        for group, own in zip(chain.groups, step.unknowns.log_ratio, strict=True)
-    )
-    return step._replace(unknowns=step.unknowns._replace(log_ratio=logs))
+def _tolerance(chain: Chain, start: Iterate, settings: Settings) -> Float[Array, ""]:
+    """Tolerance for these tensions: rounding grows with the moments that must balance."""
+    height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
+    softest = jnp.min(jnp.where(chain.rods.idle > 0.0, jnp.inf, chain.stiffness))
+    turn_per_newton = height / softest
+    largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
+    growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
+    return settings.tolerance * growth
 
 
-def _stopped_by_lips(
-    chain: Chain, unknowns: Unknowns, at: Evaluation, step: NewtonStep, part: Float[Array, ""]
-) -> NewtonStep:
-    """A step of which a part takes no notch farther than to where its lips meet.
-
-    Beyond, the law of the material would be taken at a bend that the notch cannot have, and what
-    follows from it would open the lips again.
-    """
-    modes = step.unknowns.modes
-    for group, touch, force in zip(chain.lips, at.touches, unknowns.lip_force, strict=True):
-        if touch.slope is None:
-            continue  # bodies have more than one flexure to come together by
-        closing = -part * jnp.einsum("nlm,nm->nl", touch.slope, modes)
-        is_open = ~is_active(chain.lip_stiffness, group.closes, force, touch.gap)
-        stops = is_open & (closing > touch.gap) & (touch.gap > 0.0) & (group.closes > 0.0)
-        reach = (1.0 + _BEYOND) * touch.gap + _OVERLAP * notch_heights(chain)[:, None]
-        allowed = jnp.where(stops, reach / jnp.where(stops, closing, 1.0), 1.0)
-        modes = modes * jnp.minimum(jnp.min(allowed, axis=-1, keepdims=True), 1.0)
-    return step._replace(unknowns=step.unknowns._replace(modes=modes))
-
-
-def _contacts_put(
+def _result(
     chain: Chain,
     command: Command,
-    memory: Memory,
-    before: Float[Array, " t"],
     point: Iterate,
-    step: NewtonStep,
-    whole: Float[Array, ""],
-    part: Float[Array, ""],
-) -> NewtonStep:
-    """A step whose contacts go where their tension would leave them, not where a linear step does.
+    at: Evaluation,
+    residual: Float[Array, ""],
+    iterations: Int[Array, ""],
+    within: Bool[Array, ""],
+) -> NewtonResult:
+    """Result at a point that is within the tolerance, or not."""
+    return NewtonResult(
+        point=point,
+        slid=tuple(span.slid for span in at.spans),
+        bound=tuple(span.bound for span in at.spans),
+        stroke=stroke(chain, point.base_tension, at.base),
+        residual=residual,
+        iterations=iterations,
+        converged=within & tension_is_bounded(chain, command, point.base_tension),
+    )
 
-    It serves while the tensions of tendons drawn by stroke are still to be found, and concerns only
-    these. Stuck contacts, which make a tendon very stiff, must not throw its tension about: it
-    stays moderate. Of the step that is returned `part` is to be taken, of the linear one it would
-    have been `whole`.
-    """
+
+def _next_step(
+    problem: _Problem, new: NewtonResult, at: Evaluation, iterations: Int[Array, ""]
+) -> tuple[Iterate, Float[Array, ""]]:
+    """Step from an accepted point, and the fraction of it to try first."""
+    chain, command, memory, before = problem
+    point = new.point
+    step = linear_step(chain, command, point.unknowns, memory, point.base_tension, at)
+    step = limit_slack(chain, point, step)
+    # Where strokes are commanded, contacts that turn round must not be held up on their way.
+    by_tension = command.by_stroke is None
+    limited = partial(limit_closing, chain, point.unknowns, at, step)
+    turning = limited(jnp.ones(())) if by_tension else step
+    turn = jnp.max(jnp.abs(turning.unknowns.modes))
+    logs = [jnp.max(jnp.abs(leaf), initial=0.0) for leaf in step.unknowns.log_ratio]
+    log_ratio = jnp.max(jnp.array([0.0, *logs]))
+    by_turn = jnp.minimum(1.0, _LARGEST_TURN / turn)
+    whole = jnp.minimum(by_turn, LARGEST_LOG_RATIO / log_ratio)
+    if by_tension:
+        return Iterate(*limited(whole)), whole
     assert command.by_stroke is not None
-    tension = point.base_tension + whole * step.base_tension
-    moderate = jnp.clip(
-        tension, 0.5 * point.base_tension, 2.0 * point.base_tension + chain.closing_force
-    )
-    tension = command.either(moderate, tension)
-    put = predict_log_ratios(chain, before, tension, memory)
-    logs = []
-    for group, there, here, own in zip(
-        chain.groups, put, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True
-    ):
-        sought = command.by_stroke[jnp.array(group.numbers)][None, :, None]
-        logs.append(jnp.where(sought, there - here, whole * own) / part)
-    return NewtonStep(
-        step.unknowns._replace(log_ratio=tuple(logs)),
-        (tension - point.base_tension) / part,
-    )
+    early = iterations < _PREDICTED
+    early = jnp.any(command.by_stroke) & early & (new.residual > _PREDICTED_ABOVE)
+
+    def predicted() -> NewtonStep:
+        limits = memory._replace(bound=new.bound)
+        return predict_contacts(chain, command, limits, before, point, step, whole, by_turn)
+
+    chosen = jax.lax.cond(early, predicted, lambda: step)
+    return Iterate(*chosen), jnp.where(early, by_turn, whole)

@@ -1,13 +1,14 @@
-"""The balance of the whole chain under given unknowns, all flexures at once.
+"""Residual of the whole chain at given unknowns, all flexures at once.
 
-Everything is seen from the bodies: what ends at body j is a wrench about and along its frame. Only
-three things are summed up along the chain: the logarithms of the tensions from the base on, tendon
-set free and stretched from the tip on, and the external loads.
+Wrenches on body j are taken about the origin and along the axes of body j. Three things alone are
+accumulated along the chain: logarithms of tensions from the base, released tendon lengths and
+external loads from the tip.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -23,18 +24,18 @@ from notchflex.solver.element import Memory, Unknowns, clip_symmetric, signorini
 
 
 class TendonSpans(NamedTuple):
-    """A group of t tendons over all flexures, n by t (mm, N).
+    """Tensions and lengths of a group of t tendons over all flexures, n by t (mm, N).
 
     Attributes:
-        crossing: Its way over every gap.
-        tension_ratio: Part of its tension that each edge of the gap leaves it.
+        crossing: Its path over every gap.
+        tension_ratio: Tension beyond each edge of the gap over the tension before it.
         gap_tension: Tension in the gap; 0 where the tendon has no span there.
         body_tension: Tension inside the distal body, likewise.
-        drawn: How much tendon the shape has set free beyond the distal body.
-        stretch: Sum of tension times length beyond, N mm.
-        released_length: As `drawn`, this gap included.
-        tension_length: As `stretch`, this gap and the body included.
-        slid: Tendon slid over both edges toward the base, by the memory's stiffness.
+        released_beyond: Tendon length released by the flexures beyond the distal body.
+        tension_length_beyond: Sum of tension times length beyond it, N mm.
+        released_length: As `released_beyond`, with this gap.
+        tension_length: As `tension_length_beyond`, with this gap and the distal body.
+        slid: Tendon slid over both edges toward the base, with the stiffness of the friction law.
         bound: Largest log ratio at both edges.
     """
 
@@ -42,8 +43,8 @@ class TendonSpans(NamedTuple):
     tension_ratio: Float[Array, "n t 2"]
     gap_tension: Float[Array, "n t"]
     body_tension: Float[Array, "n t"]
-    drawn: Float[Array, "n t"]
-    stretch: Float[Array, "n t"]
+    released_beyond: Float[Array, "n t"]
+    tension_length_beyond: Float[Array, "n t"]
     released_length: Float[Array, "n t"]
     tension_length: Float[Array, "n t"]
     slid: Float[Array, "n t 2"]
@@ -51,34 +52,34 @@ class TendonSpans(NamedTuple):
 
 
 class BodyWrenches(NamedTuple):
-    """What acts on the bodies (moment, force), about and along the frame of body j.
+    """Wrenches (moment, force) on the bodies, about and along the frame of body j.
 
     Attributes:
-        ending: What the spans and lips that end at body j do to the bodies j - m and beyond
+        terminating: Of the spans and contacts that end at body j, on the bodies j - m and beyond
             together, for m = 0 ... window - 1.
-        handed: The same of those that end beyond body j.
-        outside: The external loads on body j and all beyond; None where there are none.
-        whole: All that acts on body j and beyond.
+        transmitted: The same of those that end beyond body j.
+        external: External loads on body j and beyond; None where there are none.
+        resultant: Sum of all on body j and beyond.
     """
 
-    ending: Float[Array, "n window w"]
-    handed: Float[Array, "n window w"]
-    outside: Float[Array, "n w"] | None
-    whole: Float[Array, "n w"]
+    terminating: Float[Array, "n window w"]
+    transmitted: Float[Array, "n window w"]
+    external: Float[Array, "n w"] | None
+    resultant: Float[Array, "n w"]
 
 
 class BaseReaction(NamedTuple):
-    """What comes back to the base.
+    """Sums over the whole chain, at the base.
 
     Attributes:
-        drawn: How much of every tendon the shape has set free, mm.
-        stretch: Sum of tension times length of every tendon, N mm.
-        load: External loads on all bodies, about and along the base; None if there are none.
+        released_length: Length of every tendon released by the shape, mm.
+        tension_length: Sum of tension times length of every tendon, N mm.
+        external: External loads on all bodies, about and along the base; None if there are none.
     """
 
-    drawn: Float[Array, " t"]
-    stretch: Float[Array, " t"]
-    load: Float[Array, " w"] | None
+    released_length: Float[Array, " t"]
+    tension_length: Float[Array, " t"]
+    external: Float[Array, " w"] | None
 
 
 class Evaluation(NamedTuple):
@@ -86,13 +87,13 @@ class Evaluation(NamedTuple):
 
     Attributes:
         flexure: State of every flexure.
-        anchors: Pose of body j seen from the bodies j - 1, j - 2 ..., as second axis; None where
-            nothing acts on bodies.
-        rotation: Rotation of every body against the base; None where no load asks for it.
+        anchors: Pose of body j in the frames of the bodies j - 1, j - 2 ..., as second axis; None
+            where nothing acts on bodies.
+        rotation: Rotation of every body against the base; None without external loads.
         spans: For each group of tendons.
-        touches: For each kind of lips.
-        wrenches: What acts on the bodies; None as the anchors.
-        base: What comes back to the base.
+        touches: For each kind of contacts.
+        wrenches: On the bodies; None as the anchors.
+        base: Sums over the chain, at the base.
         residual: Imbalance, in the form of the unknowns and scaled to be comparable.
     """
 
@@ -113,38 +114,64 @@ def evaluate(
     base_tension: Float[Array, " t"],
     applied: BodyLoads | None,
 ) -> Evaluation:
-    """Judge given unknowns.
+    """Evaluate the residual of the chain, and what it is made of.
 
-    The balance is that of virtual work with the tendon's true work, -T times the change of its
-    span lengths, so that normal and friction forces need not be summed.
+    Equilibrium is stated as virtual work with the true work of the tendon, -T times the change of
+    its span lengths: normal and friction forces need not be summed.
 
     Args:
         chain: The chain.
         unknowns: Its unknowns, flexures as leading axis.
-        memory: What its contacts remember.
+        memory: History of its contacts.
         base_tension: Tension of every tendon at the base, N.
-        applied: Other loads on the bodies; None for a chain assembled for tendons alone.
+        applied: External loads on the bodies; None for a chain assembled for tendons alone.
 
     Returns:
         The evaluation.
     """
     on_bodies = chain.forces_on_bodies
     flexure = flexure_states(chain, unknowns.modes, with_pose=on_bodies)
-    anchors = _anchors(chain, flexure.pose)
+    anchors = _anchor_poses(chain, flexure.pose)
     spans = tuple(
-        _spans(chain, k, cross_gaps(group, chain, flexure, anchors), unknowns, memory, base_tension)
+        _spans(chain, k, _crossings(group, chain, flexure, anchors), unknowns, base_tension)
         for k, group in enumerate(chain.groups)
     )
     touches = tuple(
         jax.vmap(type(group).touch)(group, chain.rods, flexure, select_anchors(anchors, group.back))
         for group in chain.lips
     )
-    wrenches, rotation, load = None, None, None
+    rotation, wrenches, at_base = None, None, None
     if on_bodies:
         assert flexure.pose is not None
-        outside = _outside(flexure.pose, applied)
-        rotation, load = outside.rotation, outside.load
-        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, touches, outside)
+        rotation, external, at_base = _external(flexure.pose, applied)
+        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, touches, external)
+    balance = _balance(chain, unknowns, flexure, spans, touches, wrenches)
+    lip_force = tuple(
+        signorini(chain, group.closes, force, touch.gap)
+        for group, force, touch in zip(chain.lips, unknowns.lip_force, touches, strict=True)
+    )
+    log_ratio = tuple(
+        ratio - clip_symmetric(trial_log_ratio(chain, ratio, span.slid, memory, k), span.bound)
+        for k, (ratio, span) in enumerate(zip(unknowns.log_ratio, spans, strict=True))
+    )
+    residual = Unknowns(balance / chain.stiffness, lip_force, log_ratio)
+    base = BaseReaction(
+        in_tendon_order(chain, tuple(span.released_length[0] for span in spans)),
+        in_tendon_order(chain, tuple(span.tension_length[0] for span in spans)),
+        at_base,
+    )
+    return Evaluation(flexure, anchors, rotation, spans, touches, wrenches, base, residual)
+
+
+def _balance(
+    chain: Chain,
+    unknowns: Unknowns,
+    flexure: FlexureState,
+    spans: tuple[TendonSpans, ...],
+    touches: tuple[Touch, ...],
+    wrenches: BodyWrenches | None,
+) -> Float[Array, "n modes"]:
+    """Virtual work of every strain mode, N mm."""
     balance = flexure.internal
     if chain.elastic is not None:
         balance = jnp.einsum("nmk,nk->nm", chain.elastic, unknowns.modes)
@@ -155,71 +182,54 @@ def evaluate(
         if touch.slope is not None:
             balance = balance - jnp.einsum("nl,nlm->nm", force * group.closes, touch.slope)
     if wrenches is not None:
-        balance = balance - jnp.einsum("nwm,nw->nm", flexure.twist, wrenches.whole)
-    residual = Unknowns(
-        modes=balance / chain.stiffness,
-        lip_force=tuple(
-            signorini(chain, group.closes, force, touch.gap)
-            for group, force, touch in zip(chain.lips, unknowns.lip_force, touches, strict=True)
-        ),
-        log_ratio=tuple(
-            own - clip_symmetric(trial_log_ratio(chain, own, span.slid, memory, k), span.bound)
-            for k, (own, span) in enumerate(zip(unknowns.log_ratio, spans, strict=True))
-        ),
-    )
-    base = BaseReaction(
-        drawn=in_tendon_order(chain, tuple(span.released_length[0] for span in spans)),
-        stretch=in_tendon_order(chain, tuple(span.tension_length[0] for span in spans)),
-        load=load,
-    )
-    return Evaluation(flexure, anchors, rotation, spans, touches, wrenches, base, residual)
+        balance = balance - jnp.einsum("nwm,nw->nm", flexure.twist, wrenches.resultant)
+    return balance
 
 
-def cross_gaps(
+def _crossings(
     group: TendonGroup, chain: Chain, flexure: FlexureState, anchors: Motion | None
 ) -> Crossing:
-    """A group of tendons over all gaps."""
-    own = select_anchors(anchors, group.back) if group.acts_on_bodies else None
-    return jax.vmap(type(group).cross)(group, chain.rods, flexure, own)
+    """Paths of a group of tendons over all gaps."""
+    selected = select_anchors(anchors, group.back) if group.acts_on_bodies else None
+    return jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
 
 
 def select_anchors(anchors: Motion | None, back: Array) -> Motion | None:
-    """Of the bodies before (second axis), for every tendon or lip the one it comes from."""
+    """Select for every tendon or contact the body that it comes from, of those before."""
     if anchors is None:
         return None
 
     def of_leaf(leaf: Array) -> Array:
-        back_to = back.reshape(*back.shape, *(1,) * (leaf.ndim - 2))
-        found = jnp.broadcast_to(leaf[:, :1], (*back.shape, *leaf.shape[2:]))
-        for number in range(1, leaf.shape[1]):
-            found = jnp.where(back_to == number + 1, leaf[:, number][:, None], found)
-        return found
+        return select_back([leaf[:, number] for number in range(leaf.shape[1])], back)
 
     return jax.tree.map(of_leaf, anchors)
 
 
-def _anchors(chain: Chain, pose: Motion | None) -> Motion | None:
-    """Pose of every body seen from those before it, as far as the window reaches."""
+def select_back(by_body: Sequence[Array], back: Array) -> Float[Array, "n t *k"]:
+    """Select values of the first, second ... body before, for every tendon or contact its own."""
+    selected = by_body[0][:, None]
+    for number, values in enumerate(by_body[1:], start=2):
+        here = (back == number).reshape(*back.shape, *(1,) * (values.ndim - 1))
+        selected = jnp.where(here, values[:, None], selected)
+    return jnp.broadcast_to(selected, (*back.shape, *by_body[0].shape[1:]))
+
+
+def _anchor_poses(chain: Chain, pose: Motion | None) -> Motion | None:
+    """Pose of every body in the frames of those before it, as far back as the window reaches."""
     if pose is None:
         return None
-    seen = [pose]
+    poses = [pose]
     before = pose
     for _ in range(chain.window - 1):
-        before = _from_base_side(before, identity(pose.translation.shape[-1]))
-        seen.append(jax.vmap(Motion.then)(before, seen[-1]))
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves, axis=1), *seen)
+        first = identity(pose.translation.shape[-1])
+        before: Motion = jax.tree.map(_shift_from_base, before, first)
+        poses.append(jax.vmap(Motion.then)(before, poses[-1]))
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves, axis=1), *poses)
 
 
-def _from_base_side(values: Any, first: Any) -> Any:
-    """What the flexure before has, and something for the first."""
-    return jax.tree.map(
-        lambda leaf, own: jnp.concatenate([jnp.asarray(own)[None], leaf[:-1]]), values, first
-    )
-
-
-def _from_tip_side(values: Array) -> Array:
-    """What the flexure behind has, and nothing for the last."""
-    return jnp.concatenate([values[1:], jnp.zeros_like(values[:1])])
+def _shift_from_base(values: Array, first: Array) -> Array:
+    """Values of the flexure before; `first` for the first flexure."""
+    return jnp.concatenate([jnp.asarray(first)[None], values[:-1]])
 
 
 def _spans(
@@ -227,25 +237,24 @@ def _spans(
     k: int,
     crossing: Crossing,
     unknowns: Unknowns,
-    memory: Memory,
     base_tension: Float[Array, " t"],
 ) -> TendonSpans:
-    """Tensions, lengths set free and bounds of the k-th group."""
+    """Tensions, released lengths and friction bounds of the k-th group."""
     group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
     at_base = base_tension[jnp.array(group.numbers)][None]
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
-    gap_tension = runs * tension_ratio[..., 0] * _from_base_side(beyond_both, at_base[0])
+    gap_tension = runs * tension_ratio[..., 0] * _shift_from_base(beyond_both, at_base[0])
     body_tension = tension_ratio[..., 1] * gap_tension
     shortening = runs * (group.natural_gap - crossing.length)
     in_body = body_tension * group.body_length
     lengths = jnp.stack([shortening, gap_tension * group.natural_gap + in_body])
-    behind = jnp.cumsum(lengths[:, ::-1], axis=1)[:, ::-1]
-    beyond = behind - lengths
+    summed = jnp.cumsum(lengths[:, ::-1], axis=1)[:, ::-1]
+    beyond = summed - lengths
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None]
-    at_exit = behind[0] + behind[1] / stiffness
+    at_exit = summed[0] + summed[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
     bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
     return TendonSpans(
@@ -253,45 +262,39 @@ def _spans(
         tension_ratio=tension_ratio,
         gap_tension=gap_tension,
         body_tension=body_tension,
-        drawn=beyond[0],
-        stretch=beyond[1],
-        released_length=behind[0],
-        tension_length=behind[1],
+        released_beyond=beyond[0],
+        tension_length_beyond=beyond[1],
+        released_length=summed[0],
+        tension_length=summed[1],
         slid=jnp.stack([at_exit, at_entry], axis=-1),
         bound=slip_mask(group) * jnp.stack(bounds, axis=-1),
     )
 
 
 def slip_mask(group: TendonGroup) -> Float[Array, "n t 2"]:
-    """1 where a tendon can slide over an edge: not where it is fixed, nor where it does not go."""
+    """1 where a tendon can slide over an edge: not where it is fixed, nor where it does not run."""
     return jnp.stack([group.visits, group.visits * (1.0 - group.ends)], axis=-1)
 
 
-class _Outside(NamedTuple):
-    """External loads on all bodies; None where there are none."""
-
-    rotation: Float[Array, "n d d"] | None
-    beyond: Float[Array, "n w"] | None
-    load: Float[Array, " w"] | None
-
-
-def _outside(pose: Motion, applied: BodyLoads | None) -> _Outside:
-    """Sum of the loads on every body and all beyond, in the frame of the body."""
+def _external(
+    pose: Motion, applied: BodyLoads | None
+) -> tuple[Float[Array, "n d d"] | None, Float[Array, "n w"] | None, Float[Array, " w"] | None]:
+    """Rotations of the bodies, sums of the loads on each and beyond in its frame, and on all."""
     if applied is None:
-        return _Outside(None, None, None)
+        return None, None, None
     bodies = body_poses(pose)
-    beyond_base: Motion = jax.tree.map(lambda leaf: leaf[1:], bodies)
-    own = jax.vmap(body_wrench)(beyond_base.rotation, jax.tree.map(lambda leaf: leaf[1:], applied))
-    in_base = jax.vmap(Motion.wrench)(beyond_base, own)
+    distal: Motion = jax.tree.map(lambda leaf: leaf[1:], bodies)
+    wrench = jax.vmap(body_wrench)(distal.rotation, jax.tree.map(lambda leaf: leaf[1:], applied))
+    in_base = jax.vmap(Motion.wrench)(distal, wrench)
     summed = jnp.cumsum(in_base[::-1], axis=0)[::-1]
-    inside = jax.vmap(Motion.wrench_inside)(beyond_base, summed)
-    return _Outside(beyond_base.rotation, inside, summed[0])
+    inside = jax.vmap(Motion.wrench_inside)(distal, summed)
+    return distal.rotation, inside, summed[0]
 
 
 def body_poses(relative: Motion) -> Motion:
-    """Poses of bodies 0 to n in the frame of the base, from the poses between neighbours.
+    """Return the poses of bodies 0 to n in the frame of the base, from those between neighbours.
 
-    First from every second body on, then every fourth, until all are seen from the base.
+    A prefix product: first over pairs, then over fours, until all start at the base.
     """
     dimensions = relative.translation.shape[-1]
     poses = jax.tree.map(
@@ -317,31 +320,32 @@ def _wrenches(
     unknowns: Unknowns,
     spans: tuple[TendonSpans, ...],
     touches: tuple[Touch, ...],
-    outside: _Outside,
+    external: Float[Array, "n w"] | None,
 ) -> BodyWrenches:
-    """What spans, lips and loads do to the bodies."""
+    """Wrenches of spans, contacts and loads on the bodies."""
     size = chain.rods.basis.shape[-2]
-    ending = jnp.zeros((chain.flexures, chain.window, size))
+    terminating = jnp.zeros((chain.flexures, chain.window, size))
     for group, span in zip(chain.groups, spans, strict=True):
         if span.crossing.wrench is not None:
             pull = -span.gap_tension[..., None] * span.crossing.wrench
-            ending = ending + jnp.einsum("ntw,ntk->nkw", pull, span_mask(chain, group.back))
+            terminating += jnp.einsum("ntw,ntk->nkw", pull, span_mask(chain, group.back))
     for group, touch, force in zip(chain.lips, touches, unknowns.lip_force, strict=True):
         if touch.wrench is not None:
             push = (force * group.closes)[..., None] * touch.wrench
-            ending = ending + jnp.einsum("nlw,nlk->nkw", push, span_mask(chain, group.back))
-    handed = [jnp.zeros((chain.flexures, size))]
+            terminating += jnp.einsum("nlw,nlk->nkw", push, span_mask(chain, group.back))
+    transmitted = [jnp.zeros((chain.flexures, size))]
     for number in reversed(range(chain.window - 1)):
-        behind = jax.vmap(Motion.wrench)(pose, ending[:, number + 1] + handed[0])
-        handed.insert(0, _from_tip_side(behind))
-    whole = ending[:, 0] + handed[0]
-    if outside.beyond is not None:
-        whole = whole + outside.beyond
-    return BodyWrenches(ending, jnp.stack(handed, axis=1), outside.beyond, whole)
+        behind = jax.vmap(Motion.wrench)(pose, terminating[:, number + 1] + transmitted[0])
+        from_tip = jnp.concatenate([behind[1:], jnp.zeros_like(behind[:1])])
+        transmitted.insert(0, from_tip)
+    resultant = terminating[:, 0] + transmitted[0]
+    if external is not None:
+        resultant = resultant + external
+    return BodyWrenches(terminating, jnp.stack(transmitted, axis=1), external, resultant)
 
 
 def span_mask(chain: Chain, back: Array) -> Float[Array, "n t window"]:
-    """1 where a span or opening that ends at a body reaches over so many flexures more."""
+    """1 where a span or contact that ends at a body reaches back over so many flexures more."""
     return 1.0 * (back[..., None] > jnp.arange(chain.window)[None, None])
 
 
@@ -349,5 +353,4 @@ def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...])
     """Bring values per group of tendons into the order of the robot's tendons, as last axis."""
     if not grouped:
         return jnp.zeros(0)
-    together = jnp.concatenate(grouped, axis=-1)
-    return together[..., np.argsort(chain.tendon_order)]
+    return jnp.concatenate(grouped, axis=-1)[..., np.argsort(chain.tendon_order)]

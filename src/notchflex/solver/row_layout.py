@@ -1,4 +1,4 @@
-"""What may change at one flexure, in order: the columns of all rows of the linear step."""
+"""Columns of the linearised rows of one flexure: what may change there, in order."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from notchflex.mechanics.chain import Chain
 
 
 class UnitRows(NamedTuple):
-    """Rows of one 1 each, for every number that may change, in the order of the rows' axis.
+    """Unit rows for every number that may change, in the order of the columns.
 
-    How bodies move depends on few of them: rows of motions are short, over the modes and the
-    motions of bodies further back alone, until `spread` puts them among the others.
+    Motions of bodies depend on few of them: their rows are short, over the modes and the motions of
+    bodies further back alone, until `spread` puts them among the others.
     """
 
     modes: Array
@@ -25,10 +25,10 @@ class UnitRows(NamedTuple):
     older: list[Array]
     turn: Array
     tension: list[Array]
-    handed: list[Array]
-    outside: Array
-    drawn: list[Array]
-    stretch: list[Array] | None
+    transmitted: list[Array]
+    external: Array
+    released_length: list[Array]
+    tension_length: list[Array]
 
     @property
     def motions(self) -> list[Array]:
@@ -39,29 +39,28 @@ class UnitRows(NamedTuple):
 
     def of_modes(self, rows: Array) -> Array:
         """Rows over the modes as short rows."""
-        return _padded(rows, sum(len(motion) for motion in self.older))
+        return _pad(rows, sum(len(motion) for motion in self.older))
 
     def spread(self, rows: Array) -> Array:
-        """Short rows over all numbers that may change."""
-        modes, whole = self.modes.shape
-        between = sum(len(own) for own in (*self.lips, *self.log_ratio))
-        beyond = whole - rows.shape[-1] - between
+        """Short rows over all columns."""
+        modes, columns = self.modes.shape
+        between = sum(len(rows) for rows in (*self.lips, *self.log_ratio))
+        beyond = columns - rows.shape[-1] - between
         return jnp.concatenate(
-            [_padded(rows[..., :modes], between), _padded(rows[..., modes:], beyond)], axis=-1
+            [_pad(rows[..., :modes], between), _pad(rows[..., modes:], beyond)], axis=-1
         )
 
 
-def _padded(rows: Array, behind: int) -> Array:
-    return jnp.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, behind)])
+def _pad(rows: Array, columns: int) -> Array:
+    return jnp.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, columns)])
 
 
 @dataclass(frozen=True)
 class RowLayout:
-    """Where everything stands among the numbers that may change at one flexure.
+    """Sizes of the parts of a row: own unknowns, then carried from the base, then from the tip.
 
-    Of a tendon beyond come back the length that is set free and the stretch (tension times length).
-    What slides over a contact depends on one sum of the two alone, and only that comes back where
-    no stroke is demanded.
+    From the tip of a tendon come its released length and its tension times length. Slip over a
+    contact depends on one sum of the two alone; only that is kept where no stroke is commanded.
     """
 
     modes: int
@@ -75,57 +74,46 @@ class RowLayout:
 
     @property
     def unknowns(self) -> int:
-        """Own unknowns of a flexure."""
+        """Number of unknowns of a flexure."""
         return self.modes + sum(self.lips) + 2 * sum(self.tendons)
 
     @property
     def carried(self) -> int:
-        """Numbers that say how what is carried on changes."""
+        """Number of columns carried from the base: motions, turn, tensions last."""
         return self.older * self.wrench + self.turn + sum(self.tendons)
 
     @property
     def beyond(self) -> int:
-        """Numbers that come back, tendons' drawn and stretched lengths last."""
+        """Number of columns that come from the tip: wrenches, loads, tendon lengths last."""
         lengths = (1 + self.by_stroke) * sum(self.tendons)
-        return self.older * self.wrench + self.outside + lengths
+        return self.older * self.wrench + self.external + lengths
 
     @property
-    def outside(self) -> int:
-        """Numbers that say how the external loads beyond change.
+    def external(self) -> int:
+        """Number of columns of the external loads beyond.
 
-        Forces that keep their direction change as the body turns that they are seen from; only
-        their moment comes back.
+        Forces of constant direction change with the turn of the body in whose frame they are
+        given; only their moment comes from the tip.
         """
         return self.wrench if self.turn and self.follows else self.turn
 
-    def units(self) -> UnitRows:
-        """Unit rows of everything, in order."""
-        wrench = [self.wrench] * self.older
-        sizes = [
-            (self.modes,),
-            self.lips,
-            [2 * count for count in self.tendons],
-            wrench,
-            (self.turn,),
-            self.tendons,
-            wrench,
-            (self.outside,),
-            self.tendons,
-            self.tendons if self.by_stroke else (),
-        ]
-        ends = np.cumsum([size for group in sizes for size in group])
+    def unit_rows(self) -> UnitRows:
+        """Unit rows of all columns, in order."""
+        wrenches = [self.wrench] * self.older
+        edges = [2 * count for count in self.tendons]
+        lengths = self.tendons if self.by_stroke else ()
+        own = [[self.modes], self.lips, edges]
+        carried = [wrenches, [self.turn], self.tendons]
+        groups = [*own, *carried, wrenches, [self.external], self.tendons, lengths]
+        ends = np.cumsum([size for group in groups for size in group])
         rows = map(constant, np.split(np.eye(ends[-1]), ends[:-1]))
-        modes, lips, log_ratio, older, turn, tension, handed, far, drawn, stretch = (
-            [next(rows) for _ in group] for group in sizes
-        )
-        strokes = stretch if self.by_stroke else None
-        return UnitRows(
-            modes[0], lips, log_ratio, older, turn[0], tension, handed, far[0], drawn, strokes
-        )
+        parts = [[next(rows) for _ in group] for group in groups]
+        single = {0, 4, 7}  # modes, turn and external loads
+        return UnitRows(*(part[0] if i in single else part for i, part in enumerate(parts)))  # pyright: ignore[reportArgumentType]
 
 
 def row_layout(chain: Chain, *, by_stroke: bool) -> RowLayout:
-    """The layout of a chain whose tendons are given by tension alone, or some by stroke."""
+    """Return the layout for a chain whose tendons are given by tension alone, or some by stroke."""
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
     return RowLayout(
         modes=chain.stiffness.shape[-1],

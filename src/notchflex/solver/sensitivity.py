@@ -22,8 +22,8 @@ from notchflex.solver.continuation import (
     interpolate_command,
     solve_load_step,
 )
-from notchflex.solver.element import Memory
-from notchflex.solver.newton import Iterate, Settings
+from notchflex.solver.element import Iterate, Memory
+from notchflex.solver.newton import Settings
 from notchflex.solver.residual import evaluate
 
 

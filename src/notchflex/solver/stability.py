@@ -1,7 +1,7 @@
-"""Is an equilibrium stable? It is where every eigenvalue of its stiffness has a positive real part.
+"""Stability of an equilibrium: every eigenvalue of its stiffness has a positive real part.
 
-Friction makes the stiffness unsymmetric. Where its symmetric part is positive definite the
-eigenvalues have positive real parts; that is told at a fraction of their cost. The converse does
+Friction makes the stiffness unsymmetric. Where its symmetric part is positive definite, which is
+found at a fraction of their cost, the eigenvalues have positive real parts. The converse does
 not hold (a stuck contact adds the product of two different vectors), so elsewhere the eigenvalues
 themselves are found.
 """
@@ -20,26 +20,22 @@ from notchflex.solver.programs.prepare import PreparedChain
 def stable(
     prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> Bool[np.ndarray, " s"]:
-    """Whether every state is stable, contacts that stick held."""
-    told: list[bool] = []
-    for stiffness, signs in held_stiffness(prepared, commands, solved):
-        told += [
-            sign > 0.0 and bool(_positive_definite(one) or _smallest(one) > 0.0)
-            for one, sign in zip(stiffness, signs, strict=True)
-        ]
-    return np.array(told, bool)
+    """Return whether every state is stable, contacts that stick held."""
+    verdicts = [
+        sign > 0.0 and bool(_positive_definite(one) or _smallest(one) > 0.0)
+        for stiffness, signs in held_stiffness(prepared, commands, solved)
+        for one, sign in zip(stiffness, signs, strict=True)
+    ]
+    return np.array(verdicts, bool)
 
 
 def stability(
     prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
-    """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
-    smallest: list[float] = []
-    signs: list[float] = []
-    for stiffness, sign in held_stiffness(prepared, commands, solved):
-        smallest += [_smallest(one) for one in stiffness]
-        signs += sign.tolist()
-    return np.array(smallest), np.array(signs)
+    """Return the smallest real part of the eigenvalues and the determinant's sign, by state."""
+    found = list(held_stiffness(prepared, commands, solved))
+    smallest = [_smallest(one) for stiffness, _ in found for one in stiffness]
+    return np.array(smallest), np.array([one for _, sign in found for one in sign])
 
 
 def _positive_definite(stiffness: Float[np.ndarray, "m m"]) -> bool:
@@ -52,7 +48,7 @@ def _positive_definite(stiffness: Float[np.ndarray, "m m"]) -> bool:
 
 
 def _smallest(stiffness: Float[np.ndarray, "m m"]) -> float:
-    """Smallest real part of the eigenvalues; NaN where the state is none."""
+    """Smallest real part of the eigenvalues; NaN where the state is not finite."""
     if not np.isfinite(stiffness).all():
         return float("nan")
     return float(np.real(np.linalg.eigvals(stiffness)).min())

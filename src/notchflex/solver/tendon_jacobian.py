@@ -1,4 +1,4 @@
-"""How bodies, tendons and openings answer what changes at every flexure, as rows of the step."""
+"""Jacobians of bodies, tendons and contacts: rows of the linear step at every flexure."""
 
 from __future__ import annotations
 
@@ -15,17 +15,16 @@ from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.motion import Motion, angular, skew, turned
 from notchflex.mechanics.tendon import TendonGroup
 from notchflex.solver.element import Unknowns
-from notchflex.solver.residual import Evaluation, select_anchors
+from notchflex.solver.residual import Evaluation, select_anchors, select_back
 from notchflex.solver.row_layout import UnitRows
 
 
 class RelativeMotionJacobian(NamedTuple):
-    """How bodies move: rows at every flexure.
+    """Motion of the bodies.
 
     Attributes:
-        relative: Motion of the distal body relative to each of those before, in its own frame;
-            short rows.
-        turn: Turn of the distal body against the base; nothing where no load asks for it.
+        relative: Of the distal body relative to each of those before, in its own frame; short rows.
+        turn: Turn of the distal body against the base; None without external loads.
     """
 
     relative: list[Float[Array, "n w short"]]
@@ -33,7 +32,7 @@ class RelativeMotionJacobian(NamedTuple):
 
 
 class TendonJacobian(NamedTuple):
-    """A group of tendons: rows at every flexure.
+    """Rows of a group of tendons.
 
     Attributes:
         turning: Of the turning angles at both edges; short rows.
@@ -41,11 +40,12 @@ class TendonJacobian(NamedTuple):
             act on bodies.
         log_ratio: Of its log ratios.
         gap_tension: Of the tension in the gap.
-        carried: Of the tension handed on.
-        at_edges: Of the tendon slid over both edges, by the memory's stiffness.
-        drawn: Of the tendon set free, this gap included; stretched by the memory's stiffness
-            where no stroke is demanded.
-        stretch: Of tension times length, this gap included; None where no stroke is demanded.
+        carried: Of the tension beyond the distal body.
+        at_edges: Of the tendon slid over both edges.
+        released_length: Of the released length, this gap included; where no stroke is commanded,
+            of its sum with the stretch by the stiffness of the friction law.
+        tension_length: Of tension times length, this gap included; None where no stroke is
+            commanded.
     """
 
     turning: Float[Array, "n 2 t short"]
@@ -54,15 +54,15 @@ class TendonJacobian(NamedTuple):
     gap_tension: Float[Array, "n t z"]
     carried: Float[Array, "n t z"]
     at_edges: Float[Array, "n t 2 z"]
-    drawn: Float[Array, "n t z"]
-    stretch: Float[Array, "n t z"] | None
+    released_length: Float[Array, "n t z"]
+    tension_length: Float[Array, "n t z"] | None
 
 
 class ContactJacobian(NamedTuple):
-    """A kind of lips: rows at every flexure.
+    """Rows of a kind of contacts.
 
     Attributes:
-        gap: Of what is left open; short rows.
+        gap: Of the gap; short rows.
         wrench: Of the wrench on the distal body per force, short rows; None where it does not act
             on bodies.
     """
@@ -74,51 +74,37 @@ class ContactJacobian(NamedTuple):
 def relative_motion_jacobian(
     chain: Chain, at: Evaluation, unit: UnitRows
 ) -> RelativeMotionJacobian:
-    """How the bodies move."""
+    """Linearise the motion of the bodies."""
     pose, twist = at.flexure.pose, at.flexure.twist
     if pose is None or twist is None:
         return RelativeMotionJacobian([], None)
-    own = unit.of_modes(twist)
-    relative = [own]
+    modes = unit.of_modes(twist)
     inside = jax.vmap(Motion.twist_inside, (0, None))
-    for older in unit.motions:
-        relative.append(own - inside(pose, older))
-    if not len(unit.turn):
-        return RelativeMotionJacobian(relative, None)
+    relative = [modes, *(modes - inside(pose, older) for older in unit.motions)]
     axes = len(unit.turn)
-    before = jax.vmap(_turn_inside, (0, None))(pose.rotation, unit.turn)
-    return RelativeMotionJacobian(relative, unit.spread(own[:, :axes]) + before)
+    if not axes:
+        return RelativeMotionJacobian(relative, None)
+    before = jax.vmap(lambda rotation: turned(rotation.T, unit.turn))(pose.rotation)
+    return RelativeMotionJacobian(relative, unit.spread(modes[:, :axes]) + before)
 
 
-def _turn_inside(rotation: Array, axis: Array) -> Array:
-    return turned(rotation.T, axis)
-
-
-def _of_anchors(moves: RelativeMotionJacobian, back: Array) -> Float[Array, "n t w short"]:
-    """Motion relative to the anchor of each tendon or lip."""
-    found = moves.relative[0][:, None]
-    for number, rows in enumerate(moves.relative[1:], start=2):
-        found = jnp.where((back == number)[..., None, None], rows[:, None], found)
-    return jnp.broadcast_to(found, (*back.shape, *moves.relative[0].shape[1:]))
-
-
-def _by_relative(
-    chain: Chain, at: Evaluation, group: TendonGroup | LipGroup, what: Callable[..., Any]
+def _by_relative_motion(
+    chain: Chain, at: Evaluation, group: TendonGroup | LipGroup, response: Callable[..., Any]
 ) -> Any:
-    """Slopes of a crossing or touch by the motion relative to the anchor, as last axis."""
+    """Slopes of a crossing or contact by the motion relative to the anchor, as last axis."""
     size = chain.rods.basis.shape[-2]
     anchors = select_anchors(at.anchors, group.back)
     assert anchors is not None  # acts_on_bodies asks for them
 
-    def one(own: Any, rod: Rod, flexure: Any, seen: Motion) -> Any:
+    def slopes(one: Any, rod: Rod, flexure: Any, anchor: Motion) -> Any:
         def moved(twist: Array) -> Any:
             axes = angular(twist)
             step = Motion(jnp.eye(3 if axes == 3 else 2) + skew(twist[:axes]), twist[axes:])
-            return what(own, rod, flexure, jax.vmap(Motion.then, (0, None))(seen, step))
+            return response(one, rod, flexure, jax.vmap(Motion.then, (0, None))(anchor, step))
 
         return jax.jacfwd(moved)(jnp.zeros(size))
 
-    return jax.vmap(one)(group, chain.rods, at.flexure, anchors)
+    return jax.vmap(slopes)(group, chain.rods, at.flexure, anchors)
 
 
 def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) -> Any:
@@ -126,14 +112,14 @@ def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) ->
     with_pose = at.anchors is not None and group.acts_on_bodies
     anchors = select_anchors(at.anchors, group.back) if with_pose else None
 
-    def one(own: Any, rod: Rod, memory: Any, seen: Motion | None, at_modes: Array) -> Any:
+    def slopes(one: Any, rod: Rod, memory: Any, anchor: Motion | None, at_modes: Array) -> Any:
         def moved(varied: Array) -> Any:
             state = flexure_state(rod, chain.law, memory, varied, with_pose=with_pose)
-            return own.cross(rod, state, seen)
+            return one.cross(rod, state, anchor)
 
         return jax.jacfwd(moved)(at_modes)
 
-    return jax.vmap(one)(group, chain.rods, chain.memory, anchors, modes)
+    return jax.vmap(slopes)(group, chain.rods, chain.memory, anchors, modes)
 
 
 def tendon_jacobian(
@@ -142,70 +128,82 @@ def tendon_jacobian(
     unknowns: Unknowns,
     at: Evaluation,
     unit: UnitRows,
-    moves: RelativeMotionJacobian,
+    motion: RelativeMotionJacobian,
 ) -> TendonJacobian:
-    """What the k-th group of tendons does."""
+    """Linearise the k-th group of tendons."""
     group, span = chain.groups[k], at.spans[k]
-    crossing = span.crossing
+    length, turning, wrench = _crossing_rows(chain, k, unknowns, at, unit, motion)
+    log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
+    runs = group.runs[..., None]
+    ratio = span.tension_ratio[..., None]
+    gap_tension = runs * (
+        ratio[:, :, 0] * unit.tension[k][None] - span.gap_tension[..., None] * log_ratio[None, :, 0]
+    )
+    body_tension = (
+        ratio[:, :, 1] * gap_tension - span.body_tension[..., None] * log_ratio[None, :, 1]
+    )
+    in_body = body_tension * group.body_length[..., None]
+    stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
+    here = gap_tension * group.natural_gap[..., None] + in_body
+    beyond = unit.released_length[k][None]
+    released_length = beyond - runs * unit.spread(length)
+    if not unit.tension_length:
+        tension_length = None
+        at_exit = released_length = released_length + here / stiffness
+        at_entry = beyond + in_body / stiffness
+    else:
+        tension_length = unit.tension_length[k][None] + here
+        at_exit = released_length + tension_length / stiffness
+        at_entry = beyond + (unit.tension_length[k][None] + in_body) / stiffness
+    return TendonJacobian(
+        turning=turning,
+        wrench=wrench,
+        log_ratio=log_ratio,
+        gap_tension=gap_tension,
+        carried=jnp.where(runs > 0.0, body_tension, unit.tension[k][None]),
+        at_edges=jnp.stack([at_exit, at_entry], axis=2),
+        released_length=released_length,
+        tension_length=tension_length,
+    )
+
+
+def _crossing_rows(
+    chain: Chain,
+    k: int,
+    unknowns: Unknowns,
+    at: Evaluation,
+    unit: UnitRows,
+    motion: RelativeMotionJacobian,
+) -> tuple[Array, Array, Array | None]:
+    """Short rows of span length, turning angles at both edges and wrench of the k-th group."""
+    group, crossing = chain.groups[k], at.spans[k].crossing
     length, turning, wrench = [], [], None
     if group.acts_on_bodies:
-        slopes = _by_relative(chain, at, group, type(group).cross)
-        move = _of_anchors(moves, group.back)
-        length.append(jnp.einsum("ntw,ntwz->ntz", slopes.length, move))
+        slopes = _by_relative_motion(chain, at, group, type(group).cross)
+        relative = select_back(motion.relative, group.back)
+        length.append(jnp.einsum("ntw,ntwz->ntz", slopes.length, relative))
         both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
-        turning.append(jnp.einsum("nstw,ntwz->nstz", both, move))
-        wrench = jnp.einsum("ntvw,ntwz->ntvz", slopes.wrench, move)
+        turning.append(jnp.einsum("nstw,ntwz->nstz", both, relative))
+        wrench = jnp.einsum("ntvw,ntwz->ntvz", slopes.wrench, relative)
     if group.by_modes:
         slopes = _by_modes(chain, at, group, unknowns.modes)
         if crossing.slope is not None:
             length.append(unit.of_modes(crossing.slope))
         both = jnp.stack([slopes.exit_turning, slopes.entry_turning], axis=1)
         turning.append(unit.of_modes(both))
-    log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
-    runs = group.runs[..., None]
-    tension_ratio = span.tension_ratio[..., None]
-    gap_tension = runs * (
-        tension_ratio[:, :, 0] * unit.tension[k][None]
-        - span.gap_tension[..., None] * log_ratio[None, :, 0]
-    )
-    body_tension = (
-        tension_ratio[:, :, 1] * gap_tension - span.body_tension[..., None] * log_ratio[None, :, 1]
-    )
-    in_body = body_tension * group.body_length[..., None]
-    stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
-    here = gap_tension * group.natural_gap[..., None] + in_body
-    beyond = unit.drawn[k][None]
-    drawn = beyond - runs * unit.spread(cast("Array", sum(length)))
-    if unit.stretch is None:
-        stretch = None
-        at_exit = drawn = drawn + here / stiffness
-        at_entry = beyond + in_body / stiffness
-    else:
-        stretch = unit.stretch[k][None] + here
-        at_exit = drawn + stretch / stiffness
-        at_entry = beyond + (unit.stretch[k][None] + in_body) / stiffness
-    return TendonJacobian(
-        turning=cast("Array", sum(turning)),
-        wrench=wrench,
-        log_ratio=log_ratio,
-        gap_tension=gap_tension,
-        carried=jnp.where(runs > 0.0, body_tension, unit.tension[k][None]),
-        at_edges=jnp.stack([at_exit, at_entry], axis=2),
-        drawn=drawn,
-        stretch=stretch,
-    )
+    return cast("Array", sum(length)), cast("Array", sum(turning)), wrench
 
 
 def contact_jacobian(
-    chain: Chain, k: int, at: Evaluation, unit: UnitRows, moves: RelativeMotionJacobian
+    chain: Chain, k: int, at: Evaluation, unit: UnitRows, motion: RelativeMotionJacobian
 ) -> ContactJacobian:
-    """What the k-th kind of lips does."""
+    """Linearise the k-th kind of contacts."""
     group, touch = chain.lips[k], at.touches[k]
     if touch.slope is not None:
         return ContactJacobian(unit.of_modes(touch.slope), None)
-    slopes = _by_relative(chain, at, group, type(group).touch)
-    move = _of_anchors(moves, group.back)
+    slopes = _by_relative_motion(chain, at, group, type(group).touch)
+    relative = select_back(motion.relative, group.back)
     return ContactJacobian(
-        jnp.einsum("nlw,nlwz->nlz", slopes.gap, move),
-        jnp.einsum("nlvw,nlwz->nlvz", slopes.wrench, move),
+        jnp.einsum("nlw,nlwz->nlz", slopes.gap, relative),
+        jnp.einsum("nlvw,nlwz->nlvz", slopes.wrench, relative),
     )

@@ -30,7 +30,7 @@ def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Arra
     internal = at.flexure.resultants[..., bending]
     required = _along_wall(chain, unknowns, at)
     if at.wrenches is not None:
-        required = required + jax.vmap(_required)(chain.rods, unknowns.modes, at.wrenches.whole)
+        required = required + jax.vmap(_required)(chain.rods, unknowns.modes, at.wrenches.resultant)
     robots = jnp.any(chain.rods.idle == 0.0, axis=-1)
     counts = (robots[:, None] & (chain.rods.length > 0.0))[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]

@@ -14,8 +14,7 @@ from notchflex.mechanics.flexure import FlexureState, in_space, relative_pose, t
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
 from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.moments import moment_error
-from notchflex.solver.element import Unknowns, bound_side
-from notchflex.solver.newton import Iterate
+from notchflex.solver.element import Iterate, Unknowns, bound_side
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.residual import Evaluation, body_poses, evaluate, in_tendon_order
 
@@ -192,11 +191,11 @@ def quantities(chain: Chain, solved: SolverState) -> Quantities:
     turning = _turning(chain, at)
     body_length = in_tendon_order(chain, tuple(group.body_length for group in chain.groups))
     compliance = jnp.broadcast_to(1.0 / chain.axial_stiffness, gap_tension.shape)
-    drawn, stretch = _each(chain, [(s.drawn, s.stretch) for s in at.spans])
+    beyond = _each(chain, [(s.released_beyond, s.tension_length_beyond) for s in at.spans])
     released_length, tension_length = _each(
         chain, [(s.released_length, s.tension_length) for s in at.spans]
     )
-    at_entry = drawn + (stretch + body_tension * body_length) * compliance
+    at_entry = beyond[0] + (beyond[1] + body_tension * body_length) * compliance
     at_exit = released_length + tension_length * compliance
     log_ratio = _each(chain, [(own[..., 0], own[..., 1]) for own in point.unknowns.log_ratio])
     bound = _each(chain, [(s.bound[..., 0], s.bound[..., 1]) for s in at.spans])
@@ -253,10 +252,10 @@ def base_wrench(
     It balances the loads, and the drives' pull on the tendons where they enter the base.
     """
     acting = jnp.zeros(6)
-    if applied is not None and at.base.load is not None:
+    if applied is not None and at.base.external is not None:
         on_base = jax.tree.map(lambda leaf: leaf[0], applied)
         acting = in_space(
-            at.base.load + body_wrench(jnp.eye(on_base.dead_force.shape[-1]), on_base)
+            at.base.external + body_wrench(jnp.eye(on_base.dead_force.shape[-1]), on_base)
         )
         if chain.frame is not None:
             acting = (chain.frame @ acting.reshape(2, 3, 1)).reshape(6)
