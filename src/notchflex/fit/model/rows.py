@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import jax, jit, jnp
 from notchflex.analysis.axis_points import AxisPlaces, points_on_axis
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.outputs import follow_path
@@ -29,7 +29,6 @@ from notchflex.results.path import make_commands
 from notchflex.robot import Robot
 from notchflex.solver.continuation import at_rest
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.kept_xla import kept
 from notchflex.solver.programs.prepare import PreparedChain, pad_prepared
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.threads import number_of_cores, on_cores
@@ -223,7 +222,7 @@ def _piece(paths: int) -> int:
     return next((size for size in _PIECES if size >= each), _PIECES[-1])
 
 
-@kept(9, 10, 11)
+@partial(jit, static_argnums=(9, 10, 11))
 def _follow_all(
     chain: Float[Array, " chain"],
     chain_moves: Float[Array, "k chain"],

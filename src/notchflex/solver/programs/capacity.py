@@ -44,7 +44,7 @@ def padded_indices(own: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " o
     """
     found = [
         whole[tuple(slice(size) for size in part.shape)].ravel()
-        for part, whole in zip(own.places, long.places, strict=True)
+        for part, whole in zip(own.indices, long.indices, strict=True)
     ]
     return np.concatenate(found) if found else np.zeros(0, int)
 

@@ -1,12 +1,13 @@
-"""Compiled functions of the package: made for this processor once, found again on disk.
+"""Functions compiled to machine code for this processor, kept on disk.
 
-`lanewise` makes the programs. Where it cannot (something that it does not know, or a
-program too long to be written out), and on a GPU, XLA makes them, of the same function.
+`lanewise` compiles them. What it cannot compile (an unknown primitive, a program that is too long
+to be written out), and batches on a GPU, are compiled by XLA from the same function.
 """
 
 from __future__ import annotations
 
 import json
+import threading
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
@@ -16,9 +17,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lanewise import Program, UnknownHereError, machine_code, processor, source
-from notchflex._jax import jax, jnp
+from notchflex._jax import jax, jit, jnp
 from notchflex.solver.programs import shipped, store
-from notchflex.solver.programs.kept_xla import Kept, making
 
 # Rows that XLA's programs are made for; more are cut up, fewer filled up.
 _PIECES = (64, 256, 1024)
@@ -26,10 +26,11 @@ _PIECES = (64, 256, 1024)
 _MOST = 96
 # JAX remembers what it traced; it forgets that after so many programs.
 _TRACES = 24
+_making = threading.RLock()
 
 
 class CompiledFunction:
-    """A program, and the form of what it returns.
+    """A program, and the structure of what it returns.
 
     Args:
         content: What `_content` returned, with machine code; plain data, nothing that is run when
@@ -39,14 +40,14 @@ class CompiledFunction:
     def __init__(self, content: bytes) -> None:
         """Read it."""
         head, code = _parts(content)
-        *own, self.form = head
-        self.program = Program(code, *own)
+        *sizes, self._structure = head
+        self._program = Program(code, *sizes)
 
-    def __call__(self, given: Sequence[np.ndarray]) -> Any:
+    def __call__(self, vectors: Sequence[np.ndarray]) -> Any:
         """Return what the function returns, in NumPy's arrays."""
-        flat = self.program(given)
-        rows = () if self.program.by_row is None else flat[0].shape[:1]
-        return _filled(self.form, iter(flat), rows)
+        flat = self._program(vectors)
+        rows = () if self._program.by_row is None else flat[0].shape[:1]
+        return _rebuild(self._structure, iter(flat), rows)
 
 
 def _content(head: Sequence[Any], body: bytes) -> bytes:
@@ -60,23 +61,24 @@ def _parts(content: bytes) -> tuple[list[Any], bytes]:
     return json.loads(head), body
 
 
-def _form(tree: Any) -> Any:
-    """Return a tree of arrays (tuples and dictionaries) as plain data."""
+def _structure(tree: Any) -> Any:
+    """Structure of a tree of arrays (tuples and dictionaries) as plain data."""
     if isinstance(tree, dict):
-        return {name: _form(tree[name]) for name in sorted(tree)}
+        return {name: _structure(tree[name]) for name in sorted(tree)}
     if isinstance(tree, tuple):
         if hasattr(tree, "_fields"):
             raise TypeError("compiled functions return arrays, plain tuples or dictionaries")
-        return ["tuple", *(_form(one) for one in tree)]
+        return ["tuple", *(_structure(one) for one in tree)]
     return ["array", list(tree.shape), np.dtype(tree.dtype).str]
 
 
-def _filled(form: Any, flat: Iterator[np.ndarray], rows: tuple[int, ...]) -> Any:
-    if isinstance(form, dict):
-        return {name: _filled(one, flat, rows) for name, one in form.items()}
-    if form[0] == "tuple":
-        return tuple(_filled(one, flat, rows) for one in form[1:])
-    _, shape, kind = form
+def _rebuild(structure: Any, flat: Iterator[np.ndarray], rows: tuple[int, ...]) -> Any:
+    """The tree of a structure, from its arrays in order."""
+    if isinstance(structure, dict):
+        return {name: _rebuild(one, flat, rows) for name, one in structure.items()}
+    if structure[0] == "tuple":
+        return tuple(_rebuild(one, flat, rows) for one in structure[1:])
+    _, shape, kind = structure
     one = next(flat)
     return (one if kind == "<f8" else one.astype(kind)).reshape(*rows, *shape)
 
@@ -85,10 +87,10 @@ class Native:
     """A function of vectors of floats, compiled.
 
     Args:
-        function: What to compile; vectors come first, then what is no array. It returns an array,
-            or plain tuples and dictionaries of arrays.
-        vectors: How many vectors it takes.
-        long: From the other arguments, sizes of axes that rows are laid out along.
+        function: What to compile; vectors come first, then hashable values that are compiled in. It
+            returns an array, or plain tuples and dictionaries of arrays.
+        vectors: Number of vectors it takes.
+        lanes: From the other arguments, sizes of axes that rows are laid out along.
     """
 
     made: ClassVar[OrderedDict[Any, CompiledFunction | None]] = OrderedDict()
@@ -98,39 +100,17 @@ class Native:
     """How many of them it has traced, not found in the package."""
 
     def __init__(
-        self, function: Callable[..., Any], vectors: int, long: Callable[..., Sequence[int]]
+        self, function: Callable[..., Any], vectors: int, lanes: Callable[..., Sequence[int]]
     ) -> None:
         """Compile nothing yet."""
-        self._function, self._vectors, self._long = function, vectors, long
+        self._function, self._vectors, self._lanes = function, vectors, lanes
         self._name = f"{function.__module__}.{function.__qualname__}"
-        self._kept = Kept(function, tuple(range(vectors, function.__code__.co_argcount)))
-        self._by_xla: dict[Any, Kept] = {}
+        self._jitted: dict[Any, Callable[..., Any]] = {}
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
         """Return the function of some vectors."""
-        made = self._made("once", None, arguments)
-        if made is None:
-            vectors = map(jnp.asarray, arguments[: self._vectors])
-            return jax.tree.map(np.asarray, self._kept(*vectors, *arguments[self._vectors :]))
-        return made(arguments[: self._vectors])
-
-    def rows(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
-        """Return the function of every row of a batch.
-
-        Args:
-            by_row: Which of the vectors are tables, a row for each row of the batch.
-            arguments: As the function takes them.
-
-        Returns:
-            What the function returns, rows as leading axis of all.
-        """
-        made = None
-        if jax.default_backend() == "cpu":
-            made = self._made("rows", by_row, arguments)
-        if made is None:
-            return self._side_by_side(by_row, arguments)
-        return made(arguments[: self._vectors])
+        return self._run("once", None, arguments)
 
     def along(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
         """Return the function of rows one after the other, with a vector carried from row to row.
@@ -143,61 +123,89 @@ class Native:
         Returns:
             What the steps give, steps as leading axis of all.
         """
-        made = self._made("along", by_row, arguments)
-        if made is None:
-            return self._one_by_one(by_row, arguments)
-        return made(arguments[: self._vectors])
+        return self._run("along", by_row, arguments)
+
+    def rows(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
+        """Return the function of every row of a batch.
+
+        Args:
+            by_row: Which of the vectors are tables, a row for each row of the batch.
+            arguments: As the function takes them.
+
+        Returns:
+            What the function returns, rows as leading axis of all.
+        """
+        on_cpu = jax.default_backend() == "cpu"
+        program = self._made("rows", by_row, arguments) if on_cpu else None
+        if program is not None:
+            return program(arguments[: self._vectors])
+        tables = arguments[: self._vectors]
+        count = max(len(one) for one, rows in zip(tables, by_row, strict=True) if rows)
+        piece = next((size for size in _PIECES if size >= count), _PIECES[-1])
+        results: list[Any] = []
+        for start in range(0, count, piece):
+            index = np.minimum(np.arange(start, start + piece), count - 1)
+            some = [one[index] if rows else one for one, rows in zip(tables, by_row, strict=True)]
+            results.append(self._by_xla("rows", by_row, (*some, *arguments[self._vectors :])))
+        return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:count], *results)
 
     def count(self) -> int:
         """Return how many programs there are of it."""
         return sum(key[0] is self for key in Native.made)
 
+    def _run(self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]) -> Any:
+        program = self._made(how, by_row, arguments)
+        if program is None:
+            return self._by_xla(how, by_row, arguments)
+        return program(arguments[: self._vectors])
+
     def _made(
         self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
     ) -> CompiledFunction | None:
+        """The program for these arguments; None where XLA must make it."""
         if getattr(jax.config, "jax_disable_jit"):  # noqa: B009
             return None
         vectors, others = arguments[: self._vectors], arguments[self._vectors :]
         shapes = tuple(
-            np.shape(one)[1:] if by_row is not None and by_row[place] else np.shape(one)
-            for place, one in enumerate(vectors)
+            np.shape(one)[1:] if by_row is not None and by_row[number] else np.shape(one)
+            for number, one in enumerate(vectors)
         )
         key = (self, how, by_row, shapes, others)
         try:
-            found = Native.made[key]
+            program = Native.made[key]
             Native.made.move_to_end(key)
-            return found
+            return program
         except KeyError:
             pass
-        with making:  # threads that ask for the same program wait for the one at work
+        with _making:  # threads that ask for the same program wait for the one at work
             if key not in Native.made:
-                Native.made[key] = self._found(how, by_row, shapes, others)
+                Native.made[key] = self._load(how, by_row, shapes, others)
                 while len(Native.made) > _MOST:
                     Native.made.popitem(last=False)
             return Native.made[key]
 
-    def _found(
+    def _load(
         self,
         how: str,
         by_row: tuple[bool, ...] | None,
         shapes: Sequence[Any],
         others: tuple[Any, ...],
     ) -> CompiledFunction | None:
-        """The program, from disk or made and put there; None where XLA must make it."""
+        """The program, from disk or compiled and put there; None where XLA must make it."""
         key = repr((self._name, how, by_row, shapes, others))
-        own = f"{key} {processor()}"
-        content = store.read(own)
+        on_processor = f"{key} {processor()}"
+        content = store.read(on_processor)
         if content is None:
-            written = self._source(key, how, by_row, shapes, others)
-            if written is None:
+            text = shipped.read(key) or self._trace(key, how, by_row, shapes, others)
+            if text is None:
                 return None
             Native.compiled += 1
-            head, text = _parts(written)
-            content = _content(head, machine_code(text.decode()))
-            store.write(own, content)
+            head, body = _parts(text)
+            content = _content(head, machine_code(body.decode()))
+            store.write(on_processor, content)
         return CompiledFunction(content)
 
-    def _source(
+    def _trace(
         self,
         key: str,
         how: str,
@@ -205,15 +213,11 @@ class Native:
         shapes: Sequence[Any],
         others: tuple[Any, ...],
     ) -> bytes | None:
-        """The program as text: shipped, or written now; None where XLA must make it."""
-        content = shipped.read(key)
-        if content is not None:
-            return content
-        given = [np.zeros(shape) for shape in shapes]
-        function = partial(self._with, others)
+        """The program as text, traced now; None where XLA must make it."""
+        function, zeros = partial(self._with, others), [np.zeros(shape) for shape in shapes]
         try:
             made, tree = source(
-                function, given, self._long(*others), by_row, carries=how == "along"
+                function, zeros, self._lanes(*others), by_row, carries=how == "along"
             )
         except UnknownHereError as error:
             warnings.warn(
@@ -225,66 +229,44 @@ class Native:
         Native.traced += 1
         if Native.traced % _TRACES == 0:
             jax.clear_caches()
-        content = _content([made.sizes, made.room, by_row, _form(tree)], made.text.encode())
+        content = _content([made.sizes, made.room, by_row, _structure(tree)], made.text.encode())
         shipped.record(key, content)
         return content
 
     def _with(self, others: tuple[Any, ...], *vectors: Any) -> Any:
         return self._function(*vectors, *others)
 
-    def _one_by_one(self, by_row: tuple[bool, ...], arguments: tuple[Any, ...]) -> Any:
-        """Steps by a program of XLA."""
-
-        def every(*given: Any) -> Any:
-            vectors, others = given[: self._vectors], given[self._vectors :]
-            along = tuple(one for one, rows in zip(vectors, by_row, strict=True) if rows)
-
-            def step(carry: Any, items: tuple[Any, ...]) -> Any:
-                item = iter(items)
-                fixed = zip(vectors, by_row, strict=True)
-                own = [next(item) if rows else one for one, rows in fixed]
-                return self._function(carry, *own[1:], *others)
-
-            return jax.lax.scan(step, vectors[0], along)[1]
-
+    def _by_xla(self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]) -> Any:
+        """The same by a program of XLA."""
+        others = arguments[self._vectors :]
+        key = (how, by_row, others)
+        if key not in self._jitted:
+            function = partial(self._with, others)
+            if how == "along":
+                function = partial(_scan, function, by_row)
+            elif by_row is not None:
+                function = jax.vmap(function, in_axes=[0 if rows else None for rows in by_row])
+            self._jitted[key] = jit(function)
         vectors = map(jnp.asarray, arguments[: self._vectors])
-        kept = self._xla("along", by_row, every, len(arguments))
-        return jax.tree.map(np.asarray, kept(*vectors, *arguments[self._vectors :]))
+        return jax.tree.map(np.asarray, self._jitted[key](*vectors))
 
-    def _side_by_side(self, by_row: tuple[bool, ...], arguments: tuple[Any, ...]) -> Any:
-        """Rows by a program of XLA, in pieces."""
 
-        def each(*given: Any) -> Any:
-            own = partial(self._with, given[self._vectors :])
-            axes = [0 if rows else None for rows in by_row]
-            return jax.vmap(own, in_axes=axes)(*given[: self._vectors])
+def _scan(function: Callable[..., Any], by_row: tuple[bool, ...], *vectors: Any) -> Any:
+    """Results of a function of rows one after the other, with the first vector carried."""
+    tables = [one if rows else None for one, rows in zip(vectors, by_row, strict=True)]
 
-        many = self._xla("rows", by_row, each, len(arguments))
-        tables, others = arguments[: self._vectors], arguments[self._vectors :]
-        count = max(len(one) for one, rows in zip(tables, by_row, strict=True) if rows)
-        piece = next((size for size in _PIECES if size >= count), _PIECES[-1])
-        found: list[Any] = []
-        for start in range(0, count, piece):
-            index = np.minimum(np.arange(start, start + piece), count - 1)
-            some = [one[index] if rows else one for one, rows in zip(tables, by_row, strict=True)]
-            found.append(jax.tree.map(np.asarray, many(*some, *others)))
-        return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:count], *found)
+    def step(carry: Any, row: list[Any]) -> Any:
+        every = [one if own is None else own for one, own in zip(vectors, row, strict=True)]
+        return function(carry, *every[1:])
 
-    def _xla(
-        self, how: str, by_row: tuple[bool, ...], function: Callable[..., Any], count: int
-    ) -> Kept:
-        key = (how, by_row)
-        if key not in self._by_xla:
-            function.__qualname__ = f"{self._name}.{how}{by_row}"
-            self._by_xla[key] = Kept(function, tuple(range(self._vectors, count)))
-        return self._by_xla[key]
+    return jax.lax.scan(step, vectors[0], tables)[1]
 
 
 def native(
-    vectors: int, long: Callable[..., Sequence[int]]
+    vectors: int, lanes: Callable[..., Sequence[int]]
 ) -> Callable[[Callable[..., Any]], Native]:
     """Make a function a compiled one; see `Native`."""
-    return lambda function: Native(function, vectors, long)
+    return lambda function: Native(function, vectors, lanes)
 
 
 __all__ = ["CompiledFunction", "Native", "native"]

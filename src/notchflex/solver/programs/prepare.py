@@ -1,4 +1,4 @@
-"""A robot ready to be solved again and again: its chain, as arrays and as one vector."""
+"""A robot prepared to be solved again and again: its chain, as arrays and as one vector."""
 
 from __future__ import annotations
 
@@ -42,32 +42,25 @@ class PreparedChain:
 
     @cached_property
     def static_structure(self) -> StaticStructure:
-        """Layout of what is not known of the chain beforehand."""
+        """Numbers of the chain that are compiled in, and the layout of the others."""
         return StaticStructure.of(self.chain_layout, [self.chain], self.vector[None])
 
     @cached_property
-    def dynamic_vector(self) -> Float[np.ndarray, " unknown"]:
-        """That as one vector."""
+    def dynamic_vector(self) -> Float[np.ndarray, " dynamic"]:
+        """Numbers of the chain that are not compiled in, as one vector."""
         return self.static_structure.pack(self.vector)
 
     @cached_property
     def long(self) -> PreparedChain:
-        """The robot with as many flexures as programs are compiled for.
+        """The robot padded to as many flexures as programs are compiled for.
 
-        Its tendons are taken to meet the wall at every edge of every gap; where they do is for the
-        own chain to say (`run.Run`), so that it is no part of a program.
+        Its tendons are taken to touch the wall at every edge of every gap; where they do depends on
+        the own chain (`run.SolverRun`), so that it is no part of a program.
         """
         chain = self.chain
         more = padded(chain, capacity(chain.flexures), chain.contacts.shape[1])
         edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
         return PreparedChain(dataclasses.replace(more, contacts=edges))
-
-    def padded_commands(
-        self, commands: Command
-    ) -> tuple[Float[np.ndarray, "s command"], PytreeLayout]:
-        """Loads packed for the long chain, and the form of one of them."""
-        own, form = self.command_layout(commands), self.long.command_layout(commands)
-        return pad_rows(own.pack(commands, leading=1), own, form), form
 
     @cached_property
     def rest(self) -> SolverState:
@@ -75,40 +68,45 @@ class PreparedChain:
         return at_rest(self.chain)
 
     @cached_property
-    def rest_vector(self) -> np.ndarray:
-        """The same as a vector."""
-        return np.asarray(self.state.pack(self.rest))
-
-    @cached_property
-    def rest_carried(self) -> np.ndarray:
-        """The same, and that nothing has failed yet: what a path begins with."""
-        return np.append(self.rest_vector, 1.0)
-
-    @cached_property
     def state(self) -> PytreeLayout:
         """Layout of a solved state."""
         return PytreeLayout.of(self.rest)
 
-    def command_layout(self, commands: Command) -> PytreeLayout:
-        """Layout of one of some loads: by tensions alone, or some by stroke."""
-        return self._tension_layout if commands.by_stroke is None else self._stroke_layout
+    @cached_property
+    def rest_vector(self) -> np.ndarray:
+        """The free robot as a vector."""
+        return np.asarray(self.state.pack(self.rest))
 
     @cached_property
-    def _tension_layout(self) -> PytreeLayout:
-        return self._form_of_commands(None)
-
-    @cached_property
-    def _stroke_layout(self) -> PytreeLayout:
-        return self._form_of_commands(np.zeros(self.chain.tendons, bool))
-
-    def _form_of_commands(self, by_stroke: np.ndarray | None) -> PytreeLayout:
-        value = constant(np.zeros(self.chain.tendons))
-        return PytreeLayout.of(Command(value, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
+    def rest_carried(self) -> np.ndarray:
+        """The same, and that nothing has failed yet: the beginning of a path."""
+        return np.append(self.rest_vector, 1.0)
 
     @cached_property
     def shape(self) -> PytreeLayout:
-        """Layout of what is told of the shape of every state."""
+        """Layout of the shape of a state."""
         return Shape.form(self.chain.flexures, self.chain.tendons)
+
+    def command_layout(self, commands: Command) -> PytreeLayout:
+        """Return the layout of one of some loads: by tensions alone, or some by stroke."""
+        return self._stroke_layout if commands.by_stroke is not None else self._tension_layout
+
+    @cached_property
+    def _tension_layout(self) -> PytreeLayout:
+        value = constant(np.zeros(self.chain.tendons))
+        return PytreeLayout.of(Command(value, None, unloaded(self.chain)))
+
+    @cached_property
+    def _stroke_layout(self) -> PytreeLayout:
+        value, by_stroke = (np.zeros(self.chain.tendons, kind) for kind in (float, bool))
+        return PytreeLayout.of(Command(value, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
+
+    def padded_commands(
+        self, commands: Command
+    ) -> tuple[Float[np.ndarray, "s command"], PytreeLayout]:
+        """Return s loads packed for the padded chain, and the layout of one of them."""
+        own, long = self.command_layout(commands), self.long.command_layout(commands)
+        return pad_rows(own.pack(commands, leading=1), own, long), long
 
 
 @lru_cache(maxsize=6)
@@ -121,9 +119,9 @@ def prepare(
     refinement: int = 0,
     flat: bool = True,
 ) -> PreparedChain:
-    """A robot ready to be solved; for the arguments see `notchflex.mechanics.chain.assemble`.
+    """Prepare a robot; for the arguments see `notchflex.mechanics.chain.assemble`.
 
-    The last robots asked for are remembered: a control loop solves the same one again and again.
+    The last robots are remembered: a control loop solves the same one again and again.
     """
     return PreparedChain(
         assemble(robot, level, loaded=loaded, follows=follows, refinement=refinement, flat=flat)
@@ -131,7 +129,7 @@ def prepare(
 
 
 def pad_prepared(ready: PreparedChain, flexures: int, edges: int) -> PreparedChain:
-    """A robot ready to be solved beside longer ones; for the arguments see `chain.padded`."""
+    """Pad a robot to be solved beside longer ones; for the arguments see `chain.padded`."""
     chain = ready.chain
     if (chain.flexures, chain.contacts.shape[1]) == (flexures, edges):
         return ready

@@ -1,8 +1,7 @@
-"""Many arrays as one: what goes into a compiled program, and what comes out of it.
+"""Layout of many arrays as one vector: arguments and results of compiled programs.
 
 A chain has some sixty arrays. Handed over one by one they take longer than the solution of a small
-robot; as one vector they cost nothing, robots of one form differ only in its numbers, and a batch
-of robots is a table of them.
+robot; as one vector they cost nothing, and a batch of robots is a table of vectors.
 """
 
 from __future__ import annotations
@@ -17,35 +16,33 @@ from notchflex._jax import array_module, jax
 
 
 class PytreeLayout:
-    """How a tree of arrays is laid out in a vector of floats.
+    """How a tree of arrays is laid out in a vector of floats, leaf after leaf.
 
-    Forms are kept: trees of the same make have the very same form, so that compiled programs tell
-    them apart by identity.
+    Layouts are kept: trees of the same structure have the same object, so that compiled programs
+    distinguish them by identity.
     """
 
     _known: ClassVar[dict[Any, PytreeLayout]] = {}
 
     def __init__(self, structure: Any, shapes: tuple[Any, ...], kinds: tuple[str, ...]) -> None:
-        """Lay out leaves of given shapes and kinds of numbers one after the other."""
+        """Lay out leaves of these shapes and kinds of numbers."""
         self.structure, self.shapes, self.kinds = structure, shapes, kinds
-        sizes = [int(np.prod(shape)) for shape in shapes]
-        self.ends = np.cumsum(sizes)[:-1].tolist()
-        self.size = sum(sizes)
-        self._parts = tuple(map(slice, [0, *self.ends], [*self.ends, self.size]))
+        self._ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)]).tolist()
+        self.size: int = self._ends[-1]
 
     @cached_property
-    def places(self) -> list[np.ndarray]:
-        """Where the numbers of every leaf are in a vector, in the shape of the leaf."""
-        parts = np.split(np.arange(self.size), self.ends)
+    def indices(self) -> list[np.ndarray]:
+        """Indices of the numbers of every leaf in a vector, in the shape of the leaf."""
+        parts = np.split(np.arange(self.size), self._ends[1:-1])
         return [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
 
     def __repr__(self) -> str:
-        """Tell all of it: kept programs are found by this."""
+        """Return all of it: kept programs are found by this."""
         return f"PytreeLayout({self.structure}, {self.shapes}, {self.kinds})"
 
     @classmethod
     def of(cls, tree: Any) -> PytreeLayout:
-        """The form of a tree."""
+        """Return the layout of a tree."""
         leaves, structure = jax.tree.flatten(tree)
         shapes = tuple(np.shape(leaf) for leaf in leaves)
         kinds = tuple(np.dtype(leaf.dtype).kind for leaf in leaves)
@@ -55,7 +52,7 @@ class PytreeLayout:
         return cls._known[key]
 
     def pack(self, tree: Any, leading: int = 0) -> Any:
-        """The leaves of a tree as one vector, or one per entry of so many leading axes.
+        """Return the leaves of a tree as one vector, with so many leading axes.
 
         A vector of NumPy where all leaves are plain.
         """
@@ -66,9 +63,8 @@ class PytreeLayout:
         return xp.concatenate(flat, axis=-1, dtype=float)
 
     def unpack(self, vector: Any) -> Any:
-        """The tree of a vector (NumPy's or JAX's), with the vector's leading axes."""
-        xp = array_module(vector)
-        parts = xp.split(vector, self.ends, axis=-1)
+        """Return the tree of a vector (NumPy's or JAX's), with the vector's leading axes."""
+        parts = array_module(vector).split(vector, self._ends[1:-1], axis=-1)
         leaves = [
             as_kind(part.reshape(*vector.shape[:-1], *shape), kind)
             for part, shape, kind in zip(parts, self.shapes, self.kinds, strict=True)
@@ -76,21 +72,21 @@ class PytreeLayout:
         return jax.tree.unflatten(self.structure, leaves)
 
     def leaf(self, vector: Any, number: int) -> Any:
-        """One leaf of the tree of a vector alone, by its number."""
-        part = vector[..., self._parts[number]]
+        """Return one leaf of the tree of a vector, by its number."""
+        part = vector[..., self._ends[number] : self._ends[number + 1]]
         shape = (*vector.shape[:-1], *self.shapes[number])
         return as_kind(part.reshape(shape), self.kinds[number])
 
 
 def lane_sizes(chain_layout: PytreeLayout, *_others: Any) -> tuple[int, int]:
-    """Sizes of the axes that run along the chain: as many flexures, and bodies, as it has."""
+    """Return the sizes of the axes that run along the chain: its flexures, and its bodies."""
     one = jax.ShapeDtypeStruct((chain_layout.size,), float)
     chain = jax.eval_shape(chain_layout.unpack, one)
     return chain.flexures, chain.flexures + 1
 
 
 def as_kind(values: Array, kind: str) -> Array:
-    """Floats as numbers of their own kind."""
+    """Return floats as numbers of a kind of NumPy's."""
     if kind == "b":
         return values != 0.0
     return values.astype(int) if kind in "iu" else values

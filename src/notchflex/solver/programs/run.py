@@ -1,14 +1,15 @@
-"""The compiled programs: a path of loads with memory, or many loads each from rest.
+"""The compiled programs: a path of loads with history, or many loads each from rest.
 
 Compiled once for a form (kinds of flexures, modes, tendons and laws); a new load or a new robot of
 the same form runs the same program. The number of loads is known only when a program is called, and
-chains are lengthened to one of few numbers of flexures (`capacity.py`). Derived quantities of the
+chains are padded to one of few numbers of flexures (`capacity.py`). Derived quantities of the
 states are another program, run when they are asked for.
 """
 
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -16,7 +17,7 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import SolverState, solve_load_step
+from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
 from notchflex.solver.derived.quantities import Shape, notch_lips, quantities, shape, unpad_quantity
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.capacity import pad_rows, padded_indices
@@ -27,105 +28,96 @@ from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.residual import evaluate
 from notchflex.solver.stability import stability, stable
 
-# Beside states and shape: residual, iterations, converged, tried, reached, parts, part before.
-_TOLD = 7
+# Columns behind the two states and the shape, see `_status`.
+_STATUS = 7
+
+
+def _column(number: int, kind: type = float) -> Any:
+    """A property with a column of the status of every load."""
+
+    def values(run: SolverRun) -> np.ndarray:
+        return run.table[:, number - _STATUS].astype(kind, copy=False)
+
+    return cached_property(values)
 
 
 class SolverRun:
-    """States of many loads, loads as leading axis."""
+    """States of s loads, loads as leading axis, and how each was reached.
 
-    def __init__(self, prepared: PreparedChain, start: np.ndarray, table: np.ndarray) -> None:
-        """Take what the program returned for the long chain."""
-        self._prepared, self.first, self._table = prepared, start, table
+    Attributes:
+        first: The state before the first load, packed.
+        table: What the program returned, for the padded chain.
+        residual: Largest scaled residual of the last attempt.
+        iterations: Newton iterations.
+        converged: Whether the load was reached.
+        tried: Whether it was tried at all; after a failure the rest of a path is not.
+        reached: Fraction of the load step that was reached.
+        parts: Number of substeps that converged.
+        part_before: Fraction of the load step at which the last of them began.
+    """
 
-    def _told(self, number: int) -> np.ndarray:
-        return self._table[:, number - _TOLD]
+    residual: Float[np.ndarray, " s"] = _column(0)
+    iterations: Int[np.ndarray, " s"] = _column(1, int)
+    converged: Bool[np.ndarray, " s"] = _column(2, bool)
+    tried: Bool[np.ndarray, " s"] = _column(3, bool)
+    reached: Float[np.ndarray, " s"] = _column(4)
+    parts: Int[np.ndarray, " s"] = _column(5, int)
+    part_before: Float[np.ndarray, " s"] = _column(6)
 
-    @cached_property
-    def residual(self) -> Float[np.ndarray, " s"]:
-        """Largest scaled imbalance of the last attempt."""
-        return self._told(0)
-
-    @cached_property
-    def iterations(self) -> Int[np.ndarray, " s"]:
-        """Newton iterations."""
-        return self._told(1).astype(int)
-
-    @cached_property
-    def converged(self) -> Bool[np.ndarray, " s"]:
-        """Whether the load was reached."""
-        return self._told(2) != 0.0
-
-    @cached_property
-    def tried(self) -> Bool[np.ndarray, " s"]:
-        """Whether it was tried at all; after a failure the rest of a path is not."""
-        return self._told(3) != 0.0
-
-    @cached_property
-    def reached(self) -> Float[np.ndarray, " s"]:
-        """Part of the way from the load before that was reached."""
-        return self._told(4)
-
-    @cached_property
-    def parts(self) -> Int[np.ndarray, " s"]:
-        """How many parts of that way were solved one after the other."""
-        return self._told(5).astype(int)
-
-    @cached_property
-    def part_before(self) -> Float[np.ndarray, " s"]:
-        """Part of the way at which the last of them began."""
-        return self._told(6)
+    def __init__(self, prepared: PreparedChain, first: np.ndarray, table: np.ndarray) -> None:
+        """Take what the program returned."""
+        self._prepared, self.first, self.table = prepared, first, table
 
     @cached_property
     def states(self) -> Float[np.ndarray, "s state"]:
         """The last solved state at each load, packed: its own, or as far as it was followed."""
-        return self._own_state(0)
+        return self._unpadded_state(0)
 
     @cached_property
     def between(self) -> Float[np.ndarray, "s state"]:
-        """The state before the last part of the way to each load, packed."""
-        return self._own_state(self._prepared.long.state.size)
+        """The state before the last substep of each load, packed."""
+        return self._unpadded_state(self._prepared.long.state.size)
 
-    def _own_state(self, start: int) -> Float[np.ndarray, "s state"]:
+    def _unpadded_state(self, start: int) -> Float[np.ndarray, "s state"]:
         own, long = self._prepared.state, self._prepared.long.state
-        return self._table[:, start + padded_indices(own, long)]
+        return self.table[:, start + padded_indices(own, long)]
 
     @cached_property
     def solved(self) -> SolverState:
-        """The same, unpacked."""
+        """The states, unpacked."""
         return self._prepared.state.unpack(self.states)
 
     @cached_property
-    def _more(self) -> dict[str, np.ndarray]:
-        """What is reported of the state before the first load and of each state, by name."""
+    def _derived(self) -> dict[str, np.ndarray]:
+        """Derived quantities of the state before the first load and of each state, by name."""
         own, long = self._prepared, self._prepared.long
         rows = pad_rows(np.concatenate([self.first[None], self.states]), own.state, long.state)
-        given = (np.zeros(1), long.dynamic_vector, rows, long.static_structure, long.state)
-        every = _quantities.along((False, False, True), *given)
+        vectors = (np.zeros(1), long.dynamic_vector, rows)
+        every = _quantities.along((False, False, True), *vectors, long.static_structure, long.state)
         return {name: unpad_quantity(own.chain, name, values) for name, values in every.items()}
 
     def quantity(self, name: str) -> np.ndarray:
-        """What is reported of each state, by its name in `Shape` or `Quantities`."""
+        """Return a quantity of each state, by its name in `Shape` or `Quantities`."""
         if name not in Shape._fields:
-            return self._more[name][1:]
+            return self._derived[name][1:]
         long = self._prepared.long
-        packed = self._table[:, 2 * long.state.size : -_TOLD]
+        packed = self.table[:, 2 * long.state.size : -_STATUS]
         values = long.shape.leaf(packed, Shape._fields.index(name))
         return unpad_quantity(self._prepared.chain, name, values)
 
     def before(self, name: str) -> np.ndarray:
-        """A quantity of the state before the first load; of the shape only tension and stroke."""
+        """Return a quantity of the state before the first load; of its shape tension and stroke."""
         if name not in ("tension", "stroke"):
-            return self._more[name][0]
+            return self._derived[name][0]
         start: SolverState = self._prepared.state.unpack(self.first)
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
-        """Smallest real part of the stiffness's eigenvalues and sign of the determinant."""
+        """Return the smallest real part of the stiffness's eigenvalues, and its determinant's sign."""
         return stability(self._prepared, commands, self.solved)
 
     def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:
-        """Whether each state is stable: what the two say, found at less cost."""
+        """Return whether each state is stable: what the two say, found at less cost."""
         return stable(self._prepared, commands, self.solved)
 
 
@@ -143,68 +135,24 @@ def run(
         prepared: The robot.
         commands: The loads, as leading axis.
         start: The state before the first; rest where None.
-        settings: How hard to try.
+        settings: Tolerance and limits.
         each_from_start: Whether every load starts from `start`.
 
     Returns:
         One entry per load.
     """
-    options = _options(settings, each_from_start)
     long = prepared.long
     packed, form = prepared.padded_commands(commands)
-    forms = (long.static_structure, form, long.state)
     first, start_row, carried = prepared.rest_vector, long.rest_vector, long.rest_carried
     if start is not None:
         first = np.asarray(prepared.state.pack(start))
         start_row = pad_rows(first, prepared.state, long.state)
         carried = np.append(start_row, 1.0)
-    rows = (False, False, True, False, False)
-    table = _follow.along(rows, carried, long.dynamic_vector, packed, start_row, options, *forms)
+    options = _options(settings, each_from_start)
+    vectors = (carried, long.dynamic_vector, packed, start_row, options)
+    by_row = (False, False, True, False, False)
+    table = _follow.along(by_row, *vectors, long.static_structure, form, long.state)
     return SolverRun(prepared, first, table)
-
-
-def solve_contacts(
-    prepared: PreparedChain, commands: Command, start: SolverState, settings: Settings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Contact forces (N) and gaps (mm) of all notches, each load from the same state.
-
-    A small program beside `run`, for questions that are asked again and again: only whether the
-    notches are closed, and no other quantity.
-
-    Returns:
-        Contact forces and gaps, loads by notches, and which loads converged.
-    """
-    long = prepared.long
-    packed, form = prepared.padded_commands(commands)
-    forms = (long.static_structure, form, long.state)
-    before = pad_rows(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
-    given = (np.zeros(1), long.dynamic_vector, packed, before, np.array(settings.numbers))
-    force, gap, converged = _solve_contacts.along(
-        (False, False, True, False, False), *given, *forms
-    )
-    own = prepared.chain.flexures
-    return force[:, :own], gap[:, :own], converged
-
-
-@native(5, lane_sizes)
-def _solve_contacts(
-    carried: Float[Array, " one"],
-    vector: Float[Array, " chain"],
-    load: Float[Array, " command"],
-    start: Float[Array, " state"],
-    numbers: Float[Array, " settings"],
-    chain_layout: StaticStructure,
-    command_layout: PytreeLayout,
-    state_layout: PytreeLayout,
-) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Contact forces and gaps of one load, and whether it converged; nothing is carried on."""
-    chain, settings = chain_layout.unpack(vector), Settings.of(numbers)
-    came = solve_load_step(chain, command_layout.unpack(load), state_layout.unpack(start), settings)
-    point = came.solved.point
-    at = evaluate(
-        chain, point.unknowns, came.solved.memory, point.base_tension, came.solved.applied
-    )
-    return carried, (*notch_lips(chain, point.unknowns, at), came.converged)
 
 
 @lru_cache(maxsize=64)
@@ -223,8 +171,8 @@ def _follow(
     chain_layout: StaticStructure,
     command_layout: PytreeLayout,
     state_layout: PytreeLayout,
-) -> tuple[Float[Array, " state+1"], Float[Array, " told"]]:
-    """The two states of a load, their shape, and how it went.
+) -> tuple[Float[Array, " state+1"], Float[Array, " row"]]:
+    """The two states of a load, their shape, and how the load was reached.
 
     Carried from load to load is the last solved state, and whether all loads so far converged.
     """
@@ -234,29 +182,28 @@ def _follow(
     alive = carried[-1] > 0.0
     before = jnp.where(each_from_start, start, carried[:-1])
 
-    def try_it() -> tuple[Array, Array, Array]:
-        came = solve_load_step(
-            chain, command_layout.unpack(load), state_layout.unpack(before), settings
-        )
-        told = [came.residual, came.iterations, came.converged, True, came.reached]
-        told += [came.parts, came.part_before]
-        found = shape(chain, came.solved)
-        told = jnp.concatenate(
-            [
-                state_layout.pack(came.between),
-                PytreeLayout.of(found).pack(found),
-                jnp.stack([jnp.asarray(x, float) for x in told]),
-            ]
-        )
-        return state_layout.pack(came.solved), told, came.converged
+    def solve() -> tuple[Array, Array, Array]:
+        command, last = command_layout.unpack(load), state_layout.unpack(before)
+        result = solve_load_step(chain, command, last, settings)
+        form = shape(chain, result.solved)
+        parts = [state_layout.pack(result.between), PytreeLayout.of(form).pack(form)]
+        row = jnp.concatenate([*parts, _status(result)])
+        return state_layout.pack(result.solved), row, result.converged
 
     def skip() -> tuple[Array, Array, Array]:
-        told = jnp.zeros(Shape.form(chain.flexures, chain.tendons).size + _TOLD)
-        return before, jnp.concatenate([before, told.at[-_TOLD].set(jnp.nan)]), alive
+        rest = jnp.zeros(Shape.form(chain.flexures, chain.tendons).size + _STATUS)
+        return before, jnp.concatenate([before, rest.at[-_STATUS].set(jnp.nan)]), alive
 
-    solved, told, converged = jax.lax.cond(alive | each_from_start, try_it, skip)
+    solved, row, converged = jax.lax.cond(alive | each_from_start, solve, skip)
     goes_on = jnp.where(alive & converged, 1.0, 0.0)
-    return jnp.append(solved, goes_on), jnp.concatenate([solved, told])
+    return jnp.append(solved, goes_on), jnp.concatenate([solved, row])
+
+
+def _status(result: LoadStepResult) -> Float[Array, " status"]:
+    """How a load was reached, in the order of the columns of `SolverRun`."""
+    status = [result.residual, result.iterations, result.converged, True, result.reached]
+    status += [result.parts, result.part_before]
+    return jnp.stack([jnp.asarray(value, float) for value in status])
 
 
 @native(3, lane_sizes)
@@ -267,5 +214,46 @@ def _quantities(
     chain_layout: StaticStructure,
     state_layout: PytreeLayout,
 ) -> tuple[Array, dict[str, Array]]:
-    """What is reported of a state beyond its shape, by name; nothing is carried on."""
+    """Derived quantities of a state beyond its shape, by name; nothing is carried on."""
     return carried, quantities(chain_layout.unpack(vector), state_layout.unpack(state))._asdict()
+
+
+def solve_contacts(
+    prepared: PreparedChain, commands: Command, start: SolverState, settings: Settings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find contact forces (N) and gaps (mm) of all notches, each load from the same state.
+
+    A small program beside `run`, for searches that ask only whether the notches are closed.
+
+    Returns:
+        Contact forces and gaps, loads by notches, and which loads converged.
+    """
+    long = prepared.long
+    packed, form = prepared.padded_commands(commands)
+    before = pad_rows(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
+    vectors = (np.zeros(1), long.dynamic_vector, packed, before, np.array(settings.numbers))
+    force, gap, converged = _solve_contacts.along(
+        (False, False, True, False, False), *vectors, long.static_structure, form, long.state
+    )
+    own = prepared.chain.flexures
+    return force[:, :own], gap[:, :own], converged
+
+
+@native(5, lane_sizes)
+def _solve_contacts(
+    carried: Float[Array, " one"],
+    vector: Float[Array, " chain"],
+    load: Float[Array, " command"],
+    start: Float[Array, " state"],
+    numbers: Float[Array, " settings"],
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Contact forces and gaps of one load, and whether it converged; nothing is carried on."""
+    chain, settings = chain_layout.unpack(vector), Settings.of(numbers)
+    command, last = command_layout.unpack(load), state_layout.unpack(start)
+    result = solve_load_step(chain, command, last, settings)
+    (unknowns, base_tension), memory, _, applied = result.solved
+    at = evaluate(chain, unknowns, memory, base_tension, applied)
+    return carried, (*notch_lips(chain, unknowns, at), result.converged)

@@ -1,7 +1,7 @@
 """The folder of compiled programs: private to its user, verified, and bounded in size.
 
-What lies there is machine code and is run. So it is taken only from a folder and from files that
-belong to the user and that nobody else can write to; links are not followed.
+Machine code is run only from a folder and files that belong to the user and that nobody else can
+write to; links are not followed.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ _PREFIX = "program-"
 # Folders of notchflex whose code no program is made from. All of `lanewise` makes programs.
 _NOT_COMPILED = {"bench", "cli", "plotting", "viewer"}
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 _POSIX = hasattr(os, "geteuid") and os.open in os.supports_dir_fd
 
 
@@ -66,16 +67,16 @@ def program_folder() -> Path | None:
 
 def read(key: str) -> bytes | None:
     """Return what is kept under a key; None where there is nothing that is whole and private."""
-    folder = program_folder()
-    if folder is None:
+    root = program_folder()
+    if root is None:
         return None
     try:
-        with _opened(folder) as at, os.fdopen(_open(folder, at, _name(key)), "rb") as file:
+        with _opened(root) as folder, os.fdopen(folder.open(_name(key)), "rb") as file:
             if not _private(os.fstat(file.fileno()), stat.S_ISREG):
                 return None
             content = file.read()
             with suppress(OSError):  # the time of the last use
-                os.utime(file.fileno() if _POSIX else folder / _name(key))
+                os.utime(file.fileno() if _POSIX else root / _name(key))
     except OSError:
         return None
     digest, content = content[:_DIGEST], content[_DIGEST:]
@@ -84,20 +85,20 @@ def read(key: str) -> bytes | None:
 
 def write(key: str, content: bytes) -> None:
     """Keep content under a key, whole or not at all; nothing happens where it cannot be kept."""
-    folder = program_folder()
-    if folder is None:
+    root = program_folder()
+    if root is None:
         return
     temporary = f".{_name(key)}.{os.getpid()}"
-    with suppress(OSError), _opened(folder) as at:
+    with suppress(OSError), _opened(root) as folder:
         try:
-            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
-            with os.fdopen(_open(folder, at, temporary, flags), "wb") as file:
+            with os.fdopen(folder.open(temporary, _NEW_FILE), "wb") as file:
                 file.write(hashlib.sha256(content).digest() + content)
-            _replace(folder, at, temporary, _name(key))
+            old, new, at = folder.path(temporary), folder.path(_name(key)), folder.descriptor
+            os.replace(old, new, src_dir_fd=at, dst_dir_fd=at)
         finally:
             with suppress(OSError):
-                _remove(folder, at, temporary)
-        _shrink(folder)
+                os.unlink(folder.path(temporary), dir_fd=folder.descriptor)
+        _shrink(root)
 
 
 def usage() -> Usage:
@@ -112,7 +113,7 @@ def clear() -> Usage:
     before, folder = usage(), program_folder()
     for _, _, name in [] if folder is None else _files(folder):
         with suppress(OSError):
-            os.unlink(os.path.join(os.fspath(folder or ""), name))
+            os.unlink(os.path.join(folder or "", name))
     return before
 
 
@@ -163,11 +164,27 @@ def _checked(folder: Path) -> Path | None:
         return None
 
 
+class _Opened(NamedTuple):
+    """A folder that was checked; with a descriptor, the very one that was."""
+
+    folder: Path
+    descriptor: int | None
+
+    def path(self, name: str) -> str:
+        """Return the path of a file, relative to the descriptor if there is one."""
+        return os.fspath(self.folder / name) if self.descriptor is None else name
+
+    def open(self, name: str, flags: int = os.O_RDONLY) -> int:
+        """Open a file; links are not followed."""
+        flags |= getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
+        return os.open(self.path(name), flags, 0o600, dir_fd=self.descriptor)
+
+
 @contextmanager
-def _opened(folder: Path) -> Generator[int | None]:
+def _opened(folder: Path) -> Generator[_Opened]:
     """Open the folder, so that the one that was checked is the one that is used."""
     if not _POSIX:
-        yield None
+        yield _Opened(folder, None)
         return
     at = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
@@ -176,36 +193,15 @@ def _opened(folder: Path) -> Generator[int | None]:
                 f"compiled programs are not kept in {folder}: it belongs to others or others can "
                 f"write to it; make it private (chmod go-w) or choose another with {VARIABLE}"
             )
-        yield at
+        yield _Opened(folder, at)
     finally:
         os.close(at)
 
 
-def _private(found: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
+def _private(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
     """Whether a file or folder is the user's own and nobody else can write to it."""
-    own = not _POSIX or (found.st_uid == os.geteuid() and not found.st_mode & _OTHERS_WRITE)
-    return is_kind(found.st_mode) and own
-
-
-def _open(folder: Path, at: int | None, name: str, flags: int = os.O_RDONLY) -> int:
-    flags |= getattr(os, "O_BINARY", 0)
-    if at is None:
-        return os.open(folder / name, flags, 0o600)
-    return os.open(name, flags | os.O_NOFOLLOW, 0o600, dir_fd=at)
-
-
-def _replace(folder: Path, at: int | None, old: str, new: str) -> None:
-    if at is None:
-        os.replace(folder / old, folder / new)
-    else:
-        os.replace(old, new, src_dir_fd=at, dst_dir_fd=at)
-
-
-def _remove(folder: Path, at: int | None, name: str) -> None:
-    if at is None:
-        os.unlink(folder / name)
-    else:
-        os.unlink(name, dir_fd=at)
+    own = not _POSIX or (status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE)
+    return is_kind(status.st_mode) and own
 
 
 def _files(folder: Path) -> list[tuple[float, int, str]]:
@@ -256,17 +252,5 @@ def _machine() -> str:
     return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:12]
 
 
-__all__ = [
-    "MOST_BYTES",
-    "PACKAGE",
-    "VARIABLE",
-    "Usage",
-    "chosen_folder",
-    "clear",
-    "code_digest",
-    "made_from",
-    "program_folder",
-    "read",
-    "usage",
-    "write",
-]
+__all__ = ["MOST_BYTES", "PACKAGE", "VARIABLE", "Usage", "chosen_folder", "clear", "code_digest"]
+__all__ += ["made_from", "program_folder", "read", "usage", "write"]
