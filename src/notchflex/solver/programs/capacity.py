@@ -1,8 +1,8 @@
-"""Numbers of flexures that programs are compiled for, and rows of numbers for longer chains.
+"""Numbers of flexures that programs are compiled for, and padding to them.
 
-A program runs for all chains of up to so many flexures: a shorter chain is lengthened by flexures
-that do nothing. With the body at the base, flexures and bodies fill the processor's vectors, which
-a shorter chain would leave partly empty: within a vector the added flexures cost nothing.
+A program runs for all chains of up to so many flexures; a shorter chain is padded with flexures
+that do nothing. With the body at the base they fill the processor's vectors: within a vector the
+added flexures cost nothing.
 """
 
 from __future__ import annotations
@@ -36,28 +36,28 @@ def capacity(flexures: int) -> int:
 
 @lru_cache(maxsize=256)
 def padded_indices(own: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " own"]:
-    """Return where the numbers of a form are in that of a longer chain.
+    """Return where the numbers of a layout are in that of a longer chain.
 
     Args:
-        own: A form whose arrays have flexures or bodies as leading axis.
+        own: A layout of arrays with flexures or bodies as leading axis.
         long: The same of a chain with more flexures beyond the tip.
     """
-    found = [
-        whole[tuple(slice(size) for size in part.shape)].ravel()
-        for part, whole in zip(own.indices, long.indices, strict=True)
+    indices = [
+        padded[tuple(slice(size) for size in part.shape)].ravel()
+        for part, padded in zip(own.indices, long.indices, strict=True)
     ]
-    return np.concatenate(found) if found else np.zeros(0, int)
+    return np.concatenate([np.zeros(0, int), *indices])
 
 
 def pad_rows(
     rows: Float[np.ndarray, "*s own"], own: PytreeLayout, long: PytreeLayout
 ) -> Float[np.ndarray, "*s long"]:
-    """Return rows of a form as those of a longer chain, 0 for the flexures added."""
+    """Return rows of a layout as those of a longer chain, 0 for the flexures added."""
     if own is long:
         return rows
-    found = np.zeros((*rows.shape[:-1], long.size))
-    found[..., padded_indices(own, long)] = rows
-    return found
+    padded = np.zeros((*rows.shape[:-1], long.size))
+    padded[..., padded_indices(own, long)] = rows
+    return padded
 
 
 __all__ = ["capacity", "pad_rows", "padded_indices"]

@@ -113,7 +113,7 @@ class SolverRun:
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
-        """Return the smallest real part of the stiffness's eigenvalues, and its determinant's sign."""
+        """Return the smallest real part of the eigenvalues, and the determinant's sign."""
         return stability(self._prepared, commands, self.solved)
 
     def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:

@@ -1,9 +1,8 @@
-"""Programs that a wheel carries as text, so that the first call on a machine need not trace them.
+"""Programs that a wheel carries as LLVM text, so that the first call need not trace them.
 
-The text is the same for every processor and every LLVM that is allowed; machine code is made of it
-when it is first needed. `packaging/hatch_build.py` records the programs of typical calls when a
-wheel is built. They are found by a digest of the code that they were made from: after a change of
-the code they are not used.
+The text serves every processor and every allowed LLVM; machine code is made when it is first
+needed. `packaging/hatch_build.py` records the programs of typical calls when a wheel is built. They
+are found by a digest of the code that they were made from.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ FOLDER = store.PACKAGE / "shipped_programs"
 
 
 def read(key: str) -> bytes | None:
-    """Return what was recorded under a key; None where there is nothing, or it is not whole."""
+    """Return what was recorded under a key; None where nothing is, or it is damaged."""
     try:
         return lzma.decompress((FOLDER / _name(key)).read_bytes())
     except (OSError, EOFError, lzma.LZMAError):

@@ -12,12 +12,12 @@ from typing import TypeVar
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
-# So many pieces wait for each thread, that none stands still while results are put together.
+# So many pieces wait for each thread, so that none is idle while results are put together.
 _AHEAD = 4
 
 
 def number_of_cores() -> int:
-    """How many threads work where nothing else is told."""
+    """Return the number of threads where the user sets none."""
     return os.cpu_count() or 1
 
 
@@ -34,18 +34,15 @@ if hasattr(os, "register_at_fork"):
 def on_cores(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], cores: int | None = None
 ) -> Generator[Result]:
-    """What comes of pieces of work, done by several threads, in the order of the pieces.
+    """Work on pieces in several threads; yield the results in the order of the pieces.
 
-    Only a few pieces are begun ahead, so that those of others who ask meanwhile have their turn.
-    Closed early (`contextlib.closing`), no more of them are begun.
+    Only a few pieces are begun ahead, so that other callers have their turn. Closed early
+    (`contextlib.closing`), no more of them are begun.
 
     Args:
-        work: What is done with a piece.
+        work: Function of a piece.
         pieces: The pieces.
-        cores: How many threads; one per core where not given.
-
-    Yields:
-        The results.
+        cores: Number of threads; one per core where not given.
     """
     cores = cores or number_of_cores()
     threads, begun = _threads(cores), deque[Future[Result]]()
