@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import notchflex as nf
 from notchflex.loads.command import make_commands
-from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import load_path
 from notchflex.results.path import EquilibriumPath
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.prepare import prepare

@@ -15,7 +15,7 @@ from notchflex.loads.applied import (
     is_planar,
     is_unloaded,
 )
-from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import load_path
 from notchflex.mechanics.chain import assemble
 from notchflex.mechanics.chain.mass import body_masses
 from robots import ready

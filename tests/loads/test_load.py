@@ -5,7 +5,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.errors import InputError
-from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import load_path
 
 NAN = np.nan
 

@@ -10,7 +10,7 @@ import notchflex as nf
 from notchflex._jax import jax
 from notchflex.analysis.solve import prepare_for
 from notchflex.loads.command import make_commands
-from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import load_path
 from notchflex.solver.actuation import command_residual
 from notchflex.solver.block_elimination import linear_step
 from notchflex.solver.element import Iterate

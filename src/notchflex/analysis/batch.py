@@ -23,9 +23,8 @@ from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.command import make_commands, pad_commands
-from notchflex.loads.conversion import load_path
-from notchflex.loads.load_path import join_paths
-from notchflex.loads.validation import shown, whole
+from notchflex.loads.load_path import join_paths, load_path
+from notchflex.loads.validation import check_integer, short_repr
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.derived.quantities import BY_BODY, BY_FLEXURE
@@ -164,7 +163,7 @@ def simulate_batch(
         given = [loads] if isinstance(loads, LoadPath) else list(loads)
     except TypeError:
         raise InputError(
-            f"simulate_batch needs a notchflex.LoadPath, or some in order; got {shown(loads)}"
+            f"simulate_batch needs a notchflex.LoadPath, or some in order; got {short_repr(loads)}"
         ) from None
     paths = [load_path(one, tendons) for one in given]
     if not paths or len({len(path) for path in paths}) > 1:
@@ -180,7 +179,9 @@ def _robots(robots: Any) -> list[Robot]:
     except TypeError:
         every = []
     if not every or not all(isinstance(robot, Robot) for robot in every):
-        raise InputError(f"a batch needs a notchflex.Robot, or some of them; got {shown(robots)}")
+        raise InputError(
+            f"a batch needs a notchflex.Robot, or some of them; got {short_repr(robots)}"
+        )
     return every
 
 
@@ -196,7 +197,7 @@ def _simulate(
 ) -> dict[str, np.ndarray]:
     """Follow paths, given one after the other as a long one, each from rest."""
     asked = check_outputs(outputs)
-    threads = number_of_cores() if cores is None else whole(cores, "cores")
+    threads = number_of_cores() if cores is None else check_integer(cores, "cores")
     if threads < 1:
         raise InputError(f"cores must be 1 or more, or None for all; got {threads}")
     count = max(len(robots), paths)

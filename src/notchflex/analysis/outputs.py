@@ -9,7 +9,7 @@ from jaxtyping import Array
 
 from notchflex._jax import jax, jnp
 from notchflex.errors import InputError
-from notchflex.loads.validation import shown
+from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, SolverState
 from notchflex.solver.derived.quantities import Quantities, Shape, believable, quantities, shape
@@ -39,7 +39,7 @@ def check_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     wrong = [name for name in names if name not in OUTPUTS]
     if wrong or not names:
-        said = f"there is no output {shown(wrong[0])}" if wrong else "no output is asked"
+        said = f"there is no output {short_repr(wrong[0])}" if wrong else "no output is asked"
         raise InputError(f"{said}; there are {', '.join(OUTPUTS)}")
     return names
 

@@ -8,7 +8,7 @@ from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.applied import follows, is_planar, is_unloaded
 from notchflex.loads.command import make_commands
-from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import load_path
 from notchflex.mechanics.chain import tendons_in_plane
 from notchflex.mechanics.flexure import LEVELS, MOST_REFINEMENT
 from notchflex.results.equilibrium import Equilibrium

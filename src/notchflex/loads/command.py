@@ -15,68 +15,61 @@ from notchflex.robot import Robot
 
 
 class Command(NamedTuple):
-    """Demand on every tendon, and the other loads.
+    """Targets of all tendons, and the external loads; loads may be leading axis.
 
     Attributes:
-        value: Tension (N) or stroke (mm).
+        target: Tension (N) or stroke (mm).
         by_stroke: Whether it is a stroke; None where all are tensions.
-        applied: Other loads on the bodies; None for a chain assembled for tendons alone.
+        applied: External loads on the bodies; None for a chain assembled for tendons alone.
     """
 
-    value: Float[Array, " t"]
+    target: Float[Array, " t"]
     by_stroke: Bool[Array, " t"] | None
     applied: BodyLoads | None
 
     def either(self, by_stroke: Array, by_tension: Array) -> Array:
-        """Of two values per tendon the one that belongs to what is demanded of it."""
-        return (
-            by_tension
-            if self.by_stroke is None
-            else jnp.where(self.by_stroke, by_stroke, by_tension)
-        )
+        """Select per tendon the value for a stroke or that for a tension."""
+        if self.by_stroke is None:
+            return by_tension
+        return jnp.where(self.by_stroke, by_stroke, by_tension)
 
 
-def tension_commands(value: Float[np.ndarray, "s t"]) -> Command:
-    """Tensions of every tendon (N), loads as leading axis, and nothing else."""
-    return Command(constant(value), None, None)
+def tension_commands(tension: Float[np.ndarray, "s t"]) -> Command:
+    """Return commands of tensions alone (N), loads as leading axis."""
+    return Command(constant(tension), None, None)
 
 
 def pad_commands(commands: Command, flexures: int, by_stroke: bool) -> Command:
-    """Loads, as leading axis, for a chain with more flexures that carry none.
+    """Pad commands for a chain with more flexures, which carry no load.
 
     Args:
-        commands: The loads.
-        flexures: How many flexures the chain has.
-        by_stroke: Whether they are to stand beside loads by stroke.
+        commands: The commands, as leading axis.
+        flexures: Number of flexures of the chain.
+        by_stroke: Whether they stand beside commands by stroke.
     """
-    drawn, others = commands.by_stroke, commands.applied
+    target, drawn, loads = commands
     if by_stroke and drawn is None:
-        drawn = cast("Array", np.zeros(commands.value.shape, bool))
-    if others is not None:
-        more = flexures + 1 - others.dead_force.shape[1]
-        others = jax.tree.map(
-            lambda leaf: np.pad(leaf, [(0, 0), (0, more)] + [(0, 0)] * (leaf.ndim - 2)), others
+        drawn = cast("Array", np.zeros(target.shape, bool))
+    if loads is not None:
+        more = flexures + 1 - loads.dead_force.shape[1]
+        loads = jax.tree.map(
+            lambda leaf: np.pad(leaf, [(0, 0), (0, more)] + [(0, 0)] * (leaf.ndim - 2)), loads
         )
-    return Command(commands.value, drawn, others)
+    return Command(target, drawn, loads)
 
 
 def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:
-    """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
+    """Return the commands of a path; a tendon without one is slack (0 N)."""
     no_stroke = np.isnan(load.stroke)
-    drawn, value = None, np.where(np.isnan(load.tension), 0.0, load.tension)
+    drawn, target = None, np.where(np.isnan(load.tension), 0.0, load.tension)
     if not no_stroke.all():
-        drawn, value = cast("Array", ~no_stroke), np.where(no_stroke, value, load.stroke)
-    others = None
+        drawn, target = cast("Array", ~no_stroke), np.where(no_stroke, target, load.stroke)
+    loads = None
     if chain.loaded:
-        others = applied(
-            load,
-            robot,
-            np.asarray(chain.body_mass),
-            np.asarray(chain.body_centre),
-            np.asarray(chain.body_length),
-            None if chain.frame is None else np.asarray(chain.frame),
-        )
-    return Command(constant(value), drawn, others)
+        mass, centre = np.asarray(chain.body_mass), np.asarray(chain.body_centre)
+        frame = None if chain.frame is None else np.asarray(chain.frame)
+        loads = applied(load, robot, mass, centre, np.asarray(chain.body_length), frame)
+    return Command(constant(target), drawn, loads)
 
 
 __all__ = ["Command", "make_commands", "pad_commands", "tension_commands"]

@@ -1,4 +1,4 @@
-"""What acts on a robot from outside: forces and moments on its bodies, a hung mass, gravity."""
+"""External loads: forces and moments on bodies, a mass that hangs at the tip, gravity."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ from functools import partial
 from typing import Any
 
 from notchflex.errors import InputError
-from notchflex.loads.validation import number, shown, truth, vector, whole
+from notchflex.loads.validation import (
+    check_bool,
+    check_integer,
+    check_number,
+    check_vector,
+    short_repr,
+)
 
 # Standard gravity in the world, m/s^2: what a mass hangs by where no gravity is given.
 HANGING = (0.0, 0.0, -9.81)
@@ -30,7 +36,7 @@ class BodyForce:
             otherwise in the world.
 
     Raises:
-        InputError: Not a whole number of 0 or more for the body, or not three finite numbers.
+        InputError: The body is not a whole number >= 0, or a vector is not three finite numbers.
 
     Example:
         >>> from notchflex import Load
@@ -47,34 +53,32 @@ class BodyForce:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        body = whole(self.body, "the body of a BodyForce")
+        body = check_integer(self.body, "the body of a BodyForce")
         if body < 0:
             raise InputError(f"bodies are counted from 0, the base; got {body}")
         object.__setattr__(self, "body", body)
         for what, form in (("force", "N"), ("moment", "N mm"), ("point", "mm, from the body")):
-            taken = vector(getattr(self, what), f"the {what} of a BodyForce", form)
+            taken = check_vector(getattr(self, what), f"the {what} of a BodyForce", form)
             object.__setattr__(self, what, taken)
-        following = truth(self.following, "following of a BodyForce")
+        following = check_bool(self.following, "following of a BodyForce")
         object.__setattr__(self, "following", following)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExternalLoad:
-    """All that acts from outside at one step; nothing unless it is given.
+    """External loads at one step; none by default.
 
     Args:
-        tip_force: Force at the tip, N; in the world, or in the tip's frame if `following`.
-        tip_moment: Moment at the tip, N mm; in the same frame.
-        tip_point: Where the tip force acts and the tip mass hangs, from the tip (the end of the
-            last uncut length, on the tube axis), in the tip's frame, mm.
+        tip_force: Force at the tip, N; this and all others as in `Load`.
+        tip_moment: Moment at the tip, N mm.
+        tip_point: Point of the tip force and the tip mass, mm.
         following: Whether tip force and tip moment turn with the tip.
         body_forces: Forces and moments on single bodies.
         tip_mass: Mass that hangs at the tip point, g.
-        gravity: Acceleration of gravity in the world, m/s^2. Given, the robot's own weight counts
-            where its material has a density. Not given, a tip mass hangs along (0, 0, -9.81).
+        gravity: Acceleration of gravity in the world, m/s^2.
 
     Raises:
-        InputError: A value is not of this form, not finite, or the mass is negative.
+        InputError: An invalid value, one that is not finite, or a negative mass.
 
     Example:
         >>> ExternalLoad(tip_mass=20.0).weight(20.0)
@@ -98,29 +102,23 @@ class ExternalLoad:
                 given[name] = _CHECKS[name](value)
 
     @property
-    def _is_default(self) -> bool:
-        """Whether no field was given, as in most loads: then there is nothing to check."""
-        given = vars(self)
-        return all(given[name] is default for name, default in _DEFAULTS)
-
-    @property
     def external(self) -> ExternalLoad:
-        """What acts from outside, without what else a load may command."""
-        if self._is_default:
+        """The external loads alone, without what else a load may command."""
+        given = vars(self)
+        if all(given[name] is default for name, default in _DEFAULTS):
             return NOTHING
         found = object.__new__(ExternalLoad)
-        given = vars(self)
         vars(found).update({name: given[name] for name in EXTERNAL})  # checked already
         return found
 
     @property
     def pulls_down(self) -> bool:
-        """Whether there is gravity at all: given and not zero, or assumed for a hung mass."""
+        """Whether gravity acts: given and not zero, or assumed for a mass at the tip."""
         return self.tip_mass > 0.0 if self.gravity is None else any(self.gravity)
 
     @property
     def is_nothing(self) -> bool:
-        """Whether nothing acts, whatever the robot weighs."""
+        """Whether no load acts, whatever the robot weighs."""
         acting = any(self.tip_force) or any(self.tip_moment) or self.pulls_down
         return not acting and not any(any(one.force) or any(one.moment) for one in self.body_forces)
 
@@ -137,7 +135,7 @@ class ExternalLoad:
 
 
 def _mass(value: Any) -> float:
-    mass = number(value, "tip_mass", "a number of grams")
+    mass = check_number(value, "tip_mass", "a number of grams")
     if not 0.0 <= mass < float("inf"):
         raise InputError(f"tip_mass must be finite and 0 g or more; got {mass:g}")
     return mass
@@ -147,19 +145,20 @@ def _body_forces(value: Any) -> tuple[BodyForce, ...]:
     several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     if not several or not all(isinstance(one, BodyForce) for one in value):
         raise InputError(
-            f"body_forces must be a list of notchflex.BodyForce(body, force); got {shown(value)}"
+            "body_forces must be a list of notchflex.BodyForce(body, force); "
+            f"got {short_repr(value)}"
         )
     return tuple(value)
 
 
 _CHECKS: dict[str, Callable[[Any], Any]] = {
-    "tip_force": partial(vector, what="tip_force", form="N"),
-    "tip_moment": partial(vector, what="tip_moment", form="N mm"),
-    "tip_point": partial(vector, what="tip_point", form="mm, from the tip"),
-    "following": partial(truth, what="following"),
+    "tip_force": partial(check_vector, what="tip_force", form="N"),
+    "tip_moment": partial(check_vector, what="tip_moment", form="N mm"),
+    "tip_point": partial(check_vector, what="tip_point", form="mm, from the tip"),
+    "following": partial(check_bool, what="following"),
     "body_forces": _body_forces,
     "tip_mass": _mass,
-    "gravity": partial(vector, what="gravity", form="m/s^2, in the world"),
+    "gravity": partial(check_vector, what="gravity", form="m/s^2, in the world"),
 }
 EXTERNAL = tuple(one.name for one in fields(ExternalLoad))
 _DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))

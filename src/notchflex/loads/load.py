@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from math import isfinite, nan
+from typing import Any
 
+import numpy as np
+
+from notchflex.errors import InputError
 from notchflex.loads.external import ExternalLoad
+from notchflex.loads.validation import check_number, short_repr
 
 BASE_TURN = ("base_rotation", "rotation vector, rad")
 """Name and form of the rotation of the base, for messages."""
 
 NO_TURN = (0.0, 0.0, 0.0)
 """Rotation vector of a base that is not turned."""
+
+_PER_TENDON = "a number, or one entry per tendon with None where nothing is commanded"
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,8 +44,8 @@ class Load(ExternalLoad):
     A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
 
     Raises:
-        InputError: A load from outside is not of its form; tensions and strokes are checked when
-            the robot is known.
+        InputError: An invalid external load; tensions and strokes are checked when the robot is
+            known.
 
     Example:
         >>> Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
@@ -49,12 +57,42 @@ class Load(ExternalLoad):
     base_rotation: Sequence[float] = NO_TURN
 
     def __repr__(self) -> str:
-        """What is given, and nothing of what is not; tendons first."""
+        """Show what is given; tendons first."""
         ordered = sorted(fields(self), key=lambda one: bool(one.kw_only))
         values = {one.name: getattr(self, one.name) for one in ordered}
         unlike = {one.name for one in ordered if repr(values[one.name]) != repr(one.default)}
         given = (f"{name}={value!r}" for name, value in values.items() if name in unlike)
         return f"Load({', '.join(given)})"
+
+    def per_tendon(self, what: str, tendons: int) -> list[float]:
+        """Return tension (N) or stroke (mm) of every tendon, NaN where not commanded.
+
+        Args:
+            what: "tension" or "stroke".
+            tendons: Number of tendons of the robot.
+
+        Raises:
+            InputError: Too many entries, or one that is not a finite number.
+        """
+        value = getattr(self, what)
+        entries = [nan] * tendons
+        if value is None:
+            return entries
+        if hasattr(value, "__array__"):
+            value = np.asarray(value).tolist()
+        several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+        given: list[Any] = list(value) if several else [value]
+        if len(given) > tendons:
+            raise InputError(
+                f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "
+                f"give at most {tendons}"
+            )
+        for i, entry in enumerate(given):
+            if entry is not None:
+                entries[i] = check_number(entry, what, _PER_TENDON)
+                if not isfinite(entries[i]):
+                    raise InputError(f"{what} must be finite; got {short_repr(entry)}")
+        return entries
 
 
 __all__ = ["BASE_TURN", "NO_TURN", "Load"]

@@ -1,10 +1,11 @@
-"""Loads on a robot one after the other, as arrays over the steps."""
+"""Load paths: the loads on a robot step by step, as arrays over the steps."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from math import isnan
 from typing import Any
 
@@ -14,20 +15,23 @@ from jaxtyping import Int
 from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
 from notchflex.loads.external import EXTERNAL, NOTHING, BodyForce, ExternalLoad
-from notchflex.loads.load import BASE_TURN, Load
-from notchflex.loads.validation import shown, table, vector
+from notchflex.loads.load import BASE_TURN, NO_TURN, Load
+from notchflex.loads.validation import check_table, check_vector, short_repr
 
 
 @dataclass(frozen=True, repr=False)
 class LoadPath(Displayed):
-    """Loads one after the other.
+    """Loads step by step.
 
     Args:
         tension: Commanded tensions, N, steps by tendons, NaN where not commanded.
         stroke: Commanded strokes, mm, in the same form.
         base_rotation: Rotation vector of the base in the world, rad.
-        external: What acts from outside at each step; nothing where not given. `loaded` puts the
-            same on all steps.
+        external: External loads, one per step; none by default. `loaded` puts the same on all.
+
+    Raises:
+        InputError: Unequal shapes, no step, a negative or infinite number, or both tension and
+            stroke for one tendon.
     """
 
     tension: np.ndarray
@@ -37,9 +41,9 @@ class LoadPath(Displayed):
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        tension = np.atleast_2d(table(self.tension, "tension"))
-        stroke = np.atleast_2d(table(self.stroke, "stroke"))
-        base_rotation = np.array(vector(self.base_rotation, *BASE_TURN))
+        tension = np.atleast_2d(check_table(self.tension, "tension"))
+        stroke = np.atleast_2d(check_table(self.stroke, "stroke"))
+        base_rotation = np.array(check_vector(self.base_rotation, *BASE_TURN))
         if tension.shape != stroke.shape or tension.ndim != 2:
             raise InputError(
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
@@ -50,7 +54,7 @@ class LoadPath(Displayed):
         object.__setattr__(self, "base_rotation", base_rotation)
         object.__setattr__(self, "external", _for_steps(self.external, len(tension)))
         if tension.size and np.isnan(stroke).all() and 0.0 <= tension.min() < np.inf:
-            return  # nothing but tensions that a tendon can have
+            return  # valid tensions alone, as most often
         if len(tension) == 0:
             raise InputError("a load path needs at least one step; got none")
         if np.isinf(tension).any() or np.isinf(stroke).any():
@@ -65,14 +69,14 @@ class LoadPath(Displayed):
             )
 
     @classmethod
-    def checked(
+    def of_valid(
         cls,
         tension: np.ndarray,
         stroke: np.ndarray,
         base_rotation: np.ndarray,
         external: tuple[ExternalLoad, ...],
     ) -> LoadPath:
-        """A path of what needs no check any more; a control loop makes one for every solve."""
+        """Make a path of valid values; a control loop makes one for every solve."""
         made = object.__new__(cls)
         vars(made).update(
             tension=tension, stroke=stroke, base_rotation=base_rotation, external=external
@@ -110,25 +114,22 @@ class LoadPath(Displayed):
 
     @cached_property
     def different(self) -> list[ExternalLoad]:
-        """What acts from outside, each different load once, in order."""
+        """The external loads, each different one once, in order."""
         if len(self.external) == 1:
             return list(self.external)
-        return list(dict.fromkeys(self._by_identity.values()))
+        # Usually all steps have the same object, which is found faster than equal ones.
+        return list(dict.fromkeys({id(one): one for one in self.external}.values()))
 
     @cached_property
     def which(self) -> Int[np.ndarray, " s"]:
         """Which of the different loads acts at each step."""
         number = {one: i for i, one in enumerate(self.different)}
-        seen = {identity: number[one] for identity, one in self._by_identity.items()}
-        return np.array([seen[id(one)] for one in self.external])
-
-    @property
-    def _by_identity(self) -> dict[int, ExternalLoad]:
-        """Usually all steps carry the very same, which is sooner seen than that they are equal."""
-        return {id(one): one for one in self.external}
+        seen = {id(one): one for one in self.external}
+        by_identity = {identity: number[one] for identity, one in seen.items()}
+        return np.array([by_identity[id(one)] for one in self.external])
 
     def release(self) -> LoadPath:
-        """The same way there and back, the peak twice.
+        """Return the path there and back, the peak twice.
 
         Example:
             >>> from notchflex import pull
@@ -143,10 +144,10 @@ class LoadPath(Displayed):
         )
 
     def then(self, following: LoadPath) -> LoadPath:
-        """This path and another after it; a tendon that one of them does not name is slack in it.
+        """Append another path; a tendon that one of them does not name is slack in it.
 
         Raises:
-            InputError: What follows is no path.
+            InputError: `following` is not a path.
 
         Example:
             >>> from notchflex import pull
@@ -155,7 +156,7 @@ class LoadPath(Displayed):
         """
         if not isinstance(following, LoadPath):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError(
-                f"a load path goes on with another notchflex.LoadPath; got {shown(following)}"
+                f"a load path goes on with another notchflex.LoadPath; got {short_repr(following)}"
             )
         count = max(self.tension.shape[1], following.tension.shape[1])
         first, second = self.for_tendons(count), following.for_tendons(count)
@@ -167,11 +168,10 @@ class LoadPath(Displayed):
         )
 
     def part(self, start: int, steps: int) -> LoadPath:
-        """Some of its steps, from one on."""
-        own = slice(start, start + steps)
-        return replace(
-            self, tension=self.tension[own], stroke=self.stroke[own], external=self.external[own]
-        )
+        """Return some of its steps, from one on."""
+        some = slice(start, start + steps)
+        parts = (self.tension[some], self.stroke[some])
+        return LoadPath(*parts, self.base_rotation, self.external[some])
 
     def loaded(
         self,
@@ -184,21 +184,22 @@ class LoadPath(Displayed):
         tip_mass: float | None = None,
         gravity: Sequence[float] | None = None,
     ) -> LoadPath:
-        """The same path with external loads on all its steps.
+        """Return the path with external loads on all its steps.
 
         Args:
             tip_force: Force at the tip, N; this and all others as in `Load`.
             tip_moment: Moment at the tip, N mm.
-            tip_point: Where the tip force acts and the tip mass hangs, mm.
+            tip_point: Point of the tip force and the tip mass, mm.
             following: Whether tip force and tip moment turn with the tip.
             body_forces: Forces and moments on single bodies.
             tip_mass: Mass that hangs at the tip point, g.
             gravity: Acceleration of gravity in the world, m/s^2.
 
-        What is not given stays as it is.
+        Returns:
+            The path; what is not given stays as it is.
 
         Raises:
-            InputError: A value is not of its form.
+            InputError: Invalid value.
 
         Example:
             >>> from notchflex import pull
@@ -206,22 +207,13 @@ class LoadPath(Displayed):
             >>> [one.tip_force for one in path.release().external]
             [(0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.1, 0.0)]
         """
-        every: dict[str, Any] = {
-            "tip_force": tip_force,
-            "tip_moment": tip_moment,
-            "tip_point": tip_point,
-            "following": following,
-            "body_forces": body_forces,
-            "tip_mass": tip_mass,
-            "gravity": gravity,
-        }
-        given = {name: value for name, value in every.items() if value is not None}
+        given = {n: v for n, v in locals().items() if n in EXTERNAL and v is not None}
         # Usually all steps carry the same: each different load is made and checked once.
         changed = [replace(one, **given) for one in self.different]
         return replace(self, external=tuple(changed[number] for number in self.which.tolist()))
 
     def for_tendons(self, count: int) -> LoadPath:
-        """The same path for a robot of so many tendons; tendons not named hang slack."""
+        """Return the path for a robot of so many tendons; those added are slack."""
         given = self.tension.shape[1]
         if given == count:
             return self
@@ -239,7 +231,7 @@ class LoadPath(Displayed):
 
 
 def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
-    """Paths for equally many tendons one after the other, as one.
+    """Join paths for equally many tendons to one.
 
     Raises:
         InputError: Their bases are turned differently.
@@ -254,8 +246,56 @@ def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
     )
 
 
+def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
+    """Convert loads of any form to a path for a robot of so many tendons.
+
+    Args:
+        loads: A path, one load, or loads in order.
+        tendons: Number of tendons of the robot.
+
+    Returns:
+        The path, with a column for every tendon.
+
+    Raises:
+        InputError: Too many entries, invalid numbers, different base rotations.
+    """
+    if isinstance(loads, LoadPath):
+        return loads.for_tendons(tendons)
+    every = [loads] if isinstance(loads, Load) else _several(loads)
+    turns = {
+        NO_TURN if load.base_rotation is NO_TURN else check_vector(load.base_rotation, *BASE_TURN)
+        for load in every
+    }
+    if len(turns) > 1:
+        raise InputError("base_rotation must be the same for all loads of a path")
+    tension = [load.per_tendon("tension", tendons) for load in every]
+    stroke = [load.per_tendon("stroke", tendons) for load in every]
+    given = np.array(tension), np.array(stroke), np.array(turns.pop())
+    external = tuple(load.external for load in every)
+    entries = zip(chain.from_iterable(tension), chain.from_iterable(stroke), strict=True)
+    if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
+        return LoadPath(*given, external)  # raises the error
+    return LoadPath.of_valid(*given, external)
+
+
+def _several(loads: Any) -> list[Load]:
+    """Loads in order, one or more."""
+    try:
+        every = list(loads)
+    except TypeError:
+        raise InputError(
+            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {short_repr(loads)}"
+        ) from None
+    if not every:
+        raise InputError("there are no loads; give at least one")
+    for load in every:
+        if not isinstance(load, Load):
+            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
+    return every
+
+
 def _as_given(values: np.ndarray) -> float | list[float | None] | None:
-    """Return one entry per tendon as a `Load` takes them: a number for a single tendon."""
+    """One entry per tendon as a `Load` takes them: a number for a single tendon."""
     entries = [None if isnan(value) else value for value in values.tolist()]
     if all(entry is None for entry in entries):
         return None
@@ -272,7 +312,7 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     except TypeError:
         raise InputError(
             "external of a load path must hold one ExternalLoad per step; "
-            f"got {shown(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
+            f"got {short_repr(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
         ) from None
     if given and len(given) != steps:
         raise InputError(
@@ -284,4 +324,4 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     return given or (NOTHING,) * steps
 
 
-__all__ = ["LoadPath", "join_paths"]
+__all__ = ["LoadPath", "join_paths", "load_path"]

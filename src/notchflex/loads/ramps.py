@@ -6,7 +6,7 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.loads.load_path import LoadPath
-from notchflex.loads.validation import number, whole
+from notchflex.loads.validation import check_integer, check_number
 
 
 def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
@@ -54,12 +54,12 @@ def stroke_path(start: float, stop: float, steps: int = 31, *, tendon: int = 1) 
 
 
 def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> LoadPath:
-    steps, tendon = whole(steps, "steps"), whole(tendon, "tendon")
+    steps, tendon = check_integer(steps, "steps"), check_integer(tendon, "tendon")
     if steps < 1:
         raise InputError(f"a range needs at least one step; got {steps}")
     if tendon < 1:
         raise InputError(f"tendons are counted from 1; got {tendon}")
-    first, last = number(start, f"the first {what}"), number(stop, f"the last {what}")
+    first, last = check_number(start, f"the first {what}"), check_number(stop, f"the last {what}")
     commanded = np.full((steps, tendon), np.nan)
     with np.errstate(over="ignore", invalid="ignore"):
         commanded[:, tendon - 1] = np.linspace(first, last, steps)

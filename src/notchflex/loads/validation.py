@@ -1,4 +1,4 @@
-"""Numbers as people give them in loads: taken as floats, or refused with a sentence."""
+"""Checks of values that a user gives in loads: the value converted, or an `InputError`."""
 
 from __future__ import annotations
 
@@ -13,12 +13,8 @@ from notchflex.errors import InputError
 from notchflex.robot import Robot
 
 
-def number(value: Any, what: str, form: str = "a number") -> float:
-    """A number, which text and truth values are not.
-
-    Raises:
-        InputError: It is none.
-    """
+def check_number(value: Any, what: str, form: str = "a number") -> float:
+    """Return a number as a float; text and truth values are refused."""
     if type(value) is float:  # as most often
         return value
     try:
@@ -26,73 +22,58 @@ def number(value: Any, what: str, form: str = "a number") -> float:
             raise TypeError
         return float(value)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} must be {form}; got {shown(value)}") from None
+        raise InputError(f"{what} must be {form}; got {short_repr(value)}") from None
 
 
-def whole(value: Any, what: str) -> int:
-    """A whole number.
-
-    Raises:
-        InputError: It is none.
-    """
+def check_integer(value: Any, what: str) -> int:
+    """Return a whole number."""
     try:
         if isinstance(value, bool | np.bool_):
             raise TypeError
         return operator.index(value)
     except TypeError:
-        raise InputError(f"{what} must be a whole number; got {shown(value)}") from None
+        raise InputError(f"{what} must be a whole number; got {short_repr(value)}") from None
 
 
-def truth(value: Any, what: str) -> bool:
-    """True or false.
-
-    Raises:
-        InputError: It is neither.
-    """
+def check_bool(value: Any, what: str) -> bool:
+    """Return True or False."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise InputError(f"{what} must be True or False; got {shown(value)}")
+    raise InputError(f"{what} must be True or False; got {short_repr(value)}")
 
 
-def vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
-    """Three finite numbers.
+def check_vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
+    """Return three finite numbers.
 
     Args:
         value: What was given.
         what: Its name, for the message.
-        form: What the numbers are, with their unit.
-
-    Raises:
-        InputError: They are not three, or one is no finite number.
+        form: Meaning and unit of the numbers, for the message.
 
     Example:
-        >>> vector([0, 0, 1], "tip_force", "N")
+        >>> check_vector([0, 0, 1], "tip_force", "N")
         (0.0, 0.0, 1.0)
     """
-    if type(value) is tuple and len(value) == 3 and all(map(_finite, value)):
+    if type(value) is tuple and len(value) == 3 and all(map(_is_finite_float, value)):
         return value  # as most often: nothing to change
-    given = np.asarray(value).tolist() if hasattr(value, "__array__") else value
+    several = np.asarray(value).tolist() if hasattr(value, "__array__") else value
     numbers: list[float] = []
-    if isinstance(given, Sequence) and not isinstance(given, str | bytes | bytearray):
+    if isinstance(several, Sequence) and not isinstance(several, str | bytes | bytearray):
         try:
-            numbers = [number(entry, what) for entry in given]
+            numbers = [check_number(entry, what) for entry in several]
         except InputError:
             numbers = []
     if len(numbers) != 3 or not all(isfinite(one) for one in numbers):
-        raise InputError(f"{what} needs three finite numbers ({form}); got {shown(value)}")
+        raise InputError(f"{what} needs three finite numbers ({form}); got {short_repr(value)}")
     return numbers[0], numbers[1], numbers[2]
 
 
-def _finite(value: Any) -> bool:
+def _is_finite_float(value: Any) -> bool:
     return type(value) is float and isfinite(value)
 
 
-def table(value: Any, what: str) -> np.ndarray:
-    """Numbers, steps by tendons; None within them is NaN.
-
-    Raises:
-        InputError: They are no such numbers.
-    """
+def check_table(value: Any, what: str) -> np.ndarray:
+    """Return numbers, steps by tendons; None within them is NaN."""
     if type(value) is np.ndarray and value.dtype == float:
         return value
     try:
@@ -101,25 +82,22 @@ def table(value: Any, what: str) -> np.ndarray:
         return np.asarray(value, float)
     except (TypeError, ValueError, OverflowError):
         raise InputError(
-            f"{what} of a load path must be numbers, steps by tendons; got {shown(value)}"
+            f"{what} of a load path must be numbers, steps by tendons; got {short_repr(value)}"
         ) from None
 
 
-def robot_given(value: Any) -> Robot:
-    """A robot.
-
-    Raises:
-        InputError: It is none.
-    """
+def check_is_robot(value: Any) -> Robot:
+    """Return a robot."""
     if not isinstance(value, Robot):
         raise InputError(
-            f'a notchflex.Robot is needed, such as load_robot("pacheco2021-a"); got {shown(value)}'
+            'a notchflex.Robot is needed, such as load_robot("pacheco2021-a"); '
+            f"got {short_repr(value)}"
         )
     return value
 
 
-def shown(value: Any) -> str:
-    """A value as Python writes it, cut short."""
+def short_repr(value: Any) -> str:
+    """Return a value as Python writes it, at most 60 characters."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:  # a whole number of thousands of digits
@@ -127,4 +105,5 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-__all__ = ["number", "robot_given", "shown", "table", "truth", "vector", "whole"]
+__all__ = ["check_bool", "check_integer", "check_is_robot", "check_number", "check_table"]
+__all__ += ["check_vector", "short_repr"]

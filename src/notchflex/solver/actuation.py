@@ -50,10 +50,10 @@ def command_residual(
     tension >= 0, stroke released >= stroke commanded, product 0.
     """
     scale = chain.drawn_stiffness
-    missing = stroke(chain, base_tension, base) - command.value
+    missing = stroke(chain, base_tension, base) - command.target
     # A switch, not a difference: beside a large tension the rest would be lost.
     by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)
-    by_tension = (base_tension - command.value) / scale
+    by_tension = (base_tension - command.target) / scale
     return command.either(by_stroke, by_tension)
 
 

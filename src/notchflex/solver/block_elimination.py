@@ -97,7 +97,7 @@ def linear_step(
 
     at_base = _tensions_carried(chain, form)
     condensed, back = _condense(insert(rows.onward), insert(rows.behind), form)
-    tension_step = command.value - base_tension
+    tension_step = command.target - base_tension
     if command.by_stroke is not None:
         by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
         tension_step = _tension_step(chain, command, base_tension, at, by_tension)

@@ -94,8 +94,8 @@ def solve_load_step(
     The whole step is tried first. Where Newton's method fails, the step is halved until it
     succeeds, and doubled again after; only substeps that converged enter the friction history.
 
-    Where all tendons are slack before, external loads come first, with slack tendons, and then all
-    tensions together: half the load step each.
+    Where all tendons are slack before, external loads come first, then all tensions together: half
+    the load step each.
 
     Args:
         chain: The chain.
@@ -122,12 +122,12 @@ def solve_load_step(
         first = external_first & (result.reached < _EXTERNAL_COMPLETE)
         stop = jnp.where(first, _EXTERNAL_COMPLETE, 1.0)
         aim = jnp.minimum(result.reached + part, stop)
-        target = interpolate_command(chain, command, last, aim)
-        new = _solve_substep(chain, target, result.solved, settings, aim)
+        towards = interpolate_command(chain, command, last, aim)
+        new = _solve_substep(chain, towards, result.solved, settings, aim)
         memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound)
         keep = partial(jax.tree.map, lambda old, new_leaf: jnp.where(new.converged, new_leaf, old))
         result = LoadStepResult(
-            solved=keep(result.solved, SolverState(new.point, memory, new.stroke, target.applied)),
+            solved=keep(result.solved, SolverState(new.point, memory, new.stroke, towards.applied)),
             residual=new.residual,
             iterations=result.iterations + new.iterations,
             converged=new.converged & (aim >= 1.0),
@@ -152,16 +152,16 @@ def solve_load_step(
 
 
 def _solve_substep(
-    chain: Chain, target: Command, solved: SolverState, settings: Settings, aim: Array
+    chain: Chain, command: Command, solved: SolverState, settings: Settings, aim: Array
 ) -> NewtonResult:
     """Solve for a command near a solved state, from the predicted log ratios."""
-    before = solved.point.base_tension
-    tension = target.either(before, target.value)
-    log_ratio = predict_log_ratios(chain, before, tension, solved.memory)
-    start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), tension)
+    last_tension = solved.point.base_tension
+    base_tension = command.either(last_tension, command.target)
+    log_ratio = predict_log_ratios(chain, last_tension, base_tension, solved.memory)
+    start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
     enough = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
     enough = jnp.where(aim < 1.0, enough, 0.0)
-    return newton(chain, target, solved.memory, before, start, settings, enough)
+    return newton(chain, command, solved.memory, last_tension, start, settings, enough)
 
 
 def interpolate_command(
@@ -174,9 +174,9 @@ def interpolate_command(
     tendons = jnp.where(external_first, jnp.maximum(2.0 * part - 1.0, 0.0), part)
     only_external = external_first & (tendons == 0.0)
     by_stroke = None if command.by_stroke is None else command.by_stroke & ~only_external
-    value = jnp.where(only_external, 0.0, _interpolate(from_here, command.value, tendons))
+    target = jnp.where(only_external, 0.0, _interpolate(from_here, command.target, tendons))
     applied = jax.tree.map(partial(_interpolate, part=external), last.applied, command.applied)
-    return Command(value, by_stroke, applied)
+    return Command(target, by_stroke, applied)
 
 
 def _external_first(chain: Chain, last: SolverState) -> Bool[Array, ""]:

@@ -23,14 +23,14 @@ _SLACK = 1e-100
 
 
 def predict_log_ratios(
-    chain: Chain, before: Float[Array, " t"], now: Float[Array, " t"], memory: Memory
+    chain: Chain, last_tension: Float[Array, " t"], base_tension: Float[Array, " t"], memory: Memory
 ) -> tuple[Float[Array, "n t 2"], ...]:
     """Predict the log ratios of all contacts for new base tensions.
 
     Args:
         chain: The chain.
-        before: Base tensions of the last solved state, N.
-        now: The new ones, N.
+        last_tension: Base tensions of the last solved state, N.
+        base_tension: The new ones, N.
         memory: History of the contacts, as of that state.
 
     Returns:
@@ -39,7 +39,9 @@ def predict_log_ratios(
     predicted = []
     for group, old_ratio, bound in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
         numbers = jnp.array(group.numbers)
-        old, new = (jnp.maximum(tension[numbers], _SLACK) for tension in (before, now))
+        old, new = (
+            jnp.maximum(tension[numbers], _SLACK) for tension in (last_tension, base_tension)
+        )
         change = jnp.broadcast_to(jnp.log(new / old)[None, :, None], old_ratio.shape)
         rise, fall = (_cumulate(jnp.maximum(bound - side * old_ratio, 0.0)) for side in (1.0, -1.0))
         behind = jnp.maximum(change - rise, 0.0) + jnp.minimum(change + fall, 0.0)

@@ -99,12 +99,12 @@ class _Search(NamedTuple):
 
 
 class _Problem(NamedTuple):
-    """What is solved: a command on a chain, after a state with base tensions `before` (N)."""
+    """What is solved: a command on a chain, after a state with other base tensions (N)."""
 
     chain: Chain
     command: Command
     memory: Memory
-    before: Float[Array, " t"]
+    last_tension: Float[Array, " t"]
 
 
 # A step may turn a flexure by so much (rad); as `LARGEST_LOG_RATIO`.
@@ -127,7 +127,7 @@ def newton(
     chain: Chain,
     command: Command,
     memory: Memory,
-    before: Float[Array, " t"],
+    last_tension: Float[Array, " t"],
     start: Iterate,
     settings: Settings,
     enough: Float[Array, ""],
@@ -141,7 +141,7 @@ def newton(
         chain: The chain.
         command: Tensions and strokes commanded, external loads.
         memory: History of the contacts; not changed.
-        before: Base tensions of the last solved state, N.
+        last_tension: Base tensions of the last solved state, N.
         start: Where to begin.
         settings: Tolerance and limits.
         enough: Residual that is small enough, should it be above the tolerance.
@@ -151,7 +151,7 @@ def newton(
     """
     tolerance = _tolerance(chain, start, settings)
     small_enough = jnp.maximum(tolerance, enough)
-    problem = _Problem(chain, command, memory, before)
+    problem = _Problem(chain, command, memory, last_tension)
 
     def proceed(search: _Search) -> Bool[Array, ""]:
         return ~search.terminate & (search.best.iterations <= settings.max_iterations)
@@ -245,7 +245,7 @@ def _next_step(
     problem: _Problem, new: NewtonResult, at: Evaluation, iterations: Int[Array, ""]
 ) -> tuple[Iterate, Float[Array, ""]]:
     """Step from an accepted point, and the fraction of it to try first."""
-    chain, command, memory, before = problem
+    chain, command, memory, last_tension = problem
     point = new.point
     step = linear_step(chain, command, point.unknowns, memory, point.base_tension, at)
     step = limit_slack(chain, point, step)
@@ -266,7 +266,7 @@ def _next_step(
 
     def predicted() -> NewtonStep:
         limits = memory._replace(bound=new.bound)
-        return predict_contacts(chain, command, limits, before, point, step, whole, by_turn)
+        return predict_contacts(chain, command, limits, last_tension, point, step, whole, by_turn)
 
     chosen = jax.lax.cond(early, predicted, lambda: step)
     return Iterate(*chosen), jnp.where(early, by_turn, whole)

@@ -64,7 +64,7 @@ def predict_contacts(
     chain: Chain,
     command: Command,
     memory: Memory,
-    before: Float[Array, " t"],
+    last_tension: Float[Array, " t"],
     point: Iterate,
     step: NewtonStep,
     whole: Float[Array, ""],
@@ -74,8 +74,8 @@ def predict_contacts(
 
     For tendons driven by stroke, while their tensions are still to be found. Sticking contacts make
     a tendon very stiff; the change of its tension is limited. Of the step that is returned `part`
-    is to be taken, of the linear one it would have been `whole`. `before` are the base tensions (N)
-    of the last solved state.
+    is to be taken, of the linear one it would have been `whole`. `last_tension` are the base
+    tensions (N) of the last solved state.
     """
     assert command.by_stroke is not None
     tension = point.base_tension + whole * step.base_tension
@@ -83,7 +83,7 @@ def predict_contacts(
         tension, 0.5 * point.base_tension, 2.0 * point.base_tension + chain.closing_force
     )
     tension = command.either(moderate, tension)
-    predicted = predict_log_ratios(chain, before, tension, memory)
+    predicted = predict_log_ratios(chain, last_tension, tension, memory)
     logs = []
     for group, there, here, change in zip(
         chain.groups, predicted, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True

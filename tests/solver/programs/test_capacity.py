@@ -48,9 +48,9 @@ def test_a_short_robot_in_a_longer_program(robot: nf.Robot, margin, monkeypatch)
     assert usual.converged.all(), usual.reason
     with monkeypatch.context() as patched:
         patched.setattr(prepare, "capacity", lambda flexures: flexures)
-        prepare.prepared.cache_clear()
+        prepare.prepare.cache_clear()
         own = nf.simulate(robot, loads)
-    prepare.prepared.cache_clear()
+    prepare.prepare.cache_clear()
     assert own.prepared.long.chain.flexures == own.chain.flexures
     assert own.converged.all(), own.reason
     assert (np.abs(own.total_angle) > 1e-3).all(), "nothing bends"

@@ -6,7 +6,7 @@ import pytest
 import notchflex as nf
 from notchflex._jax import jax
 from notchflex.analysis.solve import prepare_for
-from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import load_path
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import StaticStructure
 

@@ -22,8 +22,8 @@ from notchflex.analysis.solve import check_refinement, prepare_for
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.command import make_commands
-from notchflex.loads.conversion import load_path
-from notchflex.loads.validation import robot_given, shown
+from notchflex.loads.load_path import load_path
+from notchflex.loads.validation import check_is_robot, short_repr
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
@@ -87,7 +87,7 @@ def differentiable(
         >>> f"{by['notch.depth']:.2f} rad/mm, {by['tension'][0, 0]:.3f} rad/N"
         '13.30 rad/mm, 1.520 rad/N'
     """
-    path = load_path(loads, robot_given(robot).number_of_tendons)
+    path = load_path(loads, check_is_robot(robot).number_of_tendons)
     check_refinement(refinement)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if not names or len(set(names)) < len(names):
@@ -234,7 +234,7 @@ class Differentiable:
     def _taken(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Values of all parameters, in their shapes."""
         if not isinstance(values, Mapping | None):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise InputError(f"give values by name of the parameter; got {shown(values)}")
+            raise InputError(f"give values by name of the parameter; got {short_repr(values)}")
         given = dict(values or {})
         wrong = [name for name in given if name not in self.start]
         if wrong:
@@ -257,7 +257,7 @@ class Differentiable:
             return jnp.broadcast_to(jnp.asarray(value, float), wanted)
         except (TypeError, ValueError):
             raise InputError(
-                f"`{name}` must be numbers of shape {wanted}; got {shown(value)}"
+                f"`{name}` must be numbers of shape {wanted}; got {short_repr(value)}"
             ) from None
 
     @cached_property

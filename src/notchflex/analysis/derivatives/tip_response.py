@@ -16,8 +16,8 @@ from notchflex.analysis.solve import check_refinement
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.applied import BodyLoads
 from notchflex.loads.command import Command, make_commands
-from notchflex.loads.conversion import load_path
-from notchflex.loads.validation import robot_given
+from notchflex.loads.load_path import load_path
+from notchflex.loads.validation import check_is_robot
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
@@ -82,7 +82,7 @@ def tip_response(
         >>> found.jacobian.shape, found.compliance.shape
         ((2, 6, 1), (2, 6, 6))
     """
-    path = load_path(loads, robot_given(robot).number_of_tendons)
+    path = load_path(loads, check_is_robot(robot).number_of_tendons)
     check_refinement(refinement)
     ready = prepare(robot, "space", loaded=True, refinement=refinement, flat=False)
     commands = make_commands(path, robot, ready.chain)

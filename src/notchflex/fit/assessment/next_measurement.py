@@ -20,7 +20,7 @@ from notchflex.fit.measurements.measurements import OBSERVED, Measurements, rows
 from notchflex.fit.measurements.simulated import modelled
 from notchflex.fit.model.samples import Samples
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import load_path
 
 
 @dataclass(frozen=True, eq=False)

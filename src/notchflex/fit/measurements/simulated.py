@@ -13,7 +13,7 @@ from notchflex.errors import InputError
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.solved_rows import solved_rows
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import load_path
 from notchflex.results.quantities.spans import spans_of
 from notchflex.robot import Robot
 

@@ -246,7 +246,7 @@ def _follow_all(
     def loads(path: Array, gauge: Array, shown: Array) -> Command:
         given: Command = command_layout.unpack(path)
         true = jnp.maximum(given.either(shown - gauge[1], shown - gauge[0]), 0.0)
-        return given._replace(value=jnp.where(jnp.isnan(shown), given.value, true))
+        return given._replace(target=jnp.where(jnp.isnan(shown), given.target, true))
 
     def one(path: Array, moves: Array | None, shown: Array) -> tuple[Any, Any]:
         # Solved once, and looked at again for its slopes: nothing that iterates is differentiated.
