@@ -1,9 +1,8 @@
-"""Points on the tube axis, told by how far from the base they lie when the robot is straight.
+"""Points on the tube axis, given by their distance from the base on the straight robot.
 
-A point on a rigid piece moves with it. Across a notch the axis is drawn as a cubic from one face to
-the next, at right angles to both. Its tangents are as long as those that follow an arc best, so
-that where the two faces lie on one arc the cubic keeps to it within 5e-6 of its radius up to 45
-degrees. It takes nothing but the poses of the bodies, and so can be differentiated by them.
+A point on a rigid piece moves with it. Across a notch the axis is a cubic from one face to the next,
+at right angles to both. Where the two faces lie on one arc, the length of its tangents keeps it to
+the arc within 5e-6 of its radius up to 45 degrees. It depends on the poses of the bodies alone.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _BEYOND = 1e-6
 
 
 class AxisPlaces(NamedTuple):
-    """Where m points lie on a straight robot of n notches.
+    """Places of m points on a straight robot of n notches.
 
     Attributes:
         body: The body that each point is on, or the one before its notch, (m,).
@@ -46,7 +45,7 @@ class AxisPlaces(NamedTuple):
 
 
 def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
-    """Find where points on the axis lie on the straight robot.
+    """Find the places of points on the axis of the straight robot.
 
     Args:
         robot: The robot.
@@ -90,7 +89,7 @@ def points_on_axis(
     body_position: Float[Array, "*s bodies 3"],
     body_rotation: Float[Array, "*s bodies 3 3"],
 ) -> Float[Array, "*s m 3"]:
-    """Points on the axis of a bent robot.
+    """Return points on the axis of a bent robot.
 
     Args:
         places: Where they lie on the straight robot.
@@ -131,7 +130,7 @@ def points_on_axis(
 
 
 def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64]:
-    """Points on the tube axis of every state of a path, in the world.
+    """Return points on the tube axis of every state of a path, in the world.
 
     Args:
         path: The states, s steps.
@@ -141,7 +140,7 @@ def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64
         The points, mm, (s, m, 3).
 
     Raises:
-        InputError: The robot is not that long.
+        InputError: A distance is beyond the tip.
 
     Example:
         >>> from notchflex import load_robot, pull, simulate

@@ -1,4 +1,4 @@
-"""Many robots, or many loads, at once: tables in, tables out, in pieces that fit the cache.
+"""Batches: many robots or many loads at once, in pieces that fit the cache.
 
 Robots of one form (as many notches, tendons and modes, the same laws) run through one program, a
 row of numbers each. A batch is cut into pieces; the cores take one after the other, so that memory
@@ -24,7 +24,7 @@ from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.command import make_commands, pad_commands
 from notchflex.loads.load_path import join_paths, load_path
-from notchflex.loads.validation import check_integer, short_repr
+from notchflex.loads.validation import check_integer, one_or_several, short_repr
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.derived.quantities import BY_BODY, BY_FLEXURE
@@ -39,7 +39,7 @@ _PIECES = {0: 64, 512: 256, 8192: 2048}
 
 
 class Batch(Displayed, Mapping[str, np.ndarray]):
-    """What a batch returned: arrays by name, the rows of the batch as leading axis.
+    """Result of a batch: arrays by name, the rows of the batch as leading axis.
 
     Example:
         >>> from notchflex import load_robot, pull
@@ -99,7 +99,7 @@ def solve_batch(
         robots: One robot, or one per row.
         loads: One load, or one per row (the steps of a `LoadPath` are loads of their own here).
         outputs: What to return, by names of `EquilibriumPath`; fewer names are less memory.
-        settings: How hard the solver tries.
+        settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
         cores: How many cores to use; all where not given.
         progress: Called with the rows done and the rows of the whole batch.
@@ -133,13 +133,13 @@ def simulate_batch(
     cores: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Batch:
-    """Follow many paths of loads, each with a memory of its own.
+    """Follow many paths of loads, each with its own friction history.
 
     Args:
         robots: One robot, or one per row.
         loads: One path, or one per row, of equally many steps.
         outputs: What to return, as for `solve_batch`.
-        settings: How hard the solver tries.
+        settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
         cores: As for `solve_batch`.
         progress: As for `solve_batch`.
@@ -159,13 +159,8 @@ def simulate_batch(
     """
     every = _robots(robots)
     tendons = max(robot.number_of_tendons for robot in every)
-    try:
-        given = [loads] if isinstance(loads, LoadPath) else list(loads)
-    except TypeError:
-        raise InputError(
-            f"simulate_batch needs a notchflex.LoadPath, or some in order; got {short_repr(loads)}"
-        ) from None
-    paths = [load_path(one, tendons) for one in given]
+    message = "simulate_batch needs a notchflex.LoadPath, or some in order"
+    paths = [load_path(one, tendons) for one in one_or_several(loads, LoadPath, message)]
     if not paths or len({len(path) for path in paths}) > 1:
         raise InputError("a batch needs one path or more, all of equally many steps")
     joined = paths[0] if len(paths) == 1 else join_paths(paths)
@@ -174,14 +169,10 @@ def simulate_batch(
 
 
 def _robots(robots: Any) -> list[Robot]:
-    try:
-        every = [robots] if isinstance(robots, Robot) else list(robots)
-    except TypeError:
-        every = []
+    message = "a batch needs a notchflex.Robot, or some of them"
+    every = one_or_several(robots, Robot, message)
     if not every or not all(isinstance(robot, Robot) for robot in every):
-        raise InputError(
-            f"a batch needs a notchflex.Robot, or some of them; got {short_repr(robots)}"
-        )
+        raise InputError(f"{message}; got {short_repr(robots)}")
     return every
 
 
@@ -206,63 +197,59 @@ def _simulate(
             "a batch needs as many robots as loads, or one of either; "
             f"got {len(robots)} robots and {paths} loads"
         )
-    numbers = np.array([*(settings or DEFAULT).numbers])
-    found: dict[str, np.ndarray] = {}
+    numbers = np.array((settings or DEFAULT).numbers)
+    arrays: dict[str, np.ndarray] = {}
     done = 0
     work = [
         (table, index)
         for table in _tables(robots, joined, paths, count, asked, refinement)
         for index in table.pieces(threads)
     ]
-    with closing(on_cores(lambda one: one[0].run(one[1], numbers), work, threads)) as came:
-        for (table, index), piece in zip(work, came, strict=True):
+    with closing(on_cores(lambda one: one[0].run(one[1], numbers), work, threads)) as pieces:
+        for (table, index), piece in zip(work, pieces, strict=True):
             rows = table.rows[index]
             for name, values in piece.items():
-                _put(found, name, rows, values, count)
+                _store(arrays, name, rows, values, count)
             done += len(rows)
             if progress is not None:
                 progress(done, count)
-    return found
+    return arrays
 
 
-def _put(
-    found: dict[str, np.ndarray], name: str, rows: np.ndarray, values: np.ndarray, count: int
+def _store(
+    arrays: dict[str, np.ndarray], name: str, rows: np.ndarray, values: np.ndarray, count: int
 ) -> None:
-    """Put the values of some rows where they belong; robots with fewer notches leave NaN."""
-    if name not in found:
-        found[name] = np.empty((count, *values.shape[1:]), values.dtype)
-    shape = tuple(np.maximum(found[name].shape[1:], values.shape[1:]))
-    if shape != found[name].shape[1:]:
-        wider = [(0, 0), *((0, b - a) for a, b in zip(found[name].shape[1:], shape, strict=True))]
-        found[name] = np.pad(found[name], wider, constant_values=np.nan)
+    """Store the values of some rows; NaN where robots have fewer notches than others."""
+    if name not in arrays:
+        arrays[name] = np.empty((count, *values.shape[1:]), values.dtype)
+    shape = tuple(np.maximum(arrays[name].shape[1:], values.shape[1:]))
+    if shape != arrays[name].shape[1:]:
+        wider = [(0, 0), *((0, b - a) for a, b in zip(arrays[name].shape[1:], shape, strict=True))]
+        arrays[name] = np.pad(arrays[name], wider, constant_values=np.nan)
     first, last = int(rows[0]), int(rows[-1]) + 1
-    own = rows if last - first > len(rows) else slice(first, last)
+    where = rows if last - first > len(rows) else slice(first, last)
     if shape != values.shape[1:]:
-        found[name][own] = np.nan
-    found[name][(own, *(slice(size) for size in values.shape[1:]))] = values
+        arrays[name][where] = np.nan
+    arrays[name][(where, *(slice(size) for size in values.shape[1:]))] = values
 
 
 @dataclass(frozen=True)
 class _Table:
-    """Rows of a batch whose robots have one form.
+    """Rows of a batch whose robots run through one program.
 
     Attributes:
-        chain_layout: PytreeLayout of what is not known of the robots.
         rows: Which rows of the batch these are.
         chains: A row per robot, or one for all.
         commands: A row per path, or one for all, then the steps.
-        command_layout: PytreeLayout of one of them.
-        flexures: How many flexures are the robot's own, by row, or one number for all.
-        outputs: What is asked.
+        flexures: Number of flexures of each robot, by row, or one for all.
+        layouts: Layouts of the chains and of one command, and names of the outputs.
     """
 
-    chain_layout: StaticStructure
     rows: np.ndarray
     chains: Float[np.ndarray, "k chain"]
     commands: Float[np.ndarray, "k s command"]
-    command_layout: PytreeLayout
     flexures: Int[np.ndarray, " k"]
-    outputs: tuple[str, ...]
+    layouts: tuple[StaticStructure, PytreeLayout, tuple[str, ...]]
 
     def pieces(self, cores: int) -> Iterator[slice]:
         """Rows that are solved in one call of the program: pieces alike, as many for each core."""
@@ -279,18 +266,17 @@ class _Table:
             commands = np.repeat(self.commands, index.stop - index.start, axis=0)
         one_robot = len(self.chains) == 1
         chains = self.chains[0] if one_robot else self.chains[index]
-        forms = (self.chain_layout, self.command_layout, self.outputs)
         by_row = (not one_robot, True, False)
-        came = follow_row.rows(by_row, chains, commands, numbers, *forms)
-        own = self.flexures[index] if len(self.flexures) > 1 else self.flexures
-        return {name: _of_own(name, values, own) for name, values in came.items()}
+        outputs = follow_row.rows(by_row, chains, commands, numbers, *self.layouts)
+        flexures = self.flexures[index] if len(self.flexures) > 1 else self.flexures
+        return {name: _unpad(name, values, flexures) for name, values in outputs.items()}
 
 
-def _of_own(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
+def _unpad(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
     """Values by flexure or body with NaN where a robot has none, rows and steps as leading axes."""
-    own = flexures + (name in BY_BODY)
-    if name in (*BY_FLEXURE, *BY_BODY) and (own < values.shape[2]).any():
-        beyond = np.arange(values.shape[2]) >= own[:, None]
+    count = flexures + (name in BY_BODY)
+    if name in (*BY_FLEXURE, *BY_BODY) and (count < values.shape[2]).any():
+        beyond = np.arange(values.shape[2]) >= count[:, None]
         values[np.broadcast_to(beyond[:, None], values.shape[:3])] = np.nan
     return values
 
@@ -303,35 +289,33 @@ def _tables(
     outputs: tuple[str, ...],
     refinement: int,
 ) -> list[_Table]:
-    """The rows of a batch by the form of their robots, shorter ones filled up to the longest."""
+    """The rows of a batch by the layout of their robots, shorter ones padded to the longest."""
     steps = len(joined) // paths
     # The modes that any of the loads asks for, so that rows share a program.
     every = [prepare_for(robot, joined, None, refinement) for robot in robots]
     flexures = max(ready.chain.flexures for ready in every)
     edges = max(ready.chain.contacts.shape[1] for ready in every)
     by_stroke = not np.isnan(joined.stroke).all()
-    tables: dict[
-        tuple[PytreeLayout, PytreeLayout], list[tuple[int, PreparedChain, int, np.ndarray]]
+    groups: dict[
+        tuple[PytreeLayout, PytreeLayout], list[tuple[int, PreparedChain, np.ndarray]]
     ] = {}
     for row, (robot, own) in enumerate(zip(robots, every, strict=True)):
         part = joined if len(robots) == 1 or paths == 1 else joined.part(row * steps, steps)
         commands = pad_commands(make_commands(part, robot, own.chain), flexures, by_stroke)
         ready = pad_prepared(own, flexures, edges)
-        form = ready.command_layout(commands)
-        packed = form.pack(commands, leading=1).reshape(-1, steps, form.size)
-        entry = (row, ready, own.chain.flexures, packed)
-        tables.setdefault((ready.chain_layout, form), []).append(entry)
-    made = []
-    for (_, form), entries in tables.items():
-        numbers, robots_of_one, own, commands = zip(*entries, strict=True)
+        layout = ready.command_layout(commands)
+        packed = layout.pack(commands, leading=1).reshape(-1, steps, layout.size)
+        groups.setdefault((ready.chain_layout, layout), []).append((row, ready, packed))
+    tables = []
+    for (chain_layout, layout), entries in groups.items():
+        numbers, prepared, commands = zip(*entries, strict=True)
         rows = np.arange(count) if len(robots) == 1 else np.array(numbers)
-        whole = np.stack([ready.vector for ready in robots_of_one])
-        own_chains = [ready.chain for ready in robots_of_one]
-        known = StaticStructure.of(robots_of_one[0].chain_layout, own_chains, whole)
-        commands = np.concatenate(commands)
-        chains = known.pack(whole)
-        made.append(_Table(known, rows, chains, commands, form, np.array(own), outputs))
-    return made
+        vectors = np.stack([ready.vector for ready in prepared])
+        structure = StaticStructure.of(chain_layout, [ready.chain for ready in prepared], vectors)
+        own = np.array([every[number].chain.flexures for number in numbers])
+        layouts = (structure, layout, outputs)
+        tables.append(_Table(rows, structure.pack(vectors), np.concatenate(commands), own, layouts))
+    return tables
 
 
 __all__ = ["Batch", "simulate_batch", "solve_batch"]

@@ -1,4 +1,4 @@
-"""The compiled program of a batch: what is done with every row."""
+"""The compiled program of a batch: the path of one row."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def follow_row(
     Args:
         chain: The robot.
         commands: Its loads, step by step.
-        numbers: How hard the solver tries.
-        chain_layout: PytreeLayout of what is not known of the robot.
-        command_layout: PytreeLayout of one step.
-        outputs: Names of what is asked.
+        numbers: Tolerance and limits of the solver.
+        chain_layout: Structure of the robot and layout of its other numbers.
+        command_layout: Layout of one step.
+        outputs: Names of the outputs.
 
     Returns:
         By name, steps as leading axis.

@@ -1,4 +1,4 @@
-"""Shapes without forces: the tip of given notch angles, and the kinematic model of a stroke."""
+"""Kinematics without forces: the tip of given notch angles, and the kinematic model of a stroke."""
 
 from __future__ import annotations
 
@@ -23,9 +23,7 @@ from notchflex.solver.residual import body_poses
 def bodies_from_angles(
     robot: Robot, notch_angle: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Forward kinematics: where every body is when the notches have given angles.
-
-    Pacheco 2021, eq. 1-2.
+    """Return the poses of all bodies for given notch angles (Pacheco 2021, eq. 1-2).
 
     Args:
         robot: The robot, n notches.
@@ -36,7 +34,7 @@ def bodies_from_angles(
         in the frame of the base.
 
     Raises:
-        InputError: As many angles as the robot has notches are needed, finite.
+        InputError: Not one finite angle per notch.
 
     Example:
         >>> from notchflex import load_robot
@@ -59,7 +57,7 @@ def bodies_from_angles(
 def tip_from_angles(
     robot: Robot, notch_angle: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Forward kinematics: the tip that given notch angles lead to (Pacheco 2021, eq. 1-2).
+    """Return the tip pose for given notch angles (Pacheco 2021, eq. 1-2).
 
     Args:
         robot: The robot, n notches.
@@ -70,7 +68,7 @@ def tip_from_angles(
         of the base.
 
     Raises:
-        InputError: As many angles as the robot has notches are needed, finite.
+        InputError: Not one finite angle per notch.
 
     Example:
         >>> from notchflex import load_robot
@@ -98,11 +96,11 @@ def _bodies(chain: Chain, angles: Float[Array, "s n"]) -> tuple[Array, Array]:
 
 
 class SharedStroke(NamedTuple):
-    """What the kinematic model makes of strokes.
+    """Notch angles and lost stroke of the kinematic model.
 
     Attributes:
         notch_angle: Angle of every notch, base to tip, rad, (s, n).
-        stroke_lost: Part of the stroke that closed notches could not take, mm, (s,).
+        stroke_lost: Part of the stroke that closed notches do not take up, mm, (s,).
     """
 
     notch_angle: NDArray[np.float64]
@@ -110,11 +108,11 @@ class SharedStroke(NamedTuple):
 
 
 def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
-    """The kinematic model of Pacheco 2021, eq. 1-3: the stroke is shared equally by all notches.
+    """Share a stroke equally between all notches: the kinematic model of Pacheco 2021, eq. 1-3.
 
     Every notch bends by its share over its moment arm r_i + ybar, from its precurvature on and
-    at most until it closes; what it then can't take of its share is lost, and told. No force,
-    material or friction enters; it is the paper's model (iii), for comparison.
+    at most until it closes; the rest of its share is lost. No force, material or friction enters; it
+    is the paper's model (iii), for comparison.
 
     Args:
         robot: A robot whose first tendon runs along the wall.
@@ -158,6 +156,6 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
     closing = free + closing_travel(chain.rods)
     angle = np.clip(free + share / arm, free, closing)
     lost = np.maximum(share - arm * (angle - free), 0.0)
-    # Rounding of a share that is taken whole is no loss.
+    # A share that is taken up completely loses nothing, whatever rounding says.
     lost = np.where(angle < closing, 0.0, lost)
     return SharedStroke(angle, lost.sum(axis=1))

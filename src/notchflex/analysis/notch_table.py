@@ -1,4 +1,4 @@
-"""What a notch is before anything pulls, and how it closes: one row for every notch."""
+"""Geometry, section and closing of every notch, one row each."""
 
 from __future__ import annotations
 

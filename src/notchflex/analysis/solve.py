@@ -1,4 +1,4 @@
-"""The public functions: one load, a path with friction history, many loads each from rest."""
+"""Equilibria under one load, along a path with friction history, or of many loads from rest."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def simulate(
         from_state: State to continue from; rest where not given.
         settings: Tolerance and limits of the solver.
         refinement: 0 for the usual strain modes; 1, 2 or 3 adds more. A result that does not change
-            has converged (`moment_error` says how much is missing).
+            has converged (`moment_error` estimates the remaining error).
 
     Returns:
         The states, one per load. Where a load does not converge, `converged` is false and `reason`
@@ -51,14 +51,9 @@ def simulate(
         >>> bool(path.total_angle[3] == path.total_angle[2] > path.total_angle[1])
         True
     """
-    load = load_path(loads, robot.number_of_tendons)
     if from_state is not None:
         check_robot(from_state, robot)
-    ready = prepare_for(robot, load, from_state, refinement)
-    start = None if from_state is None else fitted(from_state, ready.chain)
-    commands = make_commands(load, robot, ready.chain)
-    came = run(ready, commands, start, settings or DEFAULT, each_from_start=False)
-    return EquilibriumPath(robot, load, ready, came, settings=settings or DEFAULT)
+    return _follow(robot, loads, from_state, settings or DEFAULT, refinement)
 
 
 def solve(
@@ -121,12 +116,25 @@ def solve_each(
         >>> path.converged.tolist()
         [True, True, True]
     """
+    return _follow(robot, loads, None, settings or DEFAULT, refinement, each_from_rest=True)
+
+
+def _follow(
+    robot: Robot,
+    loads: Load | LoadPath | Iterable[Load],
+    from_state: State | SavedState | None,
+    settings: Settings,
+    refinement: int,
+    *,
+    each_from_rest: bool = False,
+) -> EquilibriumPath:
     load = load_path(loads, robot.number_of_tendons)
-    ready = prepare_for(robot, load, refinement=refinement)
+    ready = prepare_for(robot, load, from_state, refinement)
+    start = None if from_state is None else fitted(from_state, ready.chain)
     commands = make_commands(load, robot, ready.chain)
-    came = run(ready, commands, None, settings or DEFAULT, each_from_start=True)
+    states = run(ready, commands, start, settings, each_from_start=each_from_rest)
     return EquilibriumPath(
-        robot, load, ready, came, each_from_rest=True, settings=settings or DEFAULT
+        robot, load, ready, states, each_from_rest=each_from_rest, settings=settings
     )
 
 
@@ -144,7 +152,7 @@ def prepare_for(
     from_state: State | SavedState | None = None,
     refinement: int = 0,
 ) -> PreparedChain:
-    """The robot with modes enough for all loads of a path, and for the state before it."""
+    """Prepare a robot with modes enough for all loads of a path, and for the state before it."""
     check_refinement(refinement)
     if from_state is not None and from_state.refinement != refinement:
         raise InputError(

@@ -16,7 +16,12 @@ from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
 from notchflex.loads.external import EXTERNAL, NOTHING, BodyForce, ExternalLoad
 from notchflex.loads.load import BASE_TURN, NO_TURN, Load
-from notchflex.loads.validation import check_table, check_vector, short_repr
+from notchflex.loads.validation import (
+    check_table,
+    check_vector,
+    one_or_several,
+    short_repr,
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -49,10 +54,9 @@ class LoadPath(Displayed):
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
                 f"got {tension.shape} and {stroke.shape}"
             )
-        object.__setattr__(self, "tension", tension)
-        object.__setattr__(self, "stroke", stroke)
-        object.__setattr__(self, "base_rotation", base_rotation)
-        object.__setattr__(self, "external", _for_steps(self.external, len(tension)))
+        external = _for_steps(self.external, len(tension))
+        fields = {"tension": tension, "stroke": stroke, "base_rotation": base_rotation}
+        vars(self).update(fields, external=external)
         if tension.size and np.isnan(stroke).all() and 0.0 <= tension.min() < np.inf:
             return  # valid tensions alone, as most often
         if len(tension) == 0:
@@ -261,7 +265,14 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     """
     if isinstance(loads, LoadPath):
         return loads.for_tendons(tendons)
-    every = [loads] if isinstance(loads, Load) else _several(loads)
+    every: list[Load] = one_or_several(
+        loads, Load, "loads must be a notchflex.Load, a LoadPath or Loads in order"
+    )
+    if not every:
+        raise InputError("there are no loads; give at least one")
+    for load in every:
+        if not isinstance(load, Load):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
     turns = {
         NO_TURN if load.base_rotation is NO_TURN else check_vector(load.base_rotation, *BASE_TURN)
         for load in every
@@ -276,22 +287,6 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
         return LoadPath(*given, external)  # raises the error
     return LoadPath.of_valid(*given, external)
-
-
-def _several(loads: Any) -> list[Load]:
-    """Loads in order, one or more."""
-    try:
-        every = list(loads)
-    except TypeError:
-        raise InputError(
-            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {short_repr(loads)}"
-        ) from None
-    if not every:
-        raise InputError("there are no loads; give at least one")
-    for load in every:
-        if not isinstance(load, Load):
-            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
-    return every
 
 
 def _as_given(values: np.ndarray) -> float | list[float | None] | None:

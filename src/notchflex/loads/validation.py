@@ -86,6 +86,14 @@ def check_table(value: Any, what: str) -> np.ndarray:
         ) from None
 
 
+def one_or_several(value: Any, kind: type, what: str) -> list[Any]:
+    """Return one value of a kind, or several in order, as a list; the entries are not checked."""
+    try:
+        return [value] if isinstance(value, kind) else list(value)
+    except TypeError:
+        raise InputError(f"{what}; got {short_repr(value)}") from None
+
+
 def check_is_robot(value: Any) -> Robot:
     """Return a robot."""
     if not isinstance(value, Robot):
@@ -106,4 +114,4 @@ def short_repr(value: Any) -> str:
 
 
 __all__ = ["check_bool", "check_integer", "check_is_robot", "check_number", "check_table"]
-__all__ += ["check_vector", "short_repr"]
+__all__ += ["check_vector", "one_or_several", "short_repr"]

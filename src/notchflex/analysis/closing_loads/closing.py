@@ -1,4 +1,4 @@
-"""When does every notch close? Angle, tension and strain."""
+"""Closing of every notch: angle, tension and strain."""
 
 from __future__ import annotations
 

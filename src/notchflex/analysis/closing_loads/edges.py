@@ -1,7 +1,6 @@
-"""When do notches close whose edges belong to rigid pieces, as slots and triangular notches do?
+"""Closing of notches whose edges belong to rigid pieces, such as slots and triangular notches.
 
-The tendon is pulled in steps from rest; between the two steps where an edge comes to touch, the
-tension is found by false position on the solver itself.
+The tendon is pulled in steps from rest, which brackets the tension where an edge comes to touch.
 """
 
 from __future__ import annotations
@@ -9,18 +8,15 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.analysis.closing_loads.search import ClosingStatus, statuses
+from notchflex.analysis.closing_loads.search import ClosingStatus, find_roots, statuses
 from notchflex.loads.command import tension_commands
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import run
 
 # Steps of the first pull, up to so many times the tension that would close the softest notch if it
-# were linear and alone; what does not close by then is said not to close.
+# were linear and alone; what does not close by then is reported as never closing.
 _STEPS, _BEYOND_LINEAR = 40, 2.0
-# Rounds of false position that a notch needs; each gains one to two digits. More are run where the
-# solver fails in some.
-_ROUNDS, _MOST_ROUNDS = 4, 12
 
 
 def edge_closing(
@@ -47,40 +43,31 @@ def edge_closing(
 def _by_one_tendon(
     ready: PreparedChain, tendon: int, own: np.ndarray
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], np.ndarray]:
-    # Two steps where one would do: one alone is another program to compile.
-    free, _ = _pull(ready, tendon, np.zeros(2))
+    """The same for the notches `own`, pulling one tendon."""
+    free, _ = _pull(ready, tendon, np.zeros(1))
     reach = -free[0, own]  # the gap at rest: an edge so far from closing
     # Tendon and edges are about as far from the axis.
     linear = np.asarray(ready.chain.lip_stiffness)[own] * reach
     steps = np.linspace(0.0, _BEYOND_LINEAR * linear.max(), _STEPS + 1)
-    overlap, angle = _pull(ready, tendon, steps)
+    overlap, _ = _pull(ready, tendon, steps)
     touching = overlap[:, own] > 0.0
     closes = touching.any(axis=0)
-    after = np.where(closes, touching.argmax(axis=0), 1)
-    column = np.arange(len(own))
-    low, high = steps[after - 1], steps[after]
-    at_low, at_high = (overlap[:, own][step, column] for step in (after - 1, after))
-    guess, found_angle = high, angle[:, own][after, column]
-    rounds, missed = np.zeros(len(own), int), np.zeros(len(own), bool)
-    for _ in range(_MOST_ROUNDS if closes.any() else 0):
-        if (rounds[closes] >= _ROUNDS).all():
-            break
-        across = high - at_high * (high - low) / (at_high - at_low)
-        # Where the solver failed, the next trial lies closer to the tension that it bore.
-        guess = np.where(closes, np.where(missed, 0.5 * (low + guess), across), steps[-1])
-        order = np.argsort(guess)
-        pressed, angle = _pull(ready, tendon, guess[order])
-        here, there = (found[np.argsort(order), own] for found in (pressed, angle))
-        missed = ~np.isfinite(here)
-        rounds = rounds + ~missed
-        found_angle = np.where(missed, found_angle, there)
-        over, under = here > 0.0, here <= 0.0
-        low, at_low = np.where(under, guess, low), np.where(under, here, at_low)
-        high, at_high = np.where(over, guess, high), np.where(over, here, at_high)
-    found = closes & (rounds >= _ROUNDS) & ~missed
+    after = np.maximum(touching.argmax(axis=0), 1)
+
+    def at(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
+        """Overlap and angle of every notch, each at its own tension, on one path."""
+        order = np.argsort(tension)
+        back = np.argsort(order)
+        overlap, angle = _pull(ready, tendon, tension[order])
+        return overlap[back, own], angle[back, own]
+
+    low, high = (np.where(closes, steps[step], steps[-1]) for step in (after - 1, after))
+    tension, precise = find_roots(lambda tension: at(tension)[0], low, high)
+    _, angle = at(tension)
+    found = closes & precise & np.isfinite(angle)
     failed = ~np.isfinite(overlap[:, own]).all(axis=0)
     status = statuses(found, np.asarray(~closes & ~failed))
-    return np.where(found, guess, np.nan), np.where(found, found_angle, np.nan), status
+    return np.where(found, tension, np.nan), np.where(found, angle, np.nan), status
 
 
 def _pull(
@@ -89,9 +76,9 @@ def _pull(
     """Overlap of every notch's edges (contact force / stiffness - gap, mm) and its angle (rad)."""
     value = np.zeros((len(tensions), ready.chain.tendons))
     value[:, tendon] = tensions
-    came = run(ready, tension_commands(value), ready.rest, Settings(), each_from_start=False)
+    states = run(ready, tension_commands(value), ready.rest, Settings(), each_from_start=False)
     stiffness = np.asarray(ready.chain.lip_stiffness)
-    overlap = came.quantity("contact_force") / stiffness - came.quantity("gap")
-    good = came.converged[:, None]
-    angle = came.quantity("notch_angle")
+    overlap = states.quantity("contact_force") / stiffness - states.quantity("gap")
+    good = states.converged[:, None]
+    angle = states.quantity("notch_angle")
     return np.where(good, overlap, np.nan), np.where(good, angle, np.nan)

@@ -53,7 +53,7 @@ def closing_tensions(
     """
     low, high, failed = _bracket(overlap, guess)
     found = np.isfinite(high)
-    tension, precise = _root(overlap, low, np.where(found, high, low))
+    tension, precise = find_roots(overlap, low, np.where(found, high, low))
     closes = found & precise
     return np.where(closes, tension, np.nan), statuses(closes, ~found & ~failed)
 
@@ -87,12 +87,17 @@ def _bracket(
     return low, high, np.isfinite(failing)
 
 
-def _root(
+def find_roots(
     overlap: Overlap, low: Float[np.ndarray, " m"], high: Float[np.ndarray, " m"]
 ) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
-    """Roots between two tensions, by false position (Illinois), halving where that stalls.
+    """Find roots by false position (Illinois), bisecting where that stalls.
 
-    After a failed solve the next trials go elsewhere between the two, ever closer to the lower.
+    After a failed solve the next trials are elsewhere in the bracket, ever closer to its lower end.
+
+    Args:
+        overlap: The overlap of all notches, each at its own tension.
+        low: Tensions (N) that leave the notches open; of one that is not searched, `high`.
+        high: Tensions (N) that close them.
 
     Returns:
         The roots, and whether each is known to the precision asked for.
@@ -123,4 +128,4 @@ def _root(
     return 0.5 * (low + high), high - low <= _PRECISION * high
 
 
-__all__ = ["ClosingStatus", "closing_tensions", "statuses"]
+__all__ = ["ClosingStatus", "closing_tensions", "find_roots", "statuses"]

@@ -105,7 +105,7 @@ def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"
     packed, form = path.prepared.padded_commands(path.commands)
     none: Command = form.unpack(np.zeros(form.size))
     assert none.applied is not None  # the chain is assembled for loads
-    units = [none._replace(value=constant(row)) for row in np.eye(long.chain.tendons)]
+    units = [none._replace(target=constant(row)) for row in np.eye(long.chain.tendons)]
     for row in np.eye(6):
         applied = _with_tip(none.applied, row, np.asarray(long.chain.body_length)[-1])
         units.append(none._replace(applied=applied))
