@@ -9,8 +9,9 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual
+from notchflex.solver.block_elimination import Iterate
 from notchflex.solver.continuation import SolverState
-from notchflex.solver.element import Iterate, Memory, bound_side
+from notchflex.solver.element import Memory, bound_side
 from notchflex.solver.residual import evaluate
 
 # Closed lips and tendons drawn by stroke are held by springs this much stiffer than the notches:

@@ -1,7 +1,7 @@
 """Points on the tube axis, given by their distance from the base on the straight robot.
 
-A point on a rigid piece moves with it. Across a notch the axis is a cubic from one face to the next,
-at right angles to both. Where the two faces lie on one arc, the length of its tangents keeps it to
+A point on a rigid piece moves with it. Across a notch the axis is a cubic from face to face, at
+right angles to both. Where the two faces lie on one arc, the length of its tangents keeps it to
 the arc within 5e-6 of its radius up to 45 degrees. It depends on the poses of the bodies alone.
 """
 

@@ -111,8 +111,8 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
     """Share a stroke equally between all notches: the kinematic model of Pacheco 2021, eq. 1-3.
 
     Every notch bends by its share over its moment arm r_i + ybar, from its precurvature on and
-    at most until it closes; the rest of its share is lost. No force, material or friction enters; it
-    is the paper's model (iii), for comparison.
+    at most until it closes; the rest of its share is lost. No force, material or friction
+    enters; it is the paper's model (iii), for comparison.
 
     Args:
         robot: A robot whose first tendon runs along the wall.

@@ -95,7 +95,7 @@ class LoadPath(Displayed):
         """Return the load of one step, counted from 0.
 
         Raises:
-            IndexError: There is no such step.
+            IndexError: No such step.
 
         Example:
             >>> from notchflex import pull
@@ -298,23 +298,23 @@ def _as_given(values: np.ndarray) -> float | list[float | None] | None:
 
 
 def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
-    """What acts from outside, one entry per step."""
+    """Check the external loads, one entry per step."""
     try:
         given = tuple(external)
-        different = {id(one): one for one in given}
-        if not all(isinstance(one, ExternalLoad) for one in different.values()):
-            raise TypeError
     except TypeError:
+        given = (None,)
+    different = {id(one): one for one in given}.values()
+    if not all(isinstance(one, ExternalLoad) for one in different):
         raise InputError(
             "external of a load path must hold one ExternalLoad per step; "
             f"got {short_repr(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
-        ) from None
+        )
     if given and len(given) != steps:
         raise InputError(
             f"external of a load path has {len(given)} entries, but there are {steps} steps; "
             "give one per step"
         )
-    if any(isinstance(one, Load) for one in different.values()):
+    if any(isinstance(one, Load) for one in different):
         given = tuple(one.external for one in given)
     return given or (NOTHING,) * steps
 

@@ -34,12 +34,12 @@ from notchflex.solver.row_layout import RowLayout, row_layout
 _HELD, _TIED = 1e-9, 1e-7
 
 
-class NewtonStep(NamedTuple):
-    """A linear step.
+class Iterate(NamedTuple):
+    """A point of Newton's method, or a step between two.
 
     Attributes:
-        unknowns: Change of the unknowns.
-        base_tension: Change of the base tensions, N.
+        unknowns: The unknowns of all flexures.
+        base_tension: The base tensions, N.
     """
 
     unknowns: Unknowns
@@ -65,7 +65,7 @@ def linear_step(
     memory: Memory,
     base_tension: Float[Array, " t"],
     at: Evaluation,
-) -> NewtonStep:
+) -> Iterate:
     """Solve the linearised balance for the step to equilibrium.
 
     Derivatives of the step are those of the residual, not those of the linear system: a step
@@ -104,7 +104,7 @@ def linear_step(
     around = _back_substitute(condensed, jnp.asarray(at_base) @ tension_step)
     steps = jnp.einsum("nuz,nz->nu", response, around)
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
-    return NewtonStep(jax.vmap(unknowns_of)(steps), tension_step)
+    return Iterate(jax.vmap(unknowns_of)(steps), tension_step)
 
 
 def _tension_step(

@@ -12,9 +12,10 @@ from notchflex._jax import constant, jax, jnp
 from notchflex.loads.applied import BodyLoads
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.element import Iterate, Memory, Unknowns
+from notchflex.solver.block_elimination import Iterate
+from notchflex.solver.element import Memory, Unknowns
 from notchflex.solver.friction_predictor import predict_log_ratios
-from notchflex.solver.newton import NewtonResult, Settings, newton
+from notchflex.solver.newton import NewtonProblem, NewtonResult, Settings, newton
 
 
 class SolverState(NamedTuple):
@@ -110,12 +111,8 @@ def solve_load_step(
 
     def proceed(state: tuple[LoadStepResult, Array, Array]) -> Bool[Array, ""]:
         result, part, tries = state
-        return (
-            ~result.converged
-            & (part >= settings.smallest_load_step)
-            & (tries < settings.max_load_steps)
-            & (result.iterations < settings.max_all_iterations)
-        )
+        more = (part >= settings.smallest_load_step) & (tries < settings.max_load_steps)
+        return ~result.converged & more & (result.iterations < settings.max_all_iterations)
 
     def substep(state: tuple[LoadStepResult, Array, Array]) -> tuple[LoadStepResult, Array, Array]:
         result, part, tries = state
@@ -161,7 +158,8 @@ def _solve_substep(
     start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
     enough = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
     enough = jnp.where(aim < 1.0, enough, 0.0)
-    return newton(chain, command, solved.memory, last_tension, start, settings, enough)
+    problem = NewtonProblem(chain, command, solved.memory, last_tension)
+    return newton(problem, start, settings, enough)
 
 
 def interpolate_command(

@@ -36,13 +36,6 @@ class Unknowns(NamedTuple):
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
 
 
-class Iterate(NamedTuple):
-    """A guess or a solution: the unknowns and the base tensions, N."""
-
-    unknowns: Unknowns
-    base_tension: Float[Array, " t"]
-
-
 class Memory(NamedTuple):
     """History of the friction contacts, as of the last solved state.
 

@@ -15,8 +15,13 @@ from __future__ import annotations
 from jaxtyping import Array, Float
 
 from notchflex._jax import jnp
+from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
+from notchflex.solver.block_elimination import Iterate
 from notchflex.solver.element import Memory
+
+LARGEST_LOG_RATIO = 1.0
+"""A step may change a log ratio by so much; beyond, the linear model says nothing of use."""
 
 # Tensions below this (N) count as slack, so that logarithms stay finite.
 _SLACK = 1e-100
@@ -59,3 +64,56 @@ def _cumulate(values: Float[Array, "n t 2"]) -> Float[Array, "n t 2"]:
     """Sums over all edges up to each, base to tip."""
     both = jnp.cumsum(jnp.sum(values, axis=-1), axis=0)
     return jnp.stack([both - values[..., 1], both], axis=-1)
+
+
+def limit_slack(chain: Chain, point: Iterate, step: Iterate) -> Iterate:
+    """Limit the log-ratio step of slack tendons.
+
+    Without tension they act on nothing, and a sticking contact would change them at random: all
+    that matters is which way it slides. The rest of the step need not be shortened for their sake.
+    """
+    slack = (point.base_tension == 0.0) & (step.base_tension == 0.0)
+    logs = tuple(
+        jnp.where(
+            slack[jnp.array(group.numbers)][None, :, None],
+            jnp.clip(change, -LARGEST_LOG_RATIO, LARGEST_LOG_RATIO),
+            change,
+        )
+        for group, change in zip(chain.groups, step.unknowns.log_ratio, strict=True)
+    )
+    return step._replace(unknowns=step.unknowns._replace(log_ratio=logs))
+
+
+def predict_contacts(
+    chain: Chain,
+    command: Command,
+    memory: Memory,
+    last_tension: Float[Array, " t"],
+    point: Iterate,
+    step: Iterate,
+    whole: Float[Array, ""],
+    part: Float[Array, ""],
+) -> Iterate:
+    """Replace the log ratios of a step by those that the friction predictor gives.
+
+    For tendons driven by stroke, while their tensions are still to be found. Sticking contacts make
+    a tendon very stiff; the change of its tension is limited. Of the step that is returned `part`
+    is to be taken, of the linear one it would have been `whole`. `last_tension` are the base
+    tensions (N) of the last solved state.
+    """
+    assert command.by_stroke is not None
+    tension = point.base_tension + whole * step.base_tension
+    moderate = jnp.clip(
+        tension, 0.5 * point.base_tension, 2.0 * point.base_tension + chain.closing_force
+    )
+    tension = command.either(moderate, tension)
+    predicted = predict_log_ratios(chain, last_tension, tension, memory)
+    logs = []
+    for group, there, here, change in zip(
+        chain.groups, predicted, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True
+    ):
+        by_stroke = command.by_stroke[jnp.array(group.numbers)][None, :, None]
+        logs.append(jnp.where(by_stroke, there - here, whole * change) / part)
+    return Iterate(
+        step.unknowns._replace(log_ratio=tuple(logs)), (tension - point.base_tension) / part
+    )

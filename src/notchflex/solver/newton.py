@@ -14,15 +14,11 @@ from notchflex._pytree import Pytree
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
-from notchflex.solver.block_elimination import NewtonStep, linear_step
-from notchflex.solver.element import Iterate, Memory
+from notchflex.solver.block_elimination import Iterate, linear_step
+from notchflex.solver.element import Memory
+from notchflex.solver.friction_predictor import LARGEST_LOG_RATIO, limit_slack, predict_contacts
 from notchflex.solver.residual import Evaluation, evaluate
-from notchflex.solver.step_limits import (
-    LARGEST_LOG_RATIO,
-    limit_closing,
-    limit_slack,
-    predict_contacts,
-)
+from notchflex.solver.step_limits import limit_closing
 
 
 class Settings(Pytree, eq=True):
@@ -98,8 +94,15 @@ class _Search(NamedTuple):
     terminate: Bool[Array, ""]
 
 
-class _Problem(NamedTuple):
-    """What is solved: a command on a chain, after a state with other base tensions (N)."""
+class NewtonProblem(NamedTuple):
+    """A command on a chain, after another solved state.
+
+    Attributes:
+        chain: The chain.
+        command: Tensions and strokes commanded, external loads.
+        memory: History of the contacts, as of the last solved state.
+        last_tension: Base tensions of that state, N.
+    """
 
     chain: Chain
     command: Command
@@ -124,13 +127,7 @@ _LARGEST_GROWTH = 1e4
 
 
 def newton(
-    chain: Chain,
-    command: Command,
-    memory: Memory,
-    last_tension: Float[Array, " t"],
-    start: Iterate,
-    settings: Settings,
-    enough: Float[Array, ""],
+    problem: NewtonProblem, start: Iterate, settings: Settings, enough: Float[Array, ""]
 ) -> NewtonResult:
     """Find the equilibrium under a command near a starting point.
 
@@ -138,10 +135,7 @@ def newton(
     fraction tried before where that did not lessen the residual.
 
     Args:
-        chain: The chain.
-        command: Tensions and strokes commanded, external loads.
-        memory: History of the contacts; not changed.
-        last_tension: Base tensions of the last solved state, N.
+        problem: The chain, the command and the history.
         start: Where to begin.
         settings: Tolerance and limits.
         enough: Residual that is small enough, should it be above the tolerance.
@@ -149,9 +143,9 @@ def newton(
     Returns:
         The result; `converged` is false after a failure.
     """
+    chain, command, memory, _ = problem
     tolerance = _tolerance(chain, start, settings)
     small_enough = jnp.maximum(tolerance, enough)
-    problem = _Problem(chain, command, memory, last_tension)
 
     def proceed(search: _Search) -> Bool[Array, ""]:
         return ~search.terminate & (search.best.iterations <= settings.max_iterations)
@@ -189,7 +183,7 @@ def newton(
     return jax.lax.while_loop(proceed, iterate, _begin(problem, start)).best
 
 
-def _begin(problem: _Problem, start: Iterate) -> _Search:
+def _begin(problem: NewtonProblem, start: Iterate) -> _Search:
     """The search before anything is evaluated: its first point is the start."""
     nowhere = NewtonResult(
         point=start,
@@ -242,7 +236,7 @@ def _result(
 
 
 def _next_step(
-    problem: _Problem, new: NewtonResult, at: Evaluation, iterations: Int[Array, ""]
+    problem: NewtonProblem, new: NewtonResult, at: Evaluation, iterations: Int[Array, ""]
 ) -> tuple[Iterate, Float[Array, ""]]:
     """Step from an accepted point, and the fraction of it to try first."""
     chain, command, memory, last_tension = problem
@@ -259,14 +253,14 @@ def _next_step(
     by_turn = jnp.minimum(1.0, _LARGEST_TURN / turn)
     whole = jnp.minimum(by_turn, LARGEST_LOG_RATIO / log_ratio)
     if by_tension:
-        return Iterate(*limited(whole)), whole
+        return limited(whole), whole
     assert command.by_stroke is not None
     early = iterations < _PREDICTED
     early = jnp.any(command.by_stroke) & early & (new.residual > _PREDICTED_ABOVE)
 
-    def predicted() -> NewtonStep:
+    def predicted() -> Iterate:
         limits = memory._replace(bound=new.bound)
         return predict_contacts(chain, command, limits, last_tension, point, step, whole, by_turn)
 
     chosen = jax.lax.cond(early, predicted, lambda: step)
-    return Iterate(*chosen), jnp.where(early, by_turn, whole)
+    return chosen, jnp.where(early, by_turn, whole)

@@ -15,14 +15,14 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import stroke
-from notchflex.solver.block_elimination import linear_step
+from notchflex.solver.block_elimination import Iterate, linear_step
 from notchflex.solver.continuation import (
     LoadStepResult,
     SolverState,
     interpolate_command,
     solve_load_step,
 )
-from notchflex.solver.element import Iterate, Memory
+from notchflex.solver.element import Memory
 from notchflex.solver.newton import Settings
 from notchflex.solver.residual import evaluate
 

@@ -93,13 +93,13 @@ class PreparedChain:
 
     @cached_property
     def _tension_layout(self) -> PytreeLayout:
-        value = constant(np.zeros(self.chain.tendons))
-        return PytreeLayout.of(Command(value, None, unloaded(self.chain)))
+        target = constant(np.zeros(self.chain.tendons))
+        return PytreeLayout.of(Command(target, None, unloaded(self.chain)))
 
     @cached_property
     def _stroke_layout(self) -> PytreeLayout:
-        value, by_stroke = (np.zeros(self.chain.tendons, kind) for kind in (float, bool))
-        return PytreeLayout.of(Command(value, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
+        target, by_stroke = (np.zeros(self.chain.tendons, kind) for kind in (float, bool))
+        return PytreeLayout.of(Command(target, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
 
     def padded_commands(
         self, commands: Command
