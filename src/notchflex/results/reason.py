@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Int
 
 from notchflex._jax import constant, jax
-from notchflex.solver.actuation import drawn_when_closed
+from notchflex.solver.actuation import stroke_when_closed
 from notchflex.solver.programs.prepare import Prepared
 from notchflex.solver.programs.run import run
 
@@ -83,7 +83,7 @@ def why_not(path: EquilibriumPath, step: int) -> str:
 
 def _past_closing(path: EquilibriumPath, step: int) -> bool:
     """Whether a stroke of a step is more than an inextensible tendon can lose."""
-    reach = drawn_when_closed(path.chain)
+    reach = stroke_when_closed(path.chain)
     inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
     return bool((inextensible & (path.load.stroke[step] >= reach)).any())
 

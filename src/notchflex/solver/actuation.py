@@ -17,10 +17,10 @@ from notchflex.solver.residual import Base
 def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Base) -> Float[Array, " t"]:
     """Tendon drawn out at the base since the free robot (mm), with the file's stiffness."""
     stretch = base.stretch + base_tension * chain.free_length
-    return base.drawn + stretch / chain.axial_stiffness
+    return base.released_length + stretch / chain.axial_stiffness
 
 
-def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
+def stroke_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
     """Stroke at which every notch is closed (mm), infinite where that is not known beforehand.
 
     Where every notch closes against its spine, a tendon on the wall shortens by the notch's
@@ -49,7 +49,7 @@ def command_residual(
     A tendon drawn by stroke is slack where the robot has set free more than is drawn:
     tension >= 0, stroke set free >= stroke demanded, product 0.
     """
-    scale = chain.drawn_stiffness
+    scale = chain.stroke_stiffness
     missing = stroke(chain, base_tension, base) - command.value
     # Told apart, not subtracted from one another: beside a large tension the rest would be lost.
     by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)

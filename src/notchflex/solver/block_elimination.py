@@ -107,16 +107,16 @@ def _drawn(
     order = chain.tendon_order
     assert command.by_stroke is not None
 
-    def demand(tension: Array, drawn: Array, stretch: Array) -> Array:
-        base = at.base._replace(drawn=drawn, stretch=stretch)
+    def demand(tension: Array, released_length: Array, stretch: Array) -> Array:
+        base = at.base._replace(released_length=released_length, stretch=stretch)
         return command_residual(chain, command, tension, base)
 
-    here = (base_tension, at.base.drawn, at.base.stretch)
+    here = (base_tension, at.base.released_length, at.base.stretch)
     slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, here))
     back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
     # Rows in the order of the robot's tendons.
-    drawn, stretch = jnp.zeros_like(back).at[:, order].set(back)
-    by_base = slopes[1] @ drawn + slopes[2] @ stretch
+    released_length, stretch = jnp.zeros_like(back).at[:, order].set(back)
+    by_base = slopes[1] @ released_length + slopes[2] @ stretch
     matrix = slopes[0] + by_base[:, 1:]
     # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; a
     # small entry keeps such a step finite.

@@ -75,8 +75,8 @@ def held_stiffness(prepared: Prepared, commands: Command, solved: Solved) -> Ite
         given = (np.zeros(1), long.known_vector, loads[some], states[some])
         *rows, slopes = _rows.along((False, False, True, True), *given, *forms)
         rows = Blocks(*(one[:, : prepared.chain.flexures] for one in rows))
-        drawn = None if commands.by_stroke is None else np.asarray(commands.by_stroke)[some]
-        matrix = _whole(prepared.chain, form, rows, slopes, drawn)
+        by_stroke = None if commands.by_stroke is None else np.asarray(commands.by_stroke)[some]
+        matrix = _whole(prepared.chain, form, rows, slopes, by_stroke)
         yield _condensed(prepared.chain, form, matrix)
 
 
@@ -110,11 +110,13 @@ def _linearised(chain: Chain, command: Command, solved: Solved) -> tuple[Blocks,
     form = layout(chain, by_stroke=command.by_stroke is not None)
     rows = blocks(chain, unknowns, memory, solved.applied, at, form)
 
-    def demand(tension: Array, drawn: Array, stretch: Array) -> Array:
-        base = at.base._replace(drawn=drawn, stretch=stretch)
+    def demand(tension: Array, released_length: Array, stretch: Array) -> Array:
+        base = at.base._replace(released_length=released_length, stretch=stretch)
         return command_residual(chain, command, tension, base)
 
-    slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(tension, at.base.drawn, at.base.stretch)
+    slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(
+        tension, at.base.released_length, at.base.stretch
+    )
     return rows, jnp.stack(slopes)
 
 
@@ -158,8 +160,8 @@ def _whole(
         back = put(by_own, number) + by_carried @ carried[number] + by_back @ back
     on_diagonal = np.zeros((flexures, own))
     natural_gap = np.asarray(chain.rods.length).sum(-1)
-    give = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.lip_stiffness) * natural_gap)
-    on_diagonal[:, form.modes : form.modes + sum(form.lips)] = give[:, None]
+    give = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
+    on_diagonal[:, form.modes : form.modes + sum(form.contact_pairs)] = give[:, None]
     every = np.arange(flexures * own)
     matrix[:, every, every] += on_diagonal.ravel()
     if by_stroke is not None:
@@ -169,7 +171,7 @@ def _whole(
         )
         matrix[:, tensions] = slopes[:, 1] @ lengths[0] + slopes[:, 2] @ lengths[1]
         matrix[:, tensions[:, None], tensions] += slopes[:, 0]
-        soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.drawn_stiffness))
+        soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
         matrix[:, tensions, tensions] += soft
     return matrix
 
@@ -177,7 +179,7 @@ def _whole(
 def _condensed(chain: Chain, form: Layout, matrix: Float[np.ndarray, "s m m"]) -> Held:
     """What is left of the system after all but the robot's own modes is eliminated."""
     # Modes that only fill up the arrays are none of the robot's.
-    idle = np.asarray(chain.rods.idle) > 0.0
+    idle = np.asarray(chain.rods.padding_mask) > 0.0
     of_flexures = np.zeros((chain.flexures, form.unknowns), bool)
     of_flexures[:, : form.modes] = True
     keep = np.zeros(matrix.shape[-1], bool)

@@ -20,14 +20,14 @@ class Units(NamedTuple):
     """
 
     modes: Array
-    lips: list[Array]
+    contact_pairs: list[Array]
     log_ratio: list[Array]
     older: list[Array]
     turn: Array
     tension: list[Array]
     handed: list[Array]
     outside: Array
-    drawn: list[Array]
+    released_length: list[Array]
     stretch: list[Array] | None
 
     @property
@@ -44,7 +44,7 @@ class Units(NamedTuple):
     def spread(self, rows: Array) -> Array:
         """Short rows over all numbers that may change."""
         modes, whole = self.modes.shape
-        between = sum(len(own) for own in (*self.lips, *self.log_ratio))
+        between = sum(len(own) for own in (*self.contact_pairs, *self.log_ratio))
         beyond = whole - rows.shape[-1] - between
         return jnp.concatenate(
             [_padded(rows[..., :modes], between), _padded(rows[..., modes:], beyond)], axis=-1
@@ -65,7 +65,7 @@ class Layout:
     """
 
     modes: int
-    lips: tuple[int, ...]
+    contact_pairs: tuple[int, ...]
     tendons: tuple[int, ...]
     older: int
     wrench: int
@@ -76,7 +76,7 @@ class Layout:
     @property
     def unknowns(self) -> int:
         """Own unknowns of a flexure."""
-        return self.modes + sum(self.lips) + 2 * sum(self.tendons)
+        return self.modes + sum(self.contact_pairs) + 2 * sum(self.tendons)
 
     @property
     def carried(self) -> int:
@@ -103,7 +103,7 @@ class Layout:
         wrench = [self.wrench] * self.older
         sizes = [
             (self.modes,),
-            self.lips,
+            self.contact_pairs,
             [2 * count for count in self.tendons],
             wrench,
             (self.turn,),
@@ -115,12 +115,30 @@ class Layout:
         ]
         ends = np.cumsum([size for group in sizes for size in group])
         rows = map(constant, np.split(np.eye(ends[-1]), ends[:-1]))
-        modes, lips, log_ratio, older, turn, tension, handed, far, drawn, stretch = (
-            [next(rows) for _ in group] for group in sizes
-        )
+        (
+            modes,
+            contact_pairs,
+            log_ratio,
+            older,
+            turn,
+            tension,
+            handed,
+            far,
+            released_length,
+            stretch,
+        ) = ([next(rows) for _ in group] for group in sizes)
         strokes = stretch if self.by_stroke else None
         return Units(
-            modes[0], lips, log_ratio, older, turn[0], tension, handed, far[0], drawn, strokes
+            modes[0],
+            contact_pairs,
+            log_ratio,
+            older,
+            turn[0],
+            tension,
+            handed,
+            far[0],
+            released_length,
+            strokes,
         )
 
 
@@ -129,7 +147,7 @@ def layout(chain: Chain, *, by_stroke: bool) -> Layout:
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
     return Layout(
         modes=chain.stiffness.shape[-1],
-        lips=tuple(group.closes.shape[-1] for group in chain.lips),
+        contact_pairs=tuple(group.has_contact.shape[-1] for group in chain.contact_pairs),
         tendons=tuple(len(group.numbers) for group in chain.groups),
         older=chain.window - 1 if wrench else 0,
         wrench=wrench,

@@ -25,9 +25,9 @@ from jaxtyping import Array, Float
 from notchflex._jax import jax, jnp
 from notchflex.loads.applied import Applied, body_wrench
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.flexure import held_by_strains, pull_change
+from notchflex.mechanics.flexure import geometric_stiffness, material_tangent
 from notchflex.mechanics.motion import Motion, skew, wrench_turn
-from notchflex.solver.element import RATE, STICTION, Memory, Unknowns, driven, heights, pressed
+from notchflex.solver.element import RATE, STICTION, Memory, Unknowns, driven, heights, is_active
 from notchflex.solver.layout import Layout, Units
 from notchflex.solver.residual import Evaluation, holds, reaches
 from notchflex.solver.tendon_jacobian import Moves, Opening, Strand, moves_of, opening_of, strand_of
@@ -62,10 +62,10 @@ def blocks(
     unit = form.units()
     moves = moves_of(chain, at, unit)
     strands = [strand_of(chain, k, unknowns, at, unit, moves) for k in range(len(chain.groups))]
-    openings = [opening_of(chain, k, at, unit, moves) for k in range(len(chain.lips))]
+    openings = [opening_of(chain, k, at, unit, moves) for k in range(len(chain.contact_pairs))]
     elastic = chain.elastic
     if elastic is None:
-        elastic = jax.vmap(held_by_strains, in_axes=(0, None, 0, 0))(
+        elastic = jax.vmap(material_tangent, in_axes=(0, None, 0, 0))(
             chain.rods, chain.law, chain.memory, unknowns.modes
         )
         elastic = _never_singular(chain, elastic)
@@ -75,9 +75,9 @@ def blocks(
         return unit.spread(unit.of_modes(rows))
 
     if at.wrenches is not None:
-        assert at.flexure.bent is not None
-        elastic = elastic - jax.vmap(pull_change)(
-            chain.rods, unknowns.modes, at.flexure.bent, at.wrenches.whole
+        assert at.flexure.configuration is not None
+        elastic = elastic - jax.vmap(geometric_stiffness)(
+            chain.rods, unknowns.modes, at.flexure.configuration, at.wrenches.whole
         )
         whole, behind = _forces(chain, unknowns, applied, at, unit, moves, strands, openings)
         balance = by_modes(elastic) - jnp.einsum("nwm,nwz->nmz", at.flexure.twist, whole)
@@ -86,17 +86,26 @@ def blocks(
     for strand, span in zip(strands, at.spans, strict=True):
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, strand.gap_tension)
-    for group, touch, force in zip(chain.lips, at.touches, unit.lips, strict=True):
-        if touch.slope is not None:
-            closing = group.closes[..., None] * touch.slope
+    for group, contact, force in zip(
+        chain.contact_pairs, at.contacts, unit.contact_pairs, strict=True
+    ):
+        if contact.slope is not None:
+            closing = group.has_contact[..., None] * contact.slope
             balance = balance - jnp.einsum("nlm,lz->nmz", closing, force)
     height = heights(chain)[:, None, None]
-    stiff = chain.lip_stiffness[:, None, None]
+    stiff = chain.contact_stiffness[:, None, None]
     residual = [balance / chain.stiffness[..., None]]
-    for group, touch, force, own, opening in zip(
-        chain.lips, at.touches, unknowns.lip_force, unit.lips, openings, strict=True
+    for group, contact, force, own, opening in zip(
+        chain.contact_pairs,
+        at.contacts,
+        unknowns.contact_force,
+        unit.contact_pairs,
+        openings,
+        strict=True,
     ):
-        presses = pressed(chain.lip_stiffness, group.closes, force, touch.gap)[..., None]
+        presses = is_active(chain.contact_stiffness, group.has_contact, force, contact.gap)[
+            ..., None
+        ]
         closing = unit.spread(opening.gap)
         residual.append(jnp.where(presses, closing / height, own[None] / (stiff * height)))
     residual += [
@@ -105,7 +114,7 @@ def blocks(
     onward = [-unit.spread(moves.relative[number]) for number in range(form.older)]
     onward += [] if moves.turn is None else [moves.turn]
     onward += [strand.carried for strand in strands]
-    behind += [strand.drawn for strand in strands]
+    behind += [strand.released_length for strand in strands]
     behind += [strand.stretch for strand in strands if strand.stretch is not None]
     return Blocks(*(_stacked(chain, rows, form) for rows in (residual, onward, behind)))
 
@@ -156,13 +165,18 @@ def _forces(
             along = strand.gap_tension[:, :, None] * span.crossing.wrench[..., None]
             pull = along + unit.spread(span.gap_tension[..., None, None] * strand.wrench)
             ending = ending - jnp.einsum("ntwz,ntk->nkwz", pull, reaches(chain, group.back))
-    for group, touch, force, own, opening in zip(
-        chain.lips, at.touches, unknowns.lip_force, unit.lips, openings, strict=True
+    for group, contact, force, own, opening in zip(
+        chain.contact_pairs,
+        at.contacts,
+        unknowns.contact_force,
+        unit.contact_pairs,
+        openings,
+        strict=True,
     ):
-        if opening.wrench is not None and touch.wrench is not None:
-            along = own[None, :, None] * touch.wrench[..., None]
+        if opening.wrench is not None and contact.wrench is not None:
+            along = own[None, :, None] * contact.wrench[..., None]
             along = along + unit.spread(force[..., None, None] * opening.wrench)
-            push = group.closes[..., None, None] * along
+            push = group.has_contact[..., None, None] * along
             ending = ending + jnp.einsum("nlwz,nlk->nkwz", push, reaches(chain, group.back))
     whole = ending[:, 0]
     if unit.handed:

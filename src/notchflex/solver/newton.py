@@ -15,7 +15,7 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import bearable, command_residual, stroke
 from notchflex.solver.block_elimination import Step, linear_step
-from notchflex.solver.element import Memory, Unknowns, heights, pressed
+from notchflex.solver.element import Memory, Unknowns, heights, is_active
 from notchflex.solver.friction_predictor import played
 from notchflex.solver.residual import Evaluation, evaluate
 
@@ -142,7 +142,7 @@ def newton(
     """
     # Rounding grows with the moments that must balance, so the tolerance does, within reason.
     height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
-    softest = jnp.min(jnp.where(chain.rods.idle > 0.0, jnp.inf, chain.stiffness))
+    softest = jnp.min(jnp.where(chain.rods.padding_mask > 0.0, jnp.inf, chain.stiffness))
     turn_per_newton = height / softest
     largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
     growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
@@ -263,13 +263,15 @@ def _stopped_by_lips(
     follows from it would open the lips again.
     """
     modes = step.unknowns.modes
-    for group, touch, force in zip(chain.lips, at.touches, unknowns.lip_force, strict=True):
-        if touch.slope is None:
+    for group, contact, force in zip(
+        chain.contact_pairs, at.contacts, unknowns.contact_force, strict=True
+    ):
+        if contact.slope is None:
             continue  # bodies have more than one flexure to come together by
-        closing = -part * jnp.einsum("nlm,nm->nl", touch.slope, modes)
-        is_open = ~pressed(chain.lip_stiffness, group.closes, force, touch.gap)
-        stops = is_open & (closing > touch.gap) & (touch.gap > 0.0) & (group.closes > 0.0)
-        reach = (1.0 + _BEYOND) * touch.gap + _OVERLAP * heights(chain)[:, None]
+        closing = -part * jnp.einsum("nlm,nm->nl", contact.slope, modes)
+        is_open = ~is_active(chain.contact_stiffness, group.has_contact, force, contact.gap)
+        stops = is_open & (closing > contact.gap) & (contact.gap > 0.0) & (group.has_contact > 0.0)
+        reach = (1.0 + _BEYOND) * contact.gap + _OVERLAP * heights(chain)[:, None]
         allowed = jnp.where(stops, reach / jnp.where(stops, closing, 1.0), 1.0)
         modes = modes * jnp.minimum(jnp.min(allowed, axis=-1, keepdims=True), 1.0)
     return step._replace(unknowns=step.unknowns._replace(modes=modes))

@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 from notchflex._jax import jax, jnp
 from notchflex.loads.applied import Applied, body_wrench
 from notchflex.mechanics.chain import Chain, flexure_states
-from notchflex.mechanics.contact import Touch
+from notchflex.mechanics.contact import GapResponse
 from notchflex.mechanics.flexure import FlexureState
 from notchflex.mechanics.motion import Motion, identity
 from notchflex.mechanics.tendon import Crossing, TendonGroup
@@ -27,24 +27,24 @@ class Spans(NamedTuple):
 
     Attributes:
         crossing: Its way over every gap.
-        passed_on: Part of its tension that each edge of the gap leaves it.
+        tension_ratio: Part of its tension that each edge of the gap leaves it.
         gap_tension: Tension in the gap; 0 where the tendon has no span there.
         body_tension: Tension inside the distal body, likewise.
-        drawn: How much tendon the shape has set free beyond the distal body.
+        released_length: How much tendon the shape has set free beyond the distal body.
         stretch: Sum of tension times length beyond, N mm.
-        drawn_behind: As `drawn`, this gap included.
+        released_length_behind: As `released_length`, this gap included.
         stretch_behind: As `stretch`, this gap and the body included.
         slid: Tendon slid over both edges toward the base, by the memory's stiffness.
         bound: Largest log ratio at both edges.
     """
 
     crossing: Crossing
-    passed_on: Float[Array, "n t 2"]
+    tension_ratio: Float[Array, "n t 2"]
     gap_tension: Float[Array, "n t"]
     body_tension: Float[Array, "n t"]
-    drawn: Float[Array, "n t"]
+    released_length: Float[Array, "n t"]
     stretch: Float[Array, "n t"]
-    drawn_behind: Float[Array, "n t"]
+    released_length_behind: Float[Array, "n t"]
     stretch_behind: Float[Array, "n t"]
     slid: Float[Array, "n t 2"]
     bound: Float[Array, "n t 2"]
@@ -71,12 +71,12 @@ class Base(NamedTuple):
     """What comes back to the base.
 
     Attributes:
-        drawn: How much of every tendon the shape has set free, mm.
+        released_length: How much of every tendon the shape has set free, mm.
         stretch: Sum of tension times length of every tendon, N mm.
         load: External loads on all bodies, about and along the base; None if there are none.
     """
 
-    drawn: Float[Array, " t"]
+    released_length: Float[Array, " t"]
     stretch: Float[Array, " t"]
     load: Float[Array, " w"] | None
 
@@ -90,7 +90,7 @@ class Evaluation(NamedTuple):
             nothing acts on bodies.
         rotation: Rotation of every body against the base; None where no load asks for it.
         spans: For each group of tendons.
-        touches: For each kind of lips.
+        contacts: For each kind of lips.
         wrenches: What acts on the bodies; None as the anchors.
         base: What comes back to the base.
         residual: Imbalance, in the form of the unknowns and scaled to be comparable.
@@ -100,7 +100,7 @@ class Evaluation(NamedTuple):
     anchors: Motion | None
     rotation: Float[Array, "n d d"] | None
     spans: tuple[Spans, ...]
-    touches: tuple[Touch, ...]
+    contacts: tuple[GapResponse, ...]
     wrenches: Wrenches | None
     base: Base
     residual: Unknowns
@@ -135,32 +135,36 @@ def evaluate(
         _spans(chain, k, crossed(group, chain, flexure, anchors), unknowns, memory, base_tension)
         for k, group in enumerate(chain.groups)
     )
-    touches = tuple(
-        jax.vmap(type(group).touch)(group, chain.rods, flexure, picked(anchors, group.back))
-        for group in chain.lips
+    contacts = tuple(
+        jax.vmap(type(group).gap_response)(group, chain.rods, flexure, picked(anchors, group.back))
+        for group in chain.contact_pairs
     )
     wrenches, rotation, load = None, None, None
     if on_bodies:
         assert flexure.pose is not None
         outside = _outside(flexure.pose, applied)
         rotation, load = outside.rotation, outside.load
-        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, touches, outside)
+        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, contacts, outside)
     balance = flexure.internal
     if chain.elastic is not None:
         balance = jnp.einsum("nmk,nk->nm", chain.elastic, unknowns.modes)
     for span in spans:
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("nt,ntm->nm", span.gap_tension, span.crossing.slope)
-    for group, touch, force in zip(chain.lips, touches, unknowns.lip_force, strict=True):
-        if touch.slope is not None:
-            balance = balance - jnp.einsum("nl,nlm->nm", force * group.closes, touch.slope)
+    for group, contact, force in zip(
+        chain.contact_pairs, contacts, unknowns.contact_force, strict=True
+    ):
+        if contact.slope is not None:
+            balance = balance - jnp.einsum("nl,nlm->nm", force * group.has_contact, contact.slope)
     if wrenches is not None:
         balance = balance - jnp.einsum("nwm,nw->nm", flexure.twist, wrenches.whole)
     residual = Unknowns(
         modes=balance / chain.stiffness,
-        lip_force=tuple(
-            signorini(chain, group.closes, force, touch.gap)
-            for group, force, touch in zip(chain.lips, unknowns.lip_force, touches, strict=True)
+        contact_force=tuple(
+            signorini(chain, group.has_contact, force, contact.gap)
+            for group, force, contact in zip(
+                chain.contact_pairs, unknowns.contact_force, contacts, strict=True
+            )
         ),
         log_ratio=tuple(
             own - between(driven(chain, own, span.slid, memory, k), span.bound)
@@ -168,11 +172,11 @@ def evaluate(
         ),
     )
     base = Base(
-        drawn=per_tendon(chain, tuple(span.drawn_behind[0] for span in spans)),
+        released_length=per_tendon(chain, tuple(span.released_length_behind[0] for span in spans)),
         stretch=per_tendon(chain, tuple(span.stretch_behind[0] for span in spans)),
         load=load,
     )
-    return Evaluation(flexure, anchors, rotation, spans, touches, wrenches, base, residual)
+    return Evaluation(flexure, anchors, rotation, spans, contacts, wrenches, base, residual)
 
 
 def crossed(
@@ -235,10 +239,10 @@ def _spans(
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
     at_base = base_tension[jnp.array(group.numbers)][None]
-    passed_on = jnp.exp(-runs[..., None] * log_ratio)
-    beyond_both = at_base * jnp.cumprod(passed_on[..., 0] * passed_on[..., 1], axis=0)
-    gap_tension = runs * passed_on[..., 0] * _from_base_side(beyond_both, at_base[0])
-    body_tension = passed_on[..., 1] * gap_tension
+    tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
+    beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
+    gap_tension = runs * tension_ratio[..., 0] * _from_base_side(beyond_both, at_base[0])
+    body_tension = tension_ratio[..., 1] * gap_tension
     shortening = runs * (group.natural_gap - crossing.length)
     in_body = body_tension * group.body_length
     lengths = jnp.stack([shortening, gap_tension * group.natural_gap + in_body])
@@ -250,12 +254,12 @@ def _spans(
     bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
     return Spans(
         crossing=crossing,
-        passed_on=passed_on,
+        tension_ratio=tension_ratio,
         gap_tension=gap_tension,
         body_tension=body_tension,
-        drawn=beyond[0],
+        released_length=beyond[0],
         stretch=beyond[1],
-        drawn_behind=behind[0],
+        released_length_behind=behind[0],
         stretch_behind=behind[1],
         slid=jnp.stack([at_exit, at_entry], axis=-1),
         bound=holds(group) * jnp.stack(bounds, axis=-1),
@@ -316,7 +320,7 @@ def _wrenches(
     pose: Motion,
     unknowns: Unknowns,
     spans: tuple[Spans, ...],
-    touches: tuple[Touch, ...],
+    contacts: tuple[GapResponse, ...],
     outside: _Outside,
 ) -> Wrenches:
     """What spans, lips and loads do to the bodies."""
@@ -326,9 +330,11 @@ def _wrenches(
         if span.crossing.wrench is not None:
             pull = -span.gap_tension[..., None] * span.crossing.wrench
             ending = ending + jnp.einsum("ntw,ntk->nkw", pull, reaches(chain, group.back))
-    for group, touch, force in zip(chain.lips, touches, unknowns.lip_force, strict=True):
-        if touch.wrench is not None:
-            push = (force * group.closes)[..., None] * touch.wrench
+    for group, contact, force in zip(
+        chain.contact_pairs, contacts, unknowns.contact_force, strict=True
+    ):
+        if contact.wrench is not None:
+            push = (force * group.has_contact)[..., None] * contact.wrench
             ending = ending + jnp.einsum("nlw,nlk->nkw", push, reaches(chain, group.back))
     handed = [jnp.zeros((chain.flexures, size))]
     for number in reversed(range(chain.window - 1)):

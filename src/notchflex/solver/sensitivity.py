@@ -128,8 +128,8 @@ def _answering_part(
         slid=tuple(span.slid for span in at.spans),
         bound=tuple(span.bound for span in at.spans),
     )
-    drawn = stroke(chain, point.base_tension, at.base)
-    answer = Solved(point, memory, drawn, command.applied)
+    released_length = stroke(chain, point.base_tension, at.base)
+    answer = Solved(point, memory, released_length, command.applied)
     return jax.tree.map(
         lambda value, varied: _varying(value, varied, reached), _still(solved), answer
     )

@@ -51,7 +51,7 @@ def _by_one_tendon(
     free, _ = _pull(ready, tendon, np.zeros(2))
     reach = -free[0, own]  # the gap at rest: an edge so far from closing
     # Tendon and edges are about as far from the axis.
-    linear = np.asarray(ready.chain.lip_stiffness)[own] * reach
+    linear = np.asarray(ready.chain.contact_stiffness)[own] * reach
     steps = np.linspace(0.0, _BEYOND_LINEAR * linear.max(), _STEPS + 1)
     overlap, angle = _pull(ready, tendon, steps)
     touching = overlap[:, own] > 0.0
@@ -90,7 +90,7 @@ def _pull(
     value = np.zeros((len(tensions), ready.chain.tendons))
     value[:, tendon] = tensions
     came = run(ready, tensions_alone(value), ready.rest, Settings(), each_from_start=False)
-    stiffness = np.asarray(ready.chain.lip_stiffness)
+    stiffness = np.asarray(ready.chain.contact_stiffness)
     overlap = came.quantity("contact_force") / stiffness - came.quantity("gap")
     good = came.converged[:, None]
     angle = came.quantity("notch_angle")

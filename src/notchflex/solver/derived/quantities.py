@@ -192,12 +192,12 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
     turning = _turning(chain, at)
     body_length = per_tendon(chain, tuple(group.body_length for group in chain.groups))
     compliance = jnp.broadcast_to(1.0 / chain.axial_stiffness, gap_tension.shape)
-    drawn, stretch = _each(chain, [(s.drawn, s.stretch) for s in at.spans])
-    drawn_behind, stretch_behind = _each(
-        chain, [(s.drawn_behind, s.stretch_behind) for s in at.spans]
+    released_length, stretch = _each(chain, [(s.released_length, s.stretch) for s in at.spans])
+    released_length_behind, stretch_behind = _each(
+        chain, [(s.released_length_behind, s.stretch_behind) for s in at.spans]
     )
-    at_entry = drawn + (stretch + body_tension * body_length) * compliance
-    at_exit = drawn_behind + stretch_behind * compliance
+    at_entry = released_length + (stretch + body_tension * body_length) * compliance
+    at_exit = released_length_behind + stretch_behind * compliance
     log_ratio = _each(chain, [(own[..., 0], own[..., 1]) for own in point.unknowns.log_ratio])
     bound = _each(chain, [(s.bound[..., 0], s.bound[..., 1]) for s in at.spans])
     contact = along_contacts(chain, log_ratio[0], log_ratio[1])
@@ -232,9 +232,13 @@ def notch_lips(
     """Contact force and what is left of the narrowest opening of every notch (N, mm)."""
     force = jnp.zeros(chain.flexures)
     gap = jnp.full(chain.flexures, jnp.inf)
-    for group, own, touch in zip(chain.lips, unknowns.lip_force, at.touches, strict=True):
-        force = force + jnp.sum(own * group.closes, axis=-1)
-        gap = jnp.minimum(gap, jnp.min(jnp.where(group.closes > 0.0, touch.gap, jnp.inf), axis=-1))
+    for group, own, contact in zip(
+        chain.contact_pairs, unknowns.contact_force, at.contacts, strict=True
+    ):
+        force = force + jnp.sum(own * group.has_contact, axis=-1)
+        gap = jnp.minimum(
+            gap, jnp.min(jnp.where(group.has_contact > 0.0, contact.gap, jnp.inf), axis=-1)
+        )
     return force, jnp.where(jnp.isinf(gap), jnp.nan, gap)
 
 

@@ -163,7 +163,7 @@ def run(
     return Run(prepared, first, table)
 
 
-def lips(
+def contact_forces(
     prepared: Prepared, commands: Command, start: Solved, settings: Settings
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Contact forces (N) and gaps (mm) of all notches, each load from the same state.
