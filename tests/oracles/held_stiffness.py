@@ -62,17 +62,18 @@ def held_stiffness(
 
     matrix = jax.jacfwd(imbalance)(flat)
     natural_gap = chain.rods.length.sum(-1)
-    give = 1.0 / (_HOLDING_STIFFNESS * chain.lip_stiffness * natural_gap)
+    give = 1.0 / (_HOLDING_STIFFNESS * chain.contact_stiffness * natural_gap)
     softened = [jnp.zeros(modes)]
     softened += [
-        jnp.broadcast_to(give[:, None], group.closes.shape).ravel() for group in chain.lips
+        jnp.broadcast_to(give[:, None], group.has_contact.shape).ravel()
+        for group in chain.contact_pairs
     ]
     on_diagonal = jnp.concatenate(softened)
     rows = jnp.arange(len(on_diagonal))
     matrix = matrix.at[rows, rows].add(on_diagonal)
     drawn = len(flat) - chain.tendons + jnp.arange(chain.tendons)
     if command.by_stroke is not None:
-        soft = command.by_stroke / (_HOLDING_STIFFNESS * chain.drawn_stiffness)
+        soft = command.by_stroke / (_HOLDING_STIFFNESS * chain.stroke_stiffness)
         matrix = matrix.at[drawn, drawn].add(soft)
     others = matrix[modes:, modes:]
     stiffness = matrix[:modes, :modes] - matrix[:modes, modes:] @ jnp.linalg.solve(

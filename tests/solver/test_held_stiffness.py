@@ -44,7 +44,7 @@ CASES = {
 def by_the_oracle(path: nf.EquilibriumPath) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and sign of the determinant of every state."""
     loads = make_commands(path.load, path.robot, path.chain)
-    own = np.flatnonzero(np.asarray(path.chain.rods.idle).ravel() == 0.0)
+    own = np.flatnonzero(np.asarray(path.chain.rods.padding_mask).ravel() == 0.0)
     compiled = jax.jit(dense)
     found, signs = [], []
     for step in range(len(path)):

@@ -49,7 +49,7 @@ def command_residual(
     A tendon driven by stroke is slack where the robot has released more than is drawn:
     tension >= 0, stroke released >= stroke commanded, product 0.
     """
-    scale = chain.drawn_stiffness
+    scale = chain.stroke_stiffness
     missing = stroke(chain, base_tension, base) - command.target
     # A switch, not a difference: beside a large tension the rest would be lost.
     by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)

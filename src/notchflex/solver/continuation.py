@@ -70,7 +70,9 @@ def at_rest(chain: Chain) -> SolverState:
     none = tuple(constant(np.zeros((*group.present.shape, 2))) for group in chain.groups)
     unknowns = Unknowns(
         modes=constant(np.zeros(chain.stiffness.shape)),
-        lip_force=tuple(constant(np.zeros(group.closes.shape)) for group in chain.lips),
+        contact_force=tuple(
+            constant(np.zeros(group.has_contact.shape)) for group in chain.contact_pairs
+        ),
         log_ratio=none,
     )
     slack = constant(np.zeros(chain.tendons))

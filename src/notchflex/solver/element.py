@@ -26,13 +26,13 @@ class Unknowns(NamedTuple):
 
     Attributes:
         modes: Amplitudes of the strain modes.
-        lip_force: Contact forces, N, for each kind of contacts.
+        contact_force: Contact forces, N, for each kind of contacts.
         log_ratio: ln(tension on the base side / tip side) at both edges of the gap, for each
             group of tendons.
     """
 
     modes: Float[Array, "*n modes"]
-    lip_force: tuple[Float[Array, "*n l"], ...]
+    contact_force: tuple[Float[Array, "*n l"], ...]
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
 
 
@@ -80,19 +80,22 @@ def bound_side(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Arra
 
 def is_active(
     stiffness: Float[Array, " n"],
-    closes: Float[Array, "n l"],
+    has_contact: Float[Array, "n l"],
     force: Float[Array, "n l"],
     gap: Float[Array, "n l"],
 ) -> Bool[Array, "n l"]:
     """Which contacts press, by Signorini's condition: force >= 0, gap >= 0, product 0."""
-    return (force - stiffness[:, None] * gap > 0.0) & (closes > 0.0)
+    return (force - stiffness[:, None] * gap > 0.0) & (has_contact > 0.0)
 
 
 def signorini(
-    chain: Chain, closes: Float[Array, "n l"], force: Float[Array, "n l"], gap: Float[Array, "n l"]
+    chain: Chain,
+    has_contact: Float[Array, "n l"],
+    force: Float[Array, "n l"],
+    gap: Float[Array, "n l"],
 ) -> Float[Array, "n l"]:
     """Residual of Signorini's condition as one equation, as a part of the notch's height."""
-    stiffness = chain.lip_stiffness
+    stiffness = chain.contact_stiffness
     by_force = force / (stiffness * notch_heights(chain))[:, None]
     by_gap = gap / notch_heights(chain)[:, None]
-    return jnp.where(is_active(stiffness, closes, force, gap), by_gap, by_force)
+    return jnp.where(is_active(stiffness, has_contact, force, gap), by_gap, by_force)

@@ -135,9 +135,9 @@ def _assemble(
     first = np.arange(flexures)[:, None] * count
     modes = first + np.arange(form.modes)
     matrix[:, modes] *= np.asarray(chain.stiffness)[..., None]
-    contacts = first + np.arange(form.modes, form.modes + sum(form.lips))
+    contacts = first + np.arange(form.modes, form.modes + sum(form.contact_pairs))
     natural_gap = np.asarray(chain.rods.length).sum(-1)
-    give = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.lip_stiffness) * natural_gap)
+    give = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
     matrix[:, contacts, contacts] += give[:, None]
     if by_stroke is not None:
         lengths = np.zeros((2, states, len(order), size))
@@ -145,7 +145,7 @@ def _assemble(
         lengths[:, :, order] = np.moveaxis(by_tendon, 1, 0)
         matrix[:, tensions] = slopes[:, 1] @ lengths[0] + slopes[:, 2] @ lengths[1]
         matrix[:, tensions[:, None], tensions] += slopes[:, 0]
-        soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.drawn_stiffness))
+        soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
         matrix[:, tensions, tensions] += soft
     return matrix
 
@@ -156,7 +156,7 @@ def _condense_on_modes(
     """Eliminate all but the robot's modes."""
     modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(form.modes)
     others = np.setdiff1d(np.arange(matrix.shape[-1]), modes)
-    own = modes[np.asarray(chain.rods.idle) == 0.0]  # the rest only fill up the arrays
+    own = modes[np.asarray(chain.rods.padding_mask) == 0.0]  # the rest only fill up the arrays
     finite = np.isfinite(matrix).all(axis=(1, 2))
     stiffness = np.full((len(matrix), len(own), len(own)), np.nan)
     sign = np.full(len(matrix), np.nan)

@@ -101,7 +101,9 @@ def linearise(
     tendons = [
         tendon_jacobian(chain, k, unknowns, at, unit, motion) for k in range(len(chain.groups))
     ]
-    contacts = [contact_jacobian(chain, k, at, unit, motion) for k in range(len(chain.lips))]
+    contacts = [
+        contact_jacobian(chain, k, at, unit, motion) for k in range(len(chain.contact_pairs))
+    ]
     here = _Linearisation(chain, unknowns, memory, applied, at, unit, motion, tendons, contacts)
     balance, behind = _balance_rows(here)
     residual = [balance / chain.stiffness[..., None], *_contact_rows(here)]
@@ -134,9 +136,9 @@ def _balance_rows(here: _Linearisation) -> tuple[Float[Array, "n m z"], list[Arr
     if at.wrenches is None:
         balance = unit.spread(unit.of_modes(elastic))
     else:
-        assert at.flexure.bent is not None
+        assert at.flexure.configuration is not None
         elastic = elastic - jax.vmap(geometric_stiffness)(
-            chain.rods, here.unknowns.modes, at.flexure.bent, at.wrenches.resultant
+            chain.rods, here.unknowns.modes, at.flexure.configuration, at.wrenches.resultant
         )
         resultant, behind = _wrench_rows(here)
         balance = unit.spread(unit.of_modes(elastic)) - jnp.einsum(
@@ -145,9 +147,11 @@ def _balance_rows(here: _Linearisation) -> tuple[Float[Array, "n m z"], list[Arr
     for tendon, span in zip(here.tendons, at.spans, strict=True):
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, tendon.gap_tension)
-    for group, touch, force in zip(chain.lips, at.touches, unit.lips, strict=True):
-        if touch.slope is not None:
-            closing = group.closes[..., None] * touch.slope
+    for group, response, force in zip(
+        chain.contact_pairs, at.contacts, unit.contact_pairs, strict=True
+    ):
+        if response.slope is not None:
+            closing = group.has_contact[..., None] * response.slope
             balance = balance - jnp.einsum("nlm,lz->nmz", closing, force)
     return balance, behind
 
@@ -175,16 +179,18 @@ def _contact_rows(here: _Linearisation) -> list[Array]:
     """Rows of Signorini's condition, for every kind of contacts."""
     chain, rows = here.chain, list[Array]()
     height = notch_heights(chain)[:, None, None]
-    stiffness = chain.lip_stiffness[:, None, None]
-    for group, touch, force, unit_force, contact in zip(
-        chain.lips,
-        here.at.touches,
-        here.unknowns.lip_force,
-        here.unit.lips,
+    stiffness = chain.contact_stiffness[:, None, None]
+    for group, response, force, unit_force, contact in zip(
+        chain.contact_pairs,
+        here.at.contacts,
+        here.unknowns.contact_force,
+        here.unit.contact_pairs,
         here.contacts,
         strict=True,
     ):
-        active = is_active(chain.lip_stiffness, group.closes, force, touch.gap)[..., None]
+        active = is_active(chain.contact_stiffness, group.has_contact, force, response.gap)[
+            ..., None
+        ]
         closing = here.unit.spread(contact.gap)
         rows.append(jnp.where(active, closing / height, unit_force[None] / (stiffness * height)))
     return rows
@@ -224,13 +230,18 @@ def _terminating_rows(here: _Linearisation) -> Float[Array, "n window w z"]:
             pull = along + unit.spread(span.gap_tension[..., None, None] * tendon.wrench)
             reach = span_mask(chain, group.back)
             terminating = terminating - jnp.einsum("ntwz,ntk->nkwz", pull, reach)
-    for group, touch, force, unit_force, contact in zip(
-        chain.lips, at.touches, here.unknowns.lip_force, unit.lips, here.contacts, strict=True
+    for group, response, force, unit_force, contact in zip(
+        chain.contact_pairs,
+        at.contacts,
+        here.unknowns.contact_force,
+        unit.contact_pairs,
+        here.contacts,
+        strict=True,
     ):
-        if contact.wrench is not None and touch.wrench is not None:
-            along = unit_force[None, :, None] * touch.wrench[..., None]
+        if contact.wrench is not None and response.wrench is not None:
+            along = unit_force[None, :, None] * response.wrench[..., None]
             along = along + unit.spread(force[..., None, None] * contact.wrench)
-            push = group.closes[..., None, None] * along
+            push = group.has_contact[..., None, None] * along
             reach = span_mask(chain, group.back)
             terminating = terminating + jnp.einsum("nlwz,nlk->nkwz", push, reach)
     return terminating

@@ -207,7 +207,7 @@ def _begin(problem: NewtonProblem, start: Iterate) -> _Search:
 def _tolerance(chain: Chain, start: Iterate, settings: Settings) -> Float[Array, ""]:
     """Tolerance for these tensions: rounding grows with the moments that must balance."""
     height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
-    softest = jnp.min(jnp.where(chain.rods.idle > 0.0, jnp.inf, chain.stiffness))
+    softest = jnp.min(jnp.where(chain.rods.padding_mask > 0.0, jnp.inf, chain.stiffness))
     turn_per_newton = height / softest
     largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
     growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from notchflex._jax import jax, jnp
 from notchflex.loads.applied import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain, flexure_states
-from notchflex.mechanics.contact import Touch
+from notchflex.mechanics.contact import GapResponse
 from notchflex.mechanics.flexure import FlexureState
 from notchflex.mechanics.motion import Motion, identity
 from notchflex.mechanics.tendon import Crossing, TendonGroup
@@ -91,7 +91,7 @@ class Evaluation(NamedTuple):
             where nothing acts on bodies.
         rotation: Rotation of every body against the base; None without external loads.
         spans: For each group of tendons.
-        touches: For each kind of contacts.
+        contacts: For each kind of contacts.
         wrenches: On the bodies; None as the anchors.
         base: Sums over the chain, at the base.
         residual: Imbalance, in the form of the unknowns and scaled to be comparable.
@@ -101,7 +101,7 @@ class Evaluation(NamedTuple):
     anchors: Motion | None
     rotation: Float[Array, "n d d"] | None
     spans: tuple[TendonSpans, ...]
-    touches: tuple[Touch, ...]
+    contacts: tuple[GapResponse, ...]
     wrenches: BodyWrenches | None
     base: BaseReaction
     residual: Unknowns
@@ -136,31 +136,35 @@ def evaluate(
         _spans(chain, k, _crossings(group, chain, flexure, anchors), unknowns, base_tension)
         for k, group in enumerate(chain.groups)
     )
-    touches = tuple(
-        jax.vmap(type(group).touch)(group, chain.rods, flexure, select_anchors(anchors, group.back))
-        for group in chain.lips
+    contacts = tuple(
+        jax.vmap(type(group).gap_response)(
+            group, chain.rods, flexure, select_anchors(anchors, group.back)
+        )
+        for group in chain.contact_pairs
     )
     rotation, wrenches, at_base = None, None, None
     if on_bodies:
         assert flexure.pose is not None
         rotation, external, at_base = _external(flexure.pose, applied)
-        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, touches, external)
-    balance = _balance(chain, unknowns, flexure, spans, touches, wrenches)
-    lip_force = tuple(
-        signorini(chain, group.closes, force, touch.gap)
-        for group, force, touch in zip(chain.lips, unknowns.lip_force, touches, strict=True)
+        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, contacts, external)
+    balance = _balance(chain, unknowns, flexure, spans, contacts, wrenches)
+    contact_force = tuple(
+        signorini(chain, group.has_contact, force, response.gap)
+        for group, force, response in zip(
+            chain.contact_pairs, unknowns.contact_force, contacts, strict=True
+        )
     )
     log_ratio = tuple(
         ratio - clip_symmetric(trial_log_ratio(chain, ratio, span.slid, memory, k), span.bound)
         for k, (ratio, span) in enumerate(zip(unknowns.log_ratio, spans, strict=True))
     )
-    residual = Unknowns(balance / chain.stiffness, lip_force, log_ratio)
+    residual = Unknowns(balance / chain.stiffness, contact_force, log_ratio)
     base = BaseReaction(
         in_tendon_order(chain, tuple(span.released_length[0] for span in spans)),
         in_tendon_order(chain, tuple(span.tension_length[0] for span in spans)),
         at_base,
     )
-    return Evaluation(flexure, anchors, rotation, spans, touches, wrenches, base, residual)
+    return Evaluation(flexure, anchors, rotation, spans, contacts, wrenches, base, residual)
 
 
 def _balance(
@@ -168,7 +172,7 @@ def _balance(
     unknowns: Unknowns,
     flexure: FlexureState,
     spans: tuple[TendonSpans, ...],
-    touches: tuple[Touch, ...],
+    contacts: tuple[GapResponse, ...],
     wrenches: BodyWrenches | None,
 ) -> Float[Array, "n modes"]:
     """Virtual work of every strain mode, N mm."""
@@ -178,9 +182,11 @@ def _balance(
     for span in spans:
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("nt,ntm->nm", span.gap_tension, span.crossing.slope)
-    for group, touch, force in zip(chain.lips, touches, unknowns.lip_force, strict=True):
-        if touch.slope is not None:
-            balance = balance - jnp.einsum("nl,nlm->nm", force * group.closes, touch.slope)
+    for group, response, force in zip(
+        chain.contact_pairs, contacts, unknowns.contact_force, strict=True
+    ):
+        if response.slope is not None:
+            balance = balance - jnp.einsum("nl,nlm->nm", force * group.has_contact, response.slope)
     if wrenches is not None:
         balance = balance - jnp.einsum("nwm,nw->nm", flexure.twist, wrenches.resultant)
     return balance
@@ -319,7 +325,7 @@ def _wrenches(
     pose: Motion,
     unknowns: Unknowns,
     spans: tuple[TendonSpans, ...],
-    touches: tuple[Touch, ...],
+    contacts: tuple[GapResponse, ...],
     external: Float[Array, "n w"] | None,
 ) -> BodyWrenches:
     """Wrenches of spans, contacts and loads on the bodies."""
@@ -329,9 +335,11 @@ def _wrenches(
         if span.crossing.wrench is not None:
             pull = -span.gap_tension[..., None] * span.crossing.wrench
             terminating += jnp.einsum("ntw,ntk->nkw", pull, span_mask(chain, group.back))
-    for group, touch, force in zip(chain.lips, touches, unknowns.lip_force, strict=True):
-        if touch.wrench is not None:
-            push = (force * group.closes)[..., None] * touch.wrench
+    for group, response, force in zip(
+        chain.contact_pairs, contacts, unknowns.contact_force, strict=True
+    ):
+        if response.wrench is not None:
+            push = (force * group.has_contact)[..., None] * response.wrench
             terminating += jnp.einsum("nlw,nlk->nkw", push, span_mask(chain, group.back))
     transmitted = [jnp.zeros((chain.flexures, size))]
     for number in reversed(range(chain.window - 1)):

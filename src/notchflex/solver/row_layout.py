@@ -20,7 +20,7 @@ class UnitRows(NamedTuple):
     """
 
     modes: Array
-    lips: list[Array]
+    contact_pairs: list[Array]
     log_ratio: list[Array]
     older: list[Array]
     turn: Array
@@ -44,7 +44,7 @@ class UnitRows(NamedTuple):
     def spread(self, rows: Array) -> Array:
         """Short rows over all columns."""
         modes, columns = self.modes.shape
-        between = sum(len(rows) for rows in (*self.lips, *self.log_ratio))
+        between = sum(len(rows) for rows in (*self.contact_pairs, *self.log_ratio))
         beyond = columns - rows.shape[-1] - between
         return jnp.concatenate(
             [_pad(rows[..., :modes], between), _pad(rows[..., modes:], beyond)], axis=-1
@@ -64,7 +64,7 @@ class RowLayout:
     """
 
     modes: int
-    lips: tuple[int, ...]
+    contact_pairs: tuple[int, ...]
     tendons: tuple[int, ...]
     older: int
     wrench: int
@@ -75,7 +75,7 @@ class RowLayout:
     @property
     def unknowns(self) -> int:
         """Number of unknowns of a flexure."""
-        return self.modes + sum(self.lips) + 2 * sum(self.tendons)
+        return self.modes + sum(self.contact_pairs) + 2 * sum(self.tendons)
 
     @property
     def carried(self) -> int:
@@ -102,7 +102,7 @@ class RowLayout:
         wrenches = [self.wrench] * self.older
         edges = [2 * count for count in self.tendons]
         lengths = self.tendons if self.by_stroke else ()
-        own = [[self.modes], self.lips, edges]
+        own = [[self.modes], self.contact_pairs, edges]
         carried = [wrenches, [self.turn], self.tendons]
         groups = [*own, *carried, wrenches, [self.external], self.tendons, lengths]
         ends = np.cumsum([size for group in groups for size in group])
@@ -117,7 +117,7 @@ def row_layout(chain: Chain, *, by_stroke: bool) -> RowLayout:
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
     return RowLayout(
         modes=chain.stiffness.shape[-1],
-        lips=tuple(group.closes.shape[-1] for group in chain.lips),
+        contact_pairs=tuple(group.has_contact.shape[-1] for group in chain.contact_pairs),
         tendons=tuple(len(group.numbers) for group in chain.groups),
         older=chain.window - 1 if wrench else 0,
         wrench=wrench,

@@ -25,13 +25,17 @@ def limit_closing(
     follows from it would open the lips again.
     """
     modes = step.unknowns.modes
-    for group, touch, force in zip(chain.lips, at.touches, unknowns.lip_force, strict=True):
-        if touch.slope is None:
+    for group, response, force in zip(
+        chain.contact_pairs, at.contacts, unknowns.contact_force, strict=True
+    ):
+        if response.slope is None:
             continue  # bodies have more than one flexure to come together by
-        closing = -part * jnp.einsum("nlm,nm->nl", touch.slope, modes)
-        is_open = ~is_active(chain.lip_stiffness, group.closes, force, touch.gap)
-        stops = is_open & (closing > touch.gap) & (touch.gap > 0.0) & (group.closes > 0.0)
-        reach = (1.0 + _BEYOND) * touch.gap + _OVERLAP * notch_heights(chain)[:, None]
+        closing = -part * jnp.einsum("nlm,nm->nl", response.slope, modes)
+        is_open = ~is_active(chain.contact_stiffness, group.has_contact, force, response.gap)
+        stops = (
+            is_open & (closing > response.gap) & (response.gap > 0.0) & (group.has_contact > 0.0)
+        )
+        reach = (1.0 + _BEYOND) * response.gap + _OVERLAP * notch_heights(chain)[:, None]
         allowed = jnp.where(stops, reach / jnp.where(stops, closing, 1.0), 1.0)
         modes = modes * jnp.minimum(jnp.min(allowed, axis=-1, keepdims=True), 1.0)
     return step._replace(unknowns=step.unknowns._replace(modes=modes))

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.contact import LipGroup
+from notchflex.mechanics.contact import ContactGroup
 from notchflex.mechanics.flexure import flexure_state
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.motion import Motion, angular, skew, turned
@@ -89,7 +89,7 @@ def relative_motion_jacobian(
 
 
 def _by_relative_motion(
-    chain: Chain, at: Evaluation, group: TendonGroup | LipGroup, response: Callable[..., Any]
+    chain: Chain, at: Evaluation, group: TendonGroup | ContactGroup, response: Callable[..., Any]
 ) -> Any:
     """Slopes of a crossing or contact by the motion relative to the anchor, as last axis."""
     size = chain.rods.basis.shape[-2]
@@ -198,10 +198,10 @@ def contact_jacobian(
     chain: Chain, k: int, at: Evaluation, unit: UnitRows, motion: RelativeMotionJacobian
 ) -> ContactJacobian:
     """Linearise the k-th kind of contacts."""
-    group, touch = chain.lips[k], at.touches[k]
-    if touch.slope is not None:
-        return ContactJacobian(unit.of_modes(touch.slope), None)
-    slopes = _by_relative_motion(chain, at, group, type(group).touch)
+    group, response = chain.contact_pairs[k], at.contacts[k]
+    if response.slope is not None:
+        return ContactJacobian(unit.of_modes(response.slope), None)
+    slopes = _by_relative_motion(chain, at, group, type(group).gap_response)
     relative = select_back(motion.relative, group.back)
     return ContactJacobian(
         jnp.einsum("nlw,nlwz->nlz", slopes.gap, relative),

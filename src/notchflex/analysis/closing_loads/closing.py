@@ -111,7 +111,7 @@ def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
     Positive where it bends the notch toward its direction; 0 where it does not go.
     """
     place = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_place)[..., 0]
-    spine = np.where(np.asarray(chain.rods.lip_closes) > 0.0, chain.rods.end_offset[:, 0], 0.0)
+    spine = np.where(np.asarray(chain.rods.has_closure) > 0.0, chain.rods.end_offset[:, 0], 0.0)
     arm = np.zeros((chain.flexures, chain.tendons))
     for group in chain.groups:
         own = list(group.numbers)
@@ -132,7 +132,7 @@ def _tensions(
     notches = np.flatnonzero((arm > 0.0) & (travel > 0.0))
     if len(notches) == 0:
         return found, status
-    stiffness = np.asarray(chain.lip_stiffness)
+    stiffness = np.asarray(chain.contact_stiffness)
     # Always as many rows as notches, whichever are searched: one compiled program.
     which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 

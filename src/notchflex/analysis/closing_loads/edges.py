@@ -47,7 +47,7 @@ def _by_one_tendon(
     free, _ = _pull(ready, tendon, np.zeros(1))
     reach = -free[0, own]  # the gap at rest: an edge so far from closing
     # Tendon and edges are about as far from the axis.
-    linear = np.asarray(ready.chain.lip_stiffness)[own] * reach
+    linear = np.asarray(ready.chain.contact_stiffness)[own] * reach
     steps = np.linspace(0.0, _BEYOND_LINEAR * linear.max(), _STEPS + 1)
     overlap, _ = _pull(ready, tendon, steps)
     touching = overlap[:, own] > 0.0
@@ -77,7 +77,7 @@ def _pull(
     value = np.zeros((len(tensions), ready.chain.tendons))
     value[:, tendon] = tensions
     states = run(ready, tension_commands(value), ready.rest, Settings(), each_from_start=False)
-    stiffness = np.asarray(ready.chain.lip_stiffness)
+    stiffness = np.asarray(ready.chain.contact_stiffness)
     overlap = states.quantity("contact_force") / stiffness - states.quantity("gap")
     good = states.converged[:, None]
     angle = states.quantity("notch_angle")

@@ -88,7 +88,7 @@ def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: fl
 def _notches(path: EquilibriumPath, within: float) -> list[Kink]:
     chain = path.chain
     height = np.asarray(chain.rods.length).sum(-1)
-    travel = path.contact_force / np.asarray(chain.lip_stiffness)
+    travel = path.contact_force / np.asarray(chain.contact_stiffness)
     distance: Float[np.ndarray, "s n"] = np.maximum(np.abs(path.gap), travel) / height
     return [
         Kink(int(step), "notch", int(notch) + 1, None, float(distance[step, notch]))

@@ -21,7 +21,7 @@ class Passage(NamedTuple):
 
     Attributes:
         visits: 1 where the body behind the flexure has wall on that side.
-        closes: 1 where the opening is on that very side, not all round.
+        on_side: 1 where the opening is on that very side, not all round.
         back: How many bodies before that one it visited the last one, its anchor; 1 where it does
             not visit.
         left: Where it left the anchor, along the tube in the anchor's frame.
@@ -31,7 +31,7 @@ class Passage(NamedTuple):
     """
 
     visits: Float[np.ndarray, " n"]
-    closes: Float[np.ndarray, " n"]
+    on_side: Float[np.ndarray, " n"]
     back: Int[np.ndarray, " n"]
     left: Float[np.ndarray, " n"]
     enters: Float[np.ndarray, " n"]
@@ -50,17 +50,17 @@ def passage(
         direction_deg: Side of the tube.
     """
     count = len(notches)
-    visits, closes, left, enters = (np.zeros(count) for _ in range(4))
+    visits, on_side, left, enters = (np.zeros(count) for _ in range(4))
     back = np.ones(count, int)
     leaves = np.array(body_length, float)
     last = 0
     for body, opening in openings_along(notches, direction_deg):
         visits[body - 1], enters[body - 1] = 1.0, opening.enters
-        closes[body - 1] = opening.faces(direction_deg)
+        on_side[body - 1] = opening.faces(direction_deg)
         leaves[last] += opening.leaves
         back[body - 1], left[body - 1] = body - last, leaves[last]
         last = body
-    return Passage(visits, closes, back, left, enters, leaves[1:], leaves[0])
+    return Passage(visits, on_side, back, left, enters, leaves[1:], leaves[0])
 
 
 def passages(

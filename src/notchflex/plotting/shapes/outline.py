@@ -122,7 +122,7 @@ def _centre_line(shape: Bent) -> NDArray[np.float64]:
     rods = shape.chain.rods
     points: list[NDArray[np.float64]] = []
     for body, length in enumerate(shape.body_length):
-        if body and float(rods.lip_closes[body - 1]) > 0.0:
+        if body and float(rods.has_closure[body - 1]) > 0.0:
             points.append(
                 shape.flexures[body - 1].fibre(*np.asarray(rods.end_offset)[body - 1, :2])
             )

@@ -232,9 +232,13 @@ def notch_lips(
     """Contact force and what is left of the narrowest opening of every notch (N, mm)."""
     force = jnp.zeros(chain.flexures)
     gap = jnp.full(chain.flexures, jnp.inf)
-    for group, own, touch in zip(chain.lips, unknowns.lip_force, at.touches, strict=True):
-        force = force + jnp.sum(own * group.closes, axis=-1)
-        gap = jnp.minimum(gap, jnp.min(jnp.where(group.closes > 0.0, touch.gap, jnp.inf), axis=-1))
+    for group, own, response in zip(
+        chain.contact_pairs, unknowns.contact_force, at.contacts, strict=True
+    ):
+        force = force + jnp.sum(own * group.has_contact, axis=-1)
+        gap = jnp.minimum(
+            gap, jnp.min(jnp.where(group.has_contact > 0.0, response.gap, jnp.inf), axis=-1)
+        )
     return force, jnp.where(jnp.isinf(gap), jnp.nan, gap)
 
 
