@@ -56,8 +56,8 @@ def _level() -> int:
     return int(told) if told in ("0", "1", "2", "3") else 2
 
 
-def processor() -> str:
-    """What machine code is made for, and by which LLVM."""
+def target() -> str:
+    """Return what machine code is compiled for, and by which LLVM."""
     features = llvm.get_host_cpu_features().flatten()
     return f"{llvm.llvm_version_info} {llvm.get_host_cpu_name()} {features} {_level()}"
 
@@ -96,7 +96,7 @@ def _return_memory() -> None:
             ctypes.CDLL(None).malloc_trim(0)
 
 
-def loaded(code: bytes) -> Callable[[bytes, bytes, int, int], None]:
+def load(code: bytes) -> Callable[[bytes, bytes, int, int], None]:
     """The program of some machine code.
 
     Args:
@@ -117,4 +117,4 @@ def loaded(code: bytes) -> Callable[[bytes, bytes, int, int], None]:
     return function
 
 
-__all__ = ["loaded", "machine_code", "processor"]
+__all__ = ["load", "machine_code", "target"]

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lanewise import Program, UnknownHereError, machine_code, processor, source
+from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code, target
 from notchflex._jax import jax, jnp
 from notchflex.solver.programs import shipped, store
 from notchflex.solver.programs.kept_xla import Kept, making
@@ -185,7 +185,7 @@ class Native:
     ) -> CompiledFunction | None:
         """The program, from disk or made and put there; None where XLA must make it."""
         key = repr((self._name, how, by_row, shapes, others))
-        own = f"{key} {processor()}"
+        own = f"{key} {target()}"
         content = store.read(own)
         if content is None:
             written = self._source(key, how, by_row, shapes, others)
@@ -212,10 +212,10 @@ class Native:
         given = [np.zeros(shape) for shape in shapes]
         function = partial(self._with, others)
         try:
-            made, tree = source(
+            made, tree = lower(
                 function, given, self._long(*others), by_row, carries=how == "along"
             )
-        except UnknownHereError as error:
+        except UnsupportedPrimitiveError as error:
             warnings.warn(
                 f"{self._name} is compiled by XLA, which makes it some ten times slower: {error}",
                 RuntimeWarning,
@@ -225,7 +225,7 @@ class Native:
         Native.traced += 1
         if Native.traced % _TRACES == 0:
             jax.clear_caches()
-        content = _content([made.sizes, made.room, by_row, _form(tree)], made.text.encode())
+        content = _content([made.sizes, made.memory, by_row, _form(tree)], made.text.encode())
         shipped.record(key, content)
         return content
 
