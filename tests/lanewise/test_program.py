@@ -17,7 +17,7 @@ def given(size):
 
 def program(function, given, long, by_row=None):
     lowered, tree = lower(function, given, long, by_row)
-    code = machine_code(lowered.text)
+    code = machine_code(lowered.text, 0)
     return Program(code, lowered.sizes, lowered.memory, by_row), tree
 
 

@@ -38,12 +38,8 @@ class ArrayLowering:
         kind = "b" if values.dtype == bool else "f" if values.dtype.kind == "f" else "i"
         if not values.size:
             return _empty(values.shape)
-        flat = key = values.ravel()
-        if kind == "f":  # bits in the order of the floats, which keep 0.0 and -0.0 apart
-            bits = flat.astype(np.float64).view(np.int64)
-            key = bits ^ ((bits >> 63) & np.iinfo(np.int64).max)
-        _, first, where = np.unique(key, return_index=True, return_inverse=True)
-        made = [reference(self.graph.constant(one, kind)) for one in flat[first]]
+        distinct, where = np.unique(values.ravel(), return_inverse=True)
+        made = [reference(self.graph.constant(one, kind)) for one in distinct]
         return np.array(made, np.int64)[where.ravel()].reshape(values.shape)
 
     def known(self, refs: References) -> np.ndarray | None:
@@ -60,7 +56,7 @@ class ArrayLowering:
         return self.graph.constant_value(node)
 
     def _constant_row(self, row: np.ndarray, kind: str) -> int:
-        if (row == row[0]).all() and (kind != "f" or (np.signbit(row) == np.signbit(row[0])).all()):
+        if (row == row[0]).all():  # signs of known zeros do not count
             return self.graph.constant(row[0], kind)
         key = (row.tobytes(), len(row))
         return self.graph.intern("constants", (row,), len(row), kind, self.graph.top, key=key)

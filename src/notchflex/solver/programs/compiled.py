@@ -1,13 +1,12 @@
 """Compiled functions of the package: made for this processor once, found again on disk.
 
-`lanewise` makes the programs. Where it cannot (something that it does not know, or a
-program too long to be written out), and on a GPU, XLA makes them, of the same function.
+`lanewise` compiles the programs. XLA compiles the same functions where lanewise does not support
+them (with a warning), for batches on a GPU, and if `NOTCHFLEX_BACKEND=xla` asks for it.
 """
 
 from __future__ import annotations
 
 import json
-import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial, update_wrapper
@@ -18,6 +17,7 @@ import numpy as np
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code, target
 from notchflex._jax import jax, jnp
 from notchflex.solver.programs import shipped, store
+from notchflex.solver.programs.backend import backend, optimisation_level, warn_of_xla
 from notchflex.solver.programs.kept_xla import Kept, making
 
 # Rows that XLA's programs are made for; more are cut up, fewer filled up.
@@ -155,7 +155,7 @@ class Native:
     def _made(
         self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
     ) -> CompiledFunction | None:
-        if getattr(jax.config, "jax_disable_jit"):  # noqa: B009
+        if getattr(jax.config, "jax_disable_jit") or backend() == "xla":  # noqa: B009
             return None
         vectors, others = arguments[: self._vectors], arguments[self._vectors :]
         shapes = tuple(
@@ -185,7 +185,8 @@ class Native:
     ) -> CompiledFunction | None:
         """The program, from disk or made and put there; None where XLA must make it."""
         key = repr((self._name, how, by_row, shapes, others))
-        own = f"{key} {target()}"
+        level = optimisation_level()
+        own = f"{key} {target()} {level}"
         content = store.read(own)
         if content is None:
             written = self._source(key, how, by_row, shapes, others)
@@ -193,7 +194,7 @@ class Native:
                 return None
             Native.compiled += 1
             head, text = _parts(written)
-            content = _content(head, machine_code(text.decode()))
+            content = _content(head, machine_code(text.decode(), level))
             store.write(own, content)
         return CompiledFunction(content)
 
@@ -212,15 +213,9 @@ class Native:
         given = [np.zeros(shape) for shape in shapes]
         function = partial(self._with, others)
         try:
-            made, tree = lower(
-                function, given, self._long(*others), by_row, carries=how == "along"
-            )
+            made, tree = lower(function, given, self._long(*others), by_row, carries=how == "along")
         except UnsupportedPrimitiveError as error:
-            warnings.warn(
-                f"{self._name} is compiled by XLA, which makes it some ten times slower: {error}",
-                RuntimeWarning,
-                stacklevel=2,
-            )
+            warn_of_xla(self._name, error)
             return None
         Native.traced += 1
         if Native.traced % _TRACES == 0:
