@@ -29,6 +29,8 @@ class RecordPrograms(BuildHookInterface):
             "NOTCHFLEX_OPTIMISATION": "0",
             "JAX_COMPILATION_CACHE_DIR": "",
             "JAX_PLATFORMS": "cpu",
+            # A program that lanewise cannot compile would not be shipped: that must be seen.
+            "PYTHONWARNINGS": "error:XLA compiles:RuntimeWarning",
         }
         calls = [
             subprocess.Popen(

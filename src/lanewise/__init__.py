@@ -1,16 +1,19 @@
-"""A small compiler: programs that JAX has traced, as vector code for this processor."""
+"""Compile functions that JAX has traced to vector code for this processor, by LLVM.
+
+The README of this package describes how it works.
+"""
 
 from lanewise.ir.control_flow import WIDTH
-from lanewise.ir.graph import UnknownHereError
-from lanewise.machine import machine_code, processor
-from lanewise.program import Program, Source, source
+from lanewise.ir.graph import UnsupportedPrimitiveError
+from lanewise.machine import machine_code, target
+from lanewise.program import LoweredProgram, Program, lower
 
 __all__ = [
     "WIDTH",
+    "LoweredProgram",
     "Program",
-    "Source",
-    "UnknownHereError",
+    "UnsupportedPrimitiveError",
+    "lower",
     "machine_code",
-    "processor",
-    "source",
+    "target",
 ]

@@ -1,9 +1,8 @@
-"""LLVM: from the text of a program to machine code, and from machine code to something to call."""
+"""Compile LLVM IR to machine code, and load machine code."""
 
 from __future__ import annotations
 
 import ctypes
-import os
 import sys
 import threading
 from collections.abc import Callable, Generator
@@ -13,9 +12,9 @@ from typing import Any
 
 import llvmlite.binding as llvm
 
-# A program is a few long parts without loops, of which LLVM's passes for code as people write it
-# take several times as long as all else; it is in a good order already. What is turned off, and
-# what says so; put back after, as others may use the same LLVM.
+# A program is a few long functions without loops, in a good order already. LLVM's passes for code
+# as people write it would take several times as long as all others. LLVM has no other switch for
+# these than options of the whole process (see the README); they are set during a compilation only.
 _OPTIONS = {
     "-disable-lsr": ("true", "false"),
     "-disable-machine-cse": ("true", "false"),
@@ -27,94 +26,83 @@ _OPTIONS = {
     "-combiner-store-merging": ("false", "true"),
 }
 # LLVM ends the process at an option that it does not know.
-_KNOWN_TO = range(18, 23)
-_Called = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
+_KNOWN_VERSIONS = range(18, 23)
+_Function = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64
+)
 _lock = threading.Lock()
-
-LEVEL = "NOTCHFLEX_OPTIMISATION"
-"""Environment variable: how hard LLVM tries, 0 to 3. Programs that run a few times want 0."""
 
 
 @cache
-def _begun() -> None:
+def _initialize() -> None:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
 
 
-def _machine() -> Any:
-    """What makes machine code; an engine takes its own with it when it ends."""
-    _begun()
-    target = llvm.Target.from_default_triple()
+def _target_machine(level: int) -> Any:
+    """Return a new target machine; an engine ends its own with itself."""
+    _initialize()
     features = llvm.get_host_cpu_features().flatten()
-    return target.create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=_level(), jit=True
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=level, jit=True
     )
 
 
-def _level() -> int:
-    told = os.environ.get(LEVEL, "")
-    return int(told) if told in ("0", "1", "2", "3") else 2
-
-
-def processor() -> str:
-    """What machine code is made for, and by which LLVM."""
-    features = llvm.get_host_cpu_features().flatten()
-    return f"{llvm.llvm_version_info} {llvm.get_host_cpu_name()} {features} {_level()}"
+def target() -> str:
+    """Return what machine code is compiled for: version of LLVM, processor and its features."""
+    version = ".".join(map(str, llvm.llvm_version_info))
+    return f"{version} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
 
 
 @contextmanager
-def _plain_passes() -> Generator[None]:
-    known = llvm.llvm_version_info[0] in _KNOWN_TO
-    for option, (ours, _) in _OPTIONS.items() if known else ():
-        llvm.set_option("notchflex", f"{option}={ours}")
+def _without_slow_passes() -> Generator[None]:
+    options = _OPTIONS if llvm.llvm_version_info[0] in _KNOWN_VERSIONS else {}
+    for option, (ours, _) in options.items():
+        llvm.set_option("lanewise", f"{option}={ours}")
     try:
         yield
     finally:
-        for option, (_, theirs) in _OPTIONS.items() if known else ():
-            llvm.set_option("notchflex", f"{option}={theirs}")
+        for option, (_, default) in options.items():
+            llvm.set_option("lanewise", f"{option}={default}")
 
 
-def machine_code(text: str) -> bytes:
-    """Machine code of a program.
+def machine_code(text: str, level: int = 2) -> bytes:
+    """Return the machine code of a program.
 
     Args:
-        text: The program, in LLVM's language.
+        text: The program, in LLVM IR.
+        level: How hard LLVM optimises, 0 to 3.
     """
-    with _lock, _plain_passes():
-        machine = _machine()
+    with _lock, _without_slow_passes():
+        machine = _target_machine(level)
         head = f'target triple = "{machine.triple}"\n'
         head += f'target datalayout = "{machine.target_data}"\n'
         code = machine.emit_object(llvm.parse_assembly(head + text))
-    _return_memory()
+    # LLVM leaves some 40 MB free, of which glibc returns nothing by itself.
+    if sys.platform == "linux":
+        with suppress(AttributeError):  # other C libraries have no such function
+            ctypes.CDLL(None).malloc_trim(0)
     return code
 
 
-def _return_memory() -> None:
-    """Give back what LLVM has left free: of some 40 MB, glibc returns nothing by itself."""
-    if sys.platform == "linux":
-        with suppress(AttributeError):  # other libraries of C have no such function
-            ctypes.CDLL(None).malloc_trim(0)
-
-
-def loaded(code: bytes) -> Callable[[bytes, bytes, int, int], None]:
-    """The program of some machine code.
+def load(code: bytes) -> Callable[[bytes, bytes, int, int], None]:
+    """Load machine code.
 
     Args:
         code: What `machine_code` returned, on the same kind of processor.
 
     Returns:
-        A function of addresses given, addresses of results, the address of memory, and the number
-        of rows.
+        A function of arrays of pointers to arguments and to results, the address of working memory
+        and the number of rows.
     """
     with _lock:
-        machine = _machine()
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine(0))
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        function = _Called(engine.get_function_address("program"))
+        function = _Function(engine.get_function_address("program"))
     # The code lives as long as its engine.
     function.engine = engine  # pyright: ignore[reportAttributeAccessIssue]
     return function
 
 
-__all__ = ["loaded", "machine_code", "processor"]
+__all__ = ["load", "machine_code", "target"]

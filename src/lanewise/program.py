@@ -1,9 +1,4 @@
-"""Programs for this processor, made of functions that JAX can trace, and called with arrays.
-
-JAX stays the one language that the mechanics are written in; XLA, which compiles it elsewhere, is
-made for few operations on large arrays, and a robot is many on small ones. Here they become one
-piece of straight vector code: the lanes of a vector are flexures, or rows of a batch.
-"""
+"""Lower functions that JAX can trace, and call the programs made of them with arrays."""
 
 from __future__ import annotations
 
@@ -18,51 +13,104 @@ import numpy as np
 
 from lanewise._jax import jax
 from lanewise.codegen.emit import Emitter
-from lanewise.lowering.lower import Reader
-from lanewise.machine import loaded
+from lanewise.lowering.lower import lower_batch, lower_path, lower_single
+from lanewise.machine import load
 
-_own = threading.local()
+_thread = threading.local()
+
+
+@dataclass(frozen=True)
+class LoweredProgram:
+    """A program as LLVM IR, the same for every kind of processor.
+
+    Attributes:
+        text: The IR.
+        sizes: Number of entries of every result; of one row where there are rows.
+        memory: Working memory that it needs, in numbers of eight bytes.
+    """
+
+    text: str
+    sizes: tuple[int, ...]
+    memory: int
+
+
+def lower(
+    function: Callable[..., Any],
+    arguments: Sequence[Any],
+    lane_sizes: Sequence[int],
+    by_row: Sequence[bool] | None = None,
+    *,
+    carries: bool = False,
+) -> tuple[LoweredProgram, Any]:
+    """Lower a function to LLVM IR.
+
+    Args:
+        function: A function of vectors of floats that JAX can trace.
+        arguments: Vectors of the sizes it takes, those of one row; their values are not used.
+        lane_sizes: Sizes of axes that rows are laid out along, such as the number of bodies.
+        by_row: Which arguments have a row for every row of a batch; None without a batch.
+        carries: Whether rows follow one another: the first vector is carried from row to row, and
+            the function returns it before its results.
+
+    Returns:
+        The program, and the tree of the function's results with shapes and dtypes.
+
+    Raises:
+        UnsupportedPrimitiveError: The function uses what is not supported.
+    """
+    closed, tree = jax.make_jaxpr(function, return_shape=True)(*arguments)
+    if by_row is None:
+        lowered = lower_single(closed, lane_sizes)
+    elif carries:
+        lowered = lower_path(closed, lane_sizes, by_row)
+        tree = tree[1]
+    else:
+        lowered = lower_batch(closed, lane_sizes, by_row)
+    emitter = Emitter(lowered)
+    size = emitter.storage.arena.size + 64
+    return LoweredProgram(emitter.source, tuple(lowered.sizes), size), tree
 
 
 class Program:
-    """A program that may be called from several threads at once.
+    """A compiled program; threads may call it at the same time.
 
     Args:
-        code: Its machine code; it is read and not kept.
-        sizes: How many numbers each result has, by row where there are rows.
-        room: How much memory it needs, in numbers.
-        by_row: Which arrays have a row of numbers for every row of a batch; None without rows.
+        code: Machine code from `machine_code`; it is read and not kept.
+        sizes: Number of entries of every result, by row where there are rows.
+        memory: Working memory that it needs, in numbers of eight bytes.
+        by_row: Which arguments have a row for every row of a batch; None without a batch.
     """
 
     def __init__(
-        self, code: bytes, sizes: Sequence[int], room: int, by_row: Sequence[bool] | None
+        self, code: bytes, sizes: Sequence[int], memory: int, by_row: Sequence[bool] | None
     ) -> None:
-        """Make it ready to be called."""
-        self.sizes, self.room, self.by_row = sizes, room, by_row
-        self._function = loaded(code)
+        """Load the machine code."""
+        self.sizes, self.memory, self.by_row = sizes, memory, by_row
+        self._function = load(code)
 
-    def __call__(self, given: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Run it.
+    def __call__(self, arguments: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Run the program.
 
         Args:
-            given: Arrays of floats; those by row have rows as leading axis.
+            arguments: Arrays of floats; those by row have rows as leading axis.
 
         Returns:
             Flat arrays, rows as leading axis where there are any.
         """
-        arrays = [np.ascontiguousarray(one, float) for one in given]
+        arrays = [np.ascontiguousarray(one, float) for one in arguments]
         rows, shape = 1, ()
         if self.by_row is not None:
             rows = max(len(one) for one, own in zip(arrays, self.by_row, strict=True) if own)
             shape = (rows,)
         results = [np.empty((*shape, size)) for size in self.sizes]
         if rows:
-            self._function(_addresses(arrays), _addresses(results), _memory(self.room), rows)
+            memory = _working_memory(self.memory)
+            self._function(_addresses(arrays), _addresses(results), memory, rows)
         return results
 
 
 def _addresses(arrays: Sequence[np.ndarray]) -> bytes:
-    """Addresses of arrays, one after the other, as a C program reads them."""
+    """Return the addresses of arrays as an array of C pointers."""
     return pack(f"{len(arrays)}P", *map(_address, arrays))
 
 
@@ -73,67 +121,15 @@ def _address(array: np.ndarray) -> int:
     return array.__array_interface__["data"][0]
 
 
-def _memory(numbers: int) -> int:
-    """Address of memory of this thread, kept for the next program: fresh memory takes longer."""
-    size, start = getattr(_own, "room", (0, 0))
-    if size < numbers:
-        _own.memory = np.zeros(numbers + 8)
-        start = _address(_own.memory)
+def _working_memory(count: int) -> int:
+    """Return the address of this thread's memory; it is kept, as new memory takes longer."""
+    size, start = getattr(_thread, "memory", (0, 0))
+    if size < count:
+        _thread.array = np.zeros(count + 8)
+        start = _address(_thread.array)
         start += -start % 64
-        _own.room = (numbers, start)
+        _thread.memory = (count, start)
     return start
 
 
-@dataclass(frozen=True)
-class Source:
-    """A program as text, the same for every kind of processor.
-
-    Attributes:
-        text: The program, in LLVM's language.
-        sizes: How many numbers each result has, as `Program` takes it.
-        room: How much memory it needs, in numbers.
-    """
-
-    text: str
-    sizes: tuple[int, ...]
-    room: int
-
-
-def source(
-    function: Callable[..., Any],
-    given: Sequence[Any],
-    long: Sequence[int],
-    by_row: Sequence[bool] | None = None,
-    *,
-    carries: bool = False,
-) -> tuple[Source, Any]:
-    """Write the program of a function.
-
-    Args:
-        function: A function of vectors of floats that JAX can trace.
-        given: Vectors as it takes them, of which only the sizes matter; those of one row.
-        long: Sizes of axes that rows are laid out along, such as the number of flexures.
-        by_row: Which of them have a row for every row of a batch; no batch where not given.
-        carries: Whether rows follow one after the other: the first vector is carried from row to
-            row, and the function returns it before its results.
-
-    Returns:
-        The program, and the tree of what the function returns, with shapes and kinds of numbers.
-
-    Raises:
-        UnknownHereError: The function does what cannot be done here.
-    """
-    closed, tree = jax.make_jaxpr(function, return_shape=True)(*given)
-    reader = Reader(long)
-    if by_row is None:
-        read = reader.single(closed)
-    elif carries:
-        read = reader.path(closed, by_row)
-        tree = tree[1]
-    else:
-        read = reader.batch(closed, by_row)
-    emitter = Emitter(read)
-    return Source(emitter.source, tuple(read.sizes), emitter.arena.size + 64), tree
-
-
-__all__ = ["Program", "Source", "source"]
+__all__ = ["LoweredProgram", "Program", "lower"]

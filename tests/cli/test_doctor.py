@@ -29,6 +29,8 @@ def test_healthy_installation(call):
     assert found["healthy"] is True
     assert found["device"]["x64"] is True
     assert found["canary"] == {"expected": 268_435_456.0, "computed": 268_435_456.0}
+    assert found["backend"]["name"] == "native"
+    assert found["backend"]["optimisation"] == 0
     assert {"jax", "jaxlib", "numpy", "cyclopts"} <= found["packages"].keys()
     assert all(found["packages"].values())
     assert "matplotlib" in found["extras"]["plot"]["packages"]
@@ -40,6 +42,16 @@ def test_table_has_what_is_asked_and_fits(call):
     for words in ("python", "jaxlib", "known sum", "right", "programs", "plot"):
         assert words in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+def test_backend_is_shown_and_checked(call, monkeypatch):
+    assert "native: lanewise and LLVM" in " ".join(call("doctor")[1].split())
+    monkeypatch.setenv("NOTCHFLEX_BACKEND", "xla")
+    assert "xla: NOTCHFLEX_BACKEND asks for it" in " ".join(call("doctor")[1].split())
+    monkeypatch.setenv("NOTCHFLEX_BACKEND", "gcc")
+    code, out, err = call("doctor")
+    assert (code, out) == (2, "")
+    assert "'gcc'; allowed are native, xla" in " ".join(err.split())
 
 
 def test_wrong_sums_end_with_code_1(call, monkeypatch):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lanewise import Program, UnknownHereError, machine_code, source
+from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code
 from notchflex._jax import jax, jnp
 
 # Fewer than a vector's lanes, as many, more, and several vectors.
@@ -16,9 +16,9 @@ def given(size):
 
 
 def program(function, given, long, by_row=None):
-    written, tree = source(function, given, long, by_row)
-    code = machine_code(written.text)
-    return Program(code, written.sizes, written.room, by_row), tree
+    lowered, tree = lower(function, given, long, by_row)
+    code = machine_code(lowered.text, 0)
+    return Program(code, lowered.sizes, lowered.memory, by_row), tree
 
 
 def single(function, *arrays, long):
@@ -198,9 +198,9 @@ def test_rows_of_their_own_and_what_all_share():
 
 
 def test_what_is_not_known_is_said():
-    with pytest.raises(UnknownHereError, match="sort"):
+    with pytest.raises(UnsupportedPrimitiveError, match="sort"):
         program(jnp.sort, [np.ones(4)], (4,))
-    with pytest.raises(UnknownHereError, match="long"):
+    with pytest.raises(UnsupportedPrimitiveError, match="400000"):
         program(lambda v: jnp.sin(v[:, None] * v[None, :] + 1.0), [np.ones(700)], ())
 
 

@@ -1,1 +1,1 @@
-"""From the graph to LLVM's text."""
+"""Generate LLVM IR from a lowered function."""

@@ -1,57 +1,66 @@
-"""Where rows lie in memory while a program runs."""
+"""Describe where rows lie in memory while a program runs."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from lanewise.ir.control_flow import WIDTH
-from lanewise.ir.graph import Memory
+from lanewise.ir.graph import Buffer
 
 
 @dataclass(frozen=True)
-class Place:
-    """Numbers at even distances in memory.
+class Address:
+    """Locate numbers at a constant stride in memory.
 
     Attributes:
-        pointer: Where that memory begins, as LLVM calls it.
-        first: Place of lane 0, in numbers of eight bytes.
-        step: From lane to lane, likewise.
-        rows: Whether there is a number for every row of a batch.
-        memory: The memory, where it is one that may be written to again.
+        pointer: LLVM's name of the pointer that offsets count from.
+        first: Offset of lane 0, in numbers of eight bytes.
+        stride: Offset from lane to lane.
+        batched: Whether there is a vector of `WIDTH` rows for every lane.
+        buffer: The buffer, if it is one that may be written to again.
     """
 
     pointer: str
     first: int
-    step: int
-    rows: bool
-    memory: Memory | None = None
+    stride: int
+    batched: bool
+    buffer: Buffer | None = None
 
     def of_lane(self, lane: int) -> int:
-        """Place of a lane."""
-        return self.first + lane * self.step
+        """Return the offset of a lane."""
+        return self.first + lane * self.stride
+
+    def part(self, lane: int, stride: int) -> Address:
+        """Return the address of the lanes from one on, at a stride in lanes."""
+        return Address(
+            self.pointer, self.of_lane(lane), stride * self.stride, self.batched, self.buffer
+        )
 
 
 class Arena:
-    """Room for everything that a program puts in memory.
+    """Assign the working memory of a program.
 
     Attributes:
-        size: How much there is, in numbers of eight bytes.
+        size: Size assigned so far, in numbers of eight bytes.
     """
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin with no memory."""
         self.size = 0
         self._free: dict[int, list[int]] = {}
 
-    def room(self, numbers: int) -> int:
-        """Room for so many numbers, whole vectors."""
-        wanted = -(-numbers // WIDTH) * WIDTH
-        left = self._free.get(wanted)
-        if left:
-            return left.pop()
-        first, self.size = self.size, self.size + wanted
+    def allocate(self, count: int) -> int:
+        """Return the offset of memory for some numbers, in whole vectors."""
+        size = -(-count // WIDTH) * WIDTH
+        free = self._free.get(size)
+        if free:
+            return free.pop()
+        first, self.size = self.size, self.size + size
         return first
 
-    def leave(self, first: int, numbers: int) -> None:
-        """Room that may be used for something else."""
-        self._free.setdefault(-(-numbers // WIDTH) * WIDTH, []).append(first)
+    def free(self, first: int, count: int) -> None:
+        """Allow memory to be assigned again."""
+        self._free.setdefault(-(-count // WIDTH) * WIDTH, []).append(first)
+
+
+__all__ = ["Address", "Arena"]

@@ -1,193 +1,192 @@
-"""From statements in order to the text of a program for LLVM.
-
-A program is written in layers: where numbers lie (storage), what they are (values), loops over
-lanes, writing to memory (puts), and here its blocks, loops and conditions.
-"""
+"""Emit the LLVM IR of a lowered function: its blocks, loops and branches."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from lanewise.codegen.addresses import Place
-from lanewise.codegen.stores import Puts
-from lanewise.codegen.text import type_of
-from lanewise.ir.control_flow import WIDTH, Choice, Loop, Program, Rows, Steps
-from lanewise.ir.graph import LANE_BITS, Block, Memory
+from lanewise.codegen.addresses import Address
+from lanewise.codegen.builder import type_name
+from lanewise.codegen.lanes import LaneLoops
+from lanewise.codegen.storage import Storage
+from lanewise.codegen.stores import StoreWriter
+from lanewise.codegen.values import Values
+from lanewise.ir.control_flow import (
+    WIDTH,
+    BatchLoop,
+    Conditional,
+    LoweredFunction,
+    ScanLoop,
+    WhileLoop,
+)
+from lanewise.ir.graph import LANE_BITS, Block
+
+_HEAD = "define void @program(ptr %arguments, ptr %results, ptr noalias %arena, i64 %count)"
 
 
-class Emitter(Puts):
-    """Writes a program.
+class Emitter:
+    """Write a function.
 
     Args:
-        program: The program.
+        function: The function.
+
+    Attributes:
+        source: Its LLVM IR.
+        storage: Its memory.
     """
 
-    def __init__(self, program: Program) -> None:
-        """Write it whole."""
-        super().__init__(program)
-        self._write()
+    def __init__(self, function: LoweredFunction) -> None:
+        """Write the whole function."""
+        self.graph = function.graph
+        self.storage = Storage(function)
+        self.schedule, self.builder = self.storage.schedule, self.storage.builder
+        self.values = Values(self.storage)
+        self.lanes = LaneLoops(self.values)
+        self.stores = StoreWriter(self.values)
+        self._block(self.graph.top)
+        self.stores.write(function.stores)
+        self.source = self._module()
 
-    @property
-    def source(self) -> str:
-        """The whole text."""
-        body = "\n".join(self.text.lines)
-        head = "define void @program(ptr %given, ptr %results, ptr noalias %arena, i64 %count)"
-        parts = [*self.constants, *sorted(self.text.declared), f"{head} {{\nentry:", body, "}"]
-        return "\n".join(parts)
+    def _module(self) -> str:
+        """Return the text of the module; pointers to arguments and results are loaded first."""
+        storage, builder = self.storage, self.builder
+        pointers = ["%never = icmp slt i64 %count, 0"]
+        for array, names in (("arguments", storage.arguments), ("results", storage.results)):
+            for number, name in names.items():
+                pointers.append(f"{name}.at = getelementptr ptr, ptr %{array}, i64 {number}")
+                pointers.append(f"{name} = load ptr, ptr {name}.at, align 8")
+        declarations = [*storage.constants, *sorted(builder.declarations)]
+        body = [*pointers, *builder.lines, "ret void", "stop:", "ret void"]
+        return "\n".join([*declarations, f"{_HEAD} {{\nentry:", *body, "}"])
 
-    def _write(self) -> None:
-        self.block(self.graph.top)
-        self.puts(self.program.put)
-        for line in ("ret void", "stop:", "ret void"):
-            self.text.say(line)
-        # Pointers that are given are looked up first of all.
-        looked: list[str] = ["%never = icmp slt i64 %count, 0"]
-        for kind, table in (("given", self.given), ("results", self.results)):
-            for number, name in table.items():
-                looked.append(f"{name}.at = getelementptr ptr, ptr %{kind}, i64 {number}")
-                looked.append(f"{name} = load ptr, ptr {name}.at, align 8")
-        self.text.lines[:0] = looked
-
-    def block(self, block: Block) -> None:
-        """All statements of a block."""
-        for count, stage in enumerate(self.order.stages(block)):
-            for number in stage.straight:
-                self.straight(number)
-                self.text.pause()
-            for (length, rows), members in stage.loops.items():
-                self.over_lanes(length, rows, members)
-            for number in self.order.over(block, count):
-                room = self.rooms.pop(number, None)
+    def _block(self, block: Block) -> None:
+        for number, stage in enumerate(self.schedule.stages(block)):
+            for node in stage.straight:
+                self._node(node)
+                self.builder.limit_block()
+            for (length, batched), members in stage.loops.items():
+                self.lanes.elementwise(length, batched, members)
+            for node in self.schedule.last_used(block, number):
+                room = self.storage.rooms.pop(node, None)
                 if room is not None:
-                    self.arena.leave(*room)
+                    self.storage.arena.free(*room)
 
-    def straight(self, number: int) -> None:
-        """A statement, loop or condition on its own."""
-        op, args = self.graph.op[number], self.graph.args[number]
-        if op == "item":
-            _ITEMS[type(args[0])](self, args[0])
-        elif op == "load":
-            self._load(number)
-        elif op == "take":
-            self._take(number)
-        elif op == "reduce":
-            self._reduce(number)
-        elif op == "along":
-            self._along(number)
-        else:
-            vector = self.vector(number)
-            values = [self.as_vector(one) if vector else self.single(one) for one in args]
-            kinds = [self.graph.kind[one] for one in args]
-            self.value[number] = self.text.each(op, values, kinds, vector)
+    def _node(self, node: int) -> None:
+        """Write a node or region of straight code."""
+        op, args = self.graph.op[node], self.graph.args[node]
+        match op:
+            case "region":
+                _REGIONS[type(args[0])](self, args[0])
+            case "load":
+                self.values.load(node)
+            case "shuffle":
+                self.values.shuffle(node)
+            case "reduce":
+                self.lanes.reduce(node)
+            case "prefix":
+                self.lanes.prefix(node)
+            case _:
+                vector = self.values.is_vector(node)
+                operand = self.values.as_vector if vector else self.values.value
+                kinds = [self.graph.kind[one] for one in args]
+                operands = [operand(one) for one in args]
+                self.values.name[node] = self.builder.operation(op, operands, kinds, vector)
 
-    # Loops and conditions of the program
+    # Regions
 
-    def _loop(self, item: Loop) -> None:
-        text = self.text
-        self.puts(item.before)
-        head, inside, after = text.label(), text.label(), text.label()
-        text.say(f"br label %{head}")
-        text.say(f"{head}:")
-        self.block(item.test)
-        going = item.going >> LANE_BITS
-        by_row = item.rows and self.order.varies(going)
-        mask = self.lane(item.going)
-        more = text.together("or", mask, "b") if by_row else mask
-        text.say(f"br i1 {more}, label %{inside}, label %{after}")
-        text.say(f"{inside}:")
-        self.block(item.body)
-        self.puts(item.after, mask if by_row else None)
-        text.say(f"br label %{head}")
-        text.say(f"{after}:")
+    def _any_row(self, mask: str, by_row: bool) -> str:
+        return self.builder.reduce("or", mask, "b") if by_row else mask
 
-    def _steps(self, item: Steps) -> None:
-        text = self.text
-        self.puts(item.before)
-        steps = "%count" if item.count is None else str(item.count)
-        count = 0 if item.count is None else item.count - 1
+    def _while_loop(self, loop: WhileLoop) -> None:
+        builder = self.builder
+        self.stores.write(loop.initial)
+        head, inside, after = builder.label(), builder.label(), builder.label()
+        builder.join(head)
+        self._block(loop.condition)
+        by_row = loop.batched and self.schedule.varies(loop.predicate >> LANE_BITS)
+        mask = self.values.entry(loop.predicate)
+        going = self._any_row(mask, by_row)
+        builder.line(f"br i1 {going}, label %{inside}, label %{after}")
+        builder.line(f"{inside}:")
+        self._block(loop.body)
+        self.stores.write(loop.updates, mask if by_row else None)
+        builder.line(f"br label %{head}")
+        builder.line(f"{after}:")
+
+    def _scan_loop(self, loop: ScanLoop) -> None:
+        builder, storage = self.builder, self.storage
+        self.stores.write(loop.initial)
+        length = "%count" if loop.length is None else str(loop.length)
+        last = 0 if loop.length is None else loop.length - 1
 
         def step(index: str) -> None:
-            at = text.give(f"sub i64 {count}, {index}") if item.reverse else index
-            for own in item.along:
-                whole: Memory = own.number
-                unit = self.unit(whole.rows)
-                size = text.give(f"mul i64 {at}, {own.stride * unit}")
-                start = text.place(self.base(whole), self.offset(whole) + own.offset * unit)
-                self.pointer[id(own)] = text.place(start, size)
-            self.block(item.body)
-            self.puts(item.after)
+            at = builder.assign(f"sub i64 {last}, {index}") if loop.reverse else index
+            for own in loop.slices:
+                unit = storage.unit(own.source.batched)
+                offset = builder.assign(f"mul i64 {at}, {own.stride * unit}")
+                whole = storage.offset(own.source) + own.offset * unit
+                start = builder.pointer(storage.base(own.source), whole)
+                storage.slice_pointer[id(own)] = builder.pointer(start, offset)
+            self._block(loop.body)
+            self.stores.write(loop.updates)
 
-        self.counted(steps, step)
+        storage.loop(length, step)
 
-    def _choice(self, item: Choice) -> None:
-        text = self.text
-        which = item.which >> LANE_BITS
-        by_row = item.rows and self.order.varies(which)
-        index = self.lane(item.which)
-        whole = self.graph.kind[which] == "i"
-        last = len(item.branches) - 1
-        for number, (block, puts) in enumerate(item.branches):
-            how = "sle" if number == 0 else "sge" if number == last else "eq"
-            values = "true" if number else "false"
-            own = type_of("i" if whole else "b", by_row)
-            if whole:
-                value = text.same("", "i", number) if by_row else str(number)
-                mine = text.give(f"icmp {how} {own} {index}, {value}")
-            else:
-                value = text.same("", "b", bool(number)) if by_row else values
-                mine = text.give(f"icmp eq {own} {index}, {value}")
-            more = text.together("or", mine, "b") if by_row else mine
-            inside, after = text.label(), text.label()
-            text.say(f"br i1 {more}, label %{inside}, label %{after}")
-            text.say(f"{inside}:")
-            self.block(block)
-            self.puts(puts, mine if by_row else None)
-            text.say(f"br label %{after}")
-            text.say(f"{after}:")
+    def _conditional(self, region: Conditional) -> None:
+        builder = self.builder
+        node = region.index >> LANE_BITS
+        by_row = region.batched and self.schedule.varies(node)
+        kind = self.graph.kind[node]
+        index = self.values.entry(region.index)
+        last = len(region.branches) - 1
+        for number, (block, stores) in enumerate(region.branches):
+            # An index out of range selects the first or the last branch.
+            compare = "eq" if kind == "b" or 0 < number < last else "sge" if number else "sle"
+            value = number if kind == "i" else bool(number)
+            own = builder.splat("", kind, value) if by_row else str(value).lower()
+            mask = builder.assign(f"icmp {compare} {type_name(kind, by_row)} {index}, {own}")
+            after = builder.branch(self._any_row(mask, by_row))
+            self._block(block)
+            self.stores.write(stores, mask if by_row else None)
+            builder.join(after)
 
-    def _rows(self, item: Rows) -> None:
-        text = self.text
+    def _batch_loop(self, loop: BatchLoop) -> None:
+        builder, storage = self.builder, self.storage
 
-        def some(first: str) -> None:
-            for number, memory in item.given.items():
-                base = self.given.setdefault(number, f"%given{number}")
-                offset = self.offset(memory)
+        def rows(first: str) -> None:
+            for number, buffer in loop.inputs.items():
+                base = storage.arguments.setdefault(number, f"%argument{number}")
+                offset = storage.offset(buffer)
+                for lane in range(WIDTH):  # lanes beyond the last row repeat it
+                    row = builder.assign(f"add i64 {first}, {lane}")
+                    last = builder.assign("sub i64 %count, 1")
+                    row = builder.call("llvm.umin.i64", "i64", [("i64", row), ("i64", last)])
+                    start = builder.assign(f"mul i64 {row}, {buffer.size}")
+                    source = Address(builder.pointer(base, start), 0, 1, False)
+                    target = Address("%arena", offset + lane, WIDTH, False)
+                    storage.copy(source, target, buffer.size, "f")
+            self._block(loop.body)
+            self.stores.write(loop.stores)
+            for number, buffer in enumerate(loop.outputs):
+                base = storage.results.setdefault(number, f"%result{number}")
+                offset = storage.offset(buffer)
                 for lane in range(WIDTH):
-                    row = text.give(f"add i64 {first}, {lane}")
-                    last = text.give("sub i64 %count, 1")
-                    row = text.call("llvm.umin.i64", "i64", [("i64", row), ("i64", last)])
-                    start = text.give(f"mul i64 {row}, {memory.size}")
-                    source = Place(text.place(base, start), 0, 1, False)
-                    target = Place("%arena", offset + lane, WIDTH, False)
-                    self.copy(source, target, memory.size, "f")
-            self.block(item.body)
-            self.puts(item.put)
-            for number, memory in enumerate(item.out):
-                base = self.results.setdefault(number, f"%result{number}")
-                offset = self.offset(memory)
-                for lane in range(WIDTH):
-                    row = text.give(f"add i64 {first}, {lane}")
-                    mine = text.give(f"icmp ult i64 {row}, %count")
-                    inside, after = text.label(), text.label()
-                    text.say(f"br i1 {mine}, label %{inside}, label %{after}")
-                    text.say(f"{inside}:")
-                    start = text.give(f"mul i64 {row}, {memory.size}")
-                    target = Place(text.place(base, start), 0, 1, False)
-                    source = Place("%arena", offset + lane, WIDTH, False)
-                    self.copy(source, target, memory.size, "f")
-                    text.say(f"br label %{after}")
-                    text.say(f"{after}:")
+                    row = builder.assign(f"add i64 {first}, {lane}")
+                    after = builder.branch(builder.assign(f"icmp ult i64 {row}, %count"))
+                    start = builder.assign(f"mul i64 {row}, {buffer.size}")
+                    target = Address(builder.pointer(base, start), 0, 1, False)
+                    source = Address("%arena", offset + lane, WIDTH, False)
+                    storage.copy(source, target, buffer.size, "f")
+                    builder.join(after)
 
-        self.counted("%count", some, WIDTH)
+        storage.loop("%count", rows, WIDTH)
 
 
-_ITEMS: dict[type, Callable[[Emitter, Any], None]] = {
-    Loop: Emitter._loop,  # pyright: ignore[reportPrivateUsage]
-    Steps: Emitter._steps,  # pyright: ignore[reportPrivateUsage]
-    Choice: Emitter._choice,  # pyright: ignore[reportPrivateUsage]
-    Rows: Emitter._rows,  # pyright: ignore[reportPrivateUsage]
+_REGIONS: dict[type, Callable[[Emitter, Any], None]] = {
+    WhileLoop: Emitter._while_loop,  # pyright: ignore[reportPrivateUsage]
+    ScanLoop: Emitter._scan_loop,  # pyright: ignore[reportPrivateUsage]
+    Conditional: Emitter._conditional,  # pyright: ignore[reportPrivateUsage]
+    BatchLoop: Emitter._batch_loop,  # pyright: ignore[reportPrivateUsage]
 }
-
 
 __all__ = ["Emitter"]

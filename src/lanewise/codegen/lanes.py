@@ -1,159 +1,172 @@
-"""Loops over lanes, and what puts lanes together: sums, extremes, running sums."""
+"""Write loops over lanes and what combines lanes: reductions and running sums."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-from lanewise.codegen.addresses import Place
-from lanewise.codegen.text import literal, type_of
+from lanewise.codegen.builder import literal, type_name
 from lanewise.codegen.values import Values
 from lanewise.ir.control_flow import WIDTH
-from lanewise.lowering.tables import NEUTRAL
+from lanewise.lowering.reductions import neutral
 
 
-class Lanes(Values):
-    """Rows of a program that is being written."""
+class LaneLoops:
+    """Write the code of long rows.
 
-    def over_lanes(self, length: int, rows: bool, members: Sequence[int]) -> None:
-        """Statements whose lanes are computed in a loop."""
-        inside = set(members)
-        vector = rows or not self.program.rows
-        spread: dict[int, str] = {}
-        for number in members:
-            for one in self.graph.args[number]:
-                if one in inside or one in spread or int(self.graph.length[one]) > 1:
-                    continue
-                if vector and not (self.program.rows and self.order.varies(one)):
-                    spread[one] = self.as_vector(one)
-                else:
-                    spread[one] = self.single(one)
-        for number in members:
-            if number in self.order.kept:
-                self.place_of(number)
+    Args:
+        values: Values of nodes.
+    """
 
-        def trip(index: str | int) -> None:
+    def __init__(self, values: Values) -> None:
+        """Hold the function that is being written."""
+        self.values, self.storage, self.builder = values, values.storage, values.builder
+        self.graph, self.schedule = values.graph, values.schedule
+
+    def elementwise(self, length: int, batched: bool, members: Sequence[int]) -> None:
+        """Write a loop that computes nodes lane by lane."""
+        graph, storage, builder, kept = self.graph, self.storage, self.builder, self.schedule.kept
+        vector = batched or not storage.batched
+        outside = self._loop_invariants(members, vector)
+        for node in members:
+            if node in kept:
+                storage.address_of(node)
+
+        def iteration(index: str | int) -> None:
             local: dict[int, str] = {}
 
-            def operand(one: int) -> str:
-                if one in local:
-                    return local[one]
-                if one in spread:
-                    return spread[one]
-                local[one] = self._lanes_at(self.place_of(one), index, one, vector)
-                return local[one]
+            def operand(node: int) -> str:
+                if node in local:
+                    return local[node]
+                if node in outside:
+                    return outside[node]
+                local[node] = self._load_lanes(node, index, vector)
+                return local[node]
 
-            for number in members:
-                args = self.graph.args[number]
-                kinds = [self.graph.kind[one] for one in args]
-                values = [operand(one) for one in args]
-                local[number] = self.text.each(self.graph.op[number], values, kinds, vector)
-                if number in self.order.kept:
-                    own, kind = self.place_of(number), self.graph.kind[number]
-                    at = self._where(own, index)
-                    self.text.store(at, local[number], kind, vector)
-                self.text.pause()
+            for node in members:
+                args = graph.args[node]
+                kinds = [graph.kind[one] for one in args]
+                operands = [operand(one) for one in args]
+                local[node] = builder.operation(graph.op[node], operands, kinds, vector)
+                if node in kept:
+                    at = storage.pointer(storage.address_of(node), index)
+                    builder.store(at, local[node], graph.kind[node], vector)
+                builder.limit_block()
 
-        by = 1 if self.program.rows else WIDTH
-        self.counted(str(length), trip, by)
+        storage.loop(str(length), iteration, 1 if storage.batched else WIDTH)
 
-    def _lanes_at(self, place: Place, index: str | int, number: int, vector: bool) -> str:
-        kind = self.graph.kind[number]
-        wide = place.rows or not self.program.rows
-        value = self.text.load(self._where(place, index), kind, wide)
-        return self.text.same(value, kind, None) if vector and not wide else value
+    def _loop_invariants(self, members: Sequence[int], vector: bool) -> dict[int, str]:
+        """Return the operands that are the same for all lanes."""
+        inside = set(members)
+        outside: dict[int, str] = {}
+        for node in members:
+            for one in self.graph.args[node]:
+                if one in inside or one in outside or int(self.graph.length[one]) > 1:
+                    continue
+                has_rows = self.storage.batched and self.schedule.varies(one)
+                of_vector = vector and not has_rows
+                outside[one] = self.values.as_vector(one) if of_vector else self.values.value(one)
+        return outside
 
-    def _reduce(self, number: int) -> None:
-        op, row, first, count = self.graph.args[number]
-        kind = self.graph.kind[number]
-        neutral = self._neutral(op, kind)
-        if not self.order.looped(row):
-            value = self._within(self.as_vector(row), kind, neutral, None, first, first + count)
-            self.value[number] = self.text.together(op, value, kind)
+    def _load_lanes(self, node: int, index: str | int, vector: bool) -> str:
+        kind, address = self.graph.kind[node], self.storage.address_of(node)
+        wide = address.batched or not self.storage.batched
+        value = self.builder.load(self.storage.pointer(address, index), kind, wide)
+        return self.builder.splat(value, kind) if vector and not wide else value
+
+    def reduce(self, node: int) -> None:
+        """Write the reduction of lanes of a row to one number."""
+        op, row, first, count = self.graph.args[node]
+        kind, builder, storage = self.graph.kind[node], self.builder, self.storage
+        start = neutral(op, kind)
+        if not self.schedule.is_looped(row):
+            value = self._masked(self.values.as_vector(row), kind, start, None, first, count)
+            self.values.name[node] = builder.reduce(op, value, kind)
             return
-        place, text = self.place_of(row), self.text
-        rows = self.program.rows
-        wide = place.rows or not rows
-        room = self.arena.room(WIDTH)
-        total = text.place("%arena", room)
-        start = text.same("", kind, neutral) if wide else literal(neutral, kind)
-        text.store(total, start, kind, wide)
+        address, batched = storage.address_of(row), storage.batched
+        wide = address.batched or not batched
+        total = self._accumulator(start, kind, wide)
         length = int(self.graph.length[row])
 
-        def trip(index: str | int) -> None:
-            at = text.give(f"add i64 {index}, {first}") if rows else str(index)
-            own = text.load(self._where(place, at), kind, wide)
-            if not rows and (first > 0 or (first + count) % WIDTH or count < length):
-                own = self._within(own, kind, neutral, at, first, first + count)
-            so_far = text.load(total, kind, wide)
-            text.store(total, text.each(op, [so_far, own], [kind, kind], wide), kind, wide)
+        def iteration(index: str | int) -> None:
+            at = builder.assign(f"add i64 {index}, {first}") if batched else str(index)
+            value = builder.load(storage.pointer(address, at), kind, wide)
+            if not batched and (first > 0 or (first + count) % WIDTH or count < length):
+                value = self._masked(value, kind, start, at, first, count)
+            so_far = builder.load(total, kind, wide)
+            result = builder.operation(op, [so_far, value], [kind, kind], wide)
+            builder.store(total, result, kind, wide)
 
-        if rows:
-            self.counted(str(count), trip)
-        else:
-            self.counted(str(first + count), trip, WIDTH)
-        found = text.load(total, kind, wide)
-        self.value[number] = found if rows else text.together(op, found, kind)
+        storage.loop(str(count if batched else first + count), iteration, 1 if batched else WIDTH)
+        result = builder.load(total, kind, wide)
+        self.values.name[node] = result if batched else builder.reduce(op, result, kind)
 
-    def _neutral(self, op: str, kind: str) -> Any:
-        neutral = NEUTRAL[op]
-        if kind == "i":
-            return {"add": 0, "mul": 1, "max": -(1 << 63), "min": (1 << 63) - 1}[op]
-        return neutral
+    def _accumulator(self, start: Any, kind: str, wide: bool) -> str:
+        """Return the pointer to memory that holds a start value."""
+        pointer = self.builder.pointer("%arena", self.storage.arena.allocate(WIDTH))
+        value = self.builder.splat("", kind, start) if wide else literal(start, kind)
+        self.builder.store(pointer, value, kind, wide)
+        return pointer
 
-    def _within(
-        self, value: str, kind: str, neutral: Any, at: str | None, first: int, last: int
+    def _masked(
+        self, value: str, kind: str, start: Any, at: str | None, first: int, count: int
     ) -> str:
-        """A vector with other lanes than some made such that they make no difference."""
-        if at is None and first == 0 and last == WIDTH:
+        """Return a vector with the neutral number in the lanes outside a range.
+
+        Args:
+            value: The vector.
+            kind: Kind of its numbers.
+            start: The neutral number.
+            at: Index of its first lane; None for 0.
+            first: First lane of the range.
+            count: Number of lanes in it.
+        """
+        builder, end = self.builder, first + count
+        if at is None and first == 0 and end == WIDTH:
             return value
-        text = self.text
         if at is None:
-            inside = ", ".join(
-                f"i1 {'true' if first <= lane < last else 'false'}" for lane in range(WIDTH)
-            )
-            mask = f"<{inside}>"
+            lanes = (f"i1 {'true' if first <= lane < end else 'false'}" for lane in range(WIDTH))
+            mask = f"<{', '.join(lanes)}>"
         else:
-            whole = type_of("i", True)
+            integers = type_name("i", True)
             counting = ", ".join(f"i64 {lane}" for lane in range(WIDTH))
-            lanes = text.give(f"add {whole} {text.same(at, 'i', None)}, <{counting}>")
-            low = text.give(f"icmp sge {whole} {lanes}, {text.same('', 'i', first)}")
-            high = text.give(f"icmp slt {whole} {lanes}, {text.same('', 'i', last)}")
-            mask = text.give(f"and {type_of('b', True)} {low}, {high}")
-        values = [mask, value, text.same("", kind, neutral)]
-        return text.each("select", values, ["b", kind, kind], True)
+            index = builder.assign(f"add {integers} {builder.splat(at, 'i')}, <{counting}>")
+            low = builder.assign(f"icmp sge {integers} {index}, {builder.splat('', 'i', first)}")
+            high = builder.assign(f"icmp slt {integers} {index}, {builder.splat('', 'i', end)}")
+            mask = builder.assign(f"and {type_name('b', True)} {low}, {high}")
+        values = [mask, value, builder.splat("", kind, start)]
+        return builder.operation("select", values, ["b", kind, kind], True)
 
-    def _along(self, number: int) -> None:
-        op, row, reverse = self.graph.args[number]
-        kind, length = self.graph.kind[number], int(self.graph.length[number])
-        text = self.text
-        if not self.order.looped(number):
-            source, value, total = self.as_vector(row), "poison", None
-            own = type_of(kind, True)
+    def prefix(self, node: int) -> None:
+        """Write the running combination of the lanes of a row."""
+        op, row, reverse = self.graph.args[node]
+        kind, length = self.graph.kind[node], int(self.graph.length[node])
+        builder, storage = self.builder, self.storage
+        if not self.schedule.is_looped(node):
+            source, value, total = self.values.as_vector(row), "poison", None
             for lane in reversed(range(length)) if reverse else range(length):
-                one = text.give(f"extractelement {own} {source}, i64 {lane}")
-                total = one if total is None else text.each(op, [total, one], [kind, kind], False)
-                value = self._insert(value, total, kind, lane)
-            self.value[number] = value
+                one = builder.extract(source, kind, lane)
+                if total is not None:
+                    one = builder.operation(op, [total, one], [kind, kind], False)
+                total = one
+                value = builder.insert(value, total, kind, lane)
+            self.values.name[node] = value
             return
-        source, target = self.place_of(row), self.place_of(number)
-        wide = target.rows
-        room = text.place("%arena", self.arena.room(WIDTH))
-        neutral = self._neutral(op, kind)
-        text.store(
-            room, text.same("", kind, neutral) if wide else literal(neutral, kind), kind, wide
-        )
+        source, target = storage.address_of(row), storage.address_of(node)
+        wide = target.batched
+        pointer = self._accumulator(neutral(op, kind), kind, wide)
 
-        def trip(index: str) -> None:
-            at = text.give(f"sub i64 {length - 1}, {index}") if reverse else index
-            own = text.load(self._where(source, at), kind, source.rows)
-            if wide and not source.rows:
-                own = text.same(own, kind, None)
-            total = text.each(op, [text.load(room, kind, wide), own], [kind, kind], wide)
-            text.store(room, total, kind, wide)
-            text.store(self._where(target, at), total, kind, wide)
+        def iteration(index: str) -> None:
+            at = builder.assign(f"sub i64 {length - 1}, {index}") if reverse else index
+            value = storage.load(source, at, kind)
+            if wide and not source.batched:
+                value = builder.splat(value, kind)
+            so_far = builder.load(pointer, kind, wide)
+            total = builder.operation(op, [so_far, value], [kind, kind], wide)
+            builder.store(pointer, total, kind, wide)
+            storage.store(target, at, total, kind)
 
-        self.counted(str(length), trip)
+        storage.loop(str(length), iteration)
 
 
-__all__ = ["Lanes"]
+__all__ = ["LaneLoops"]

@@ -1,50 +1,51 @@
-"""Entries that go to memory together: lanes of one row at even distances."""
+"""Find entries that can be stored together: lanes of one row at a constant stride."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lanewise.ir.graph import LANE, LANE_BITS
+from lanewise.ir.graph import LANE_BITS, LANE_MASK, reference
 
 
 @dataclass(frozen=True)
 class Run:
-    """Lanes of one row at even distances that go to places at even distances."""
+    """Lanes of one node at a constant stride that go to offsets at a constant stride."""
 
-    statement: int
+    node: int
     lane: int
-    step: int
-    place: int
-    apart: int
+    lane_stride: int
+    offset: int
+    offset_stride: int
     count: int
 
-    def entry(self, number: int) -> int:
-        """One of its entries."""
-        return (self.statement << LANE_BITS) + self.lane + number * self.step
+    def ref(self, number: int) -> int:
+        """Return the reference to one of its entries."""
+        return reference(self.node, self.lane + number * self.lane_stride)
 
 
-def runs(entries: Sequence[int], places: Sequence[int]) -> list[Run]:
-    """Entries and the places that they go to, as few runs."""
-    by_row: dict[int, list[tuple[int, int]]] = {}
-    for one, place in zip(entries, places, strict=True):
-        by_row.setdefault(one >> LANE_BITS, []).append((one & LANE, place))
-    found: list[Run] = []
-    for statement, pairs in by_row.items():
+def find_runs(refs: Sequence[int], offsets: Sequence[int]) -> list[Run]:
+    """Return entries and the offsets that they go to, as few runs."""
+    by_node: dict[int, list[tuple[int, int]]] = {}
+    for ref, offset in zip(refs, offsets, strict=True):
+        by_node.setdefault(ref >> LANE_BITS, []).append((ref & LANE_MASK, offset))
+    runs: list[Run] = []
+    for node, pairs in by_node.items():
         first = 0
         while first < len(pairs):
-            lane, place = pairs[first]
-            last, step, apart = first + 1, 1, 1
-            if last < len(pairs):
-                step, apart = pairs[last][0] - lane, pairs[last][1] - place
-                while step and last < len(pairs):
-                    near, here = pairs[last - 1], pairs[last]
-                    if (here[0] - near[0], here[1] - near[1]) != (step, apart):
+            lane, offset = pairs[first]
+            end, lane_stride, offset_stride = first + 1, 1, 1
+            if end < len(pairs):
+                lane_stride, offset_stride = pairs[end][0] - lane, pairs[end][1] - offset
+                while lane_stride and end < len(pairs):
+                    previous, present = pairs[end - 1], pairs[end]
+                    step = (present[0] - previous[0], present[1] - previous[1])
+                    if step != (lane_stride, offset_stride):
                         break
-                    last += 1
-            found.append(Run(statement, lane, step, place, apart, last - first))
-            first = last
-    return found
+                    end += 1
+            runs.append(Run(node, lane, lane_stride, offset, offset_stride, end - first))
+            first = end
+    return runs
 
 
-__all__ = ["Run", "runs"]
+__all__ = ["Run", "find_runs"]

@@ -1,4 +1,4 @@
-"""Where a program's numbers lie in memory, and how they are copied."""
+"""Assign memory to buffers and rows, and copy between them."""
 
 from __future__ import annotations
 
@@ -7,198 +7,200 @@ from typing import Any
 
 import numpy as np
 
-from lanewise.codegen.addresses import Arena, Place
-from lanewise.codegen.schedule import Order
-from lanewise.codegen.text import Text, literal, type_of
-from lanewise.ir.control_flow import WIDTH, Program
-from lanewise.ir.graph import LANE, LANE_BITS, Memory
+from lanewise.codegen.addresses import Address, Arena
+from lanewise.codegen.builder import IRBuilder, literal, type_name
+from lanewise.codegen.schedule import Schedule
+from lanewise.ir.control_flow import WIDTH, LoweredFunction
+from lanewise.ir.graph import LANE_BITS, LANE_MASK, Buffer
 
-# Runs of numbers longer than this are copied in a loop.
+# Longer runs of numbers are copied in a loop.
 _UNROLLED = 16
 
 
 class Storage:
-    """Memory of a program that is being written.
+    """Manage the memory of a function that is being written.
 
     Args:
-        program: The program.
+        function: The function.
+
+    Attributes:
+        builder: Its lines of LLVM IR.
+        address: Addresses of rows that are in memory, by node.
+        rooms: Memory in the arena of rows, by node: offset and size.
+        slice_pointer: Pointers to slices of the present step, by identity of the buffer.
+        constants: Definitions of constant rows.
+        arguments: Names of the pointers to arguments in use.
+        results: Names of the pointers to results in use.
     """
 
-    def __init__(self, program: Program) -> None:
-        """Begin with an empty text."""
-        self.program, self.graph = program, program.graph
-        self.order = Order(program)
-        self.text = Text()
+    def __init__(self, function: LoweredFunction) -> None:
+        """Begin with no memory assigned."""
+        self.graph, self.batched = function.graph, function.batched
+        self.schedule = Schedule(function)
+        self.builder = IRBuilder()
         self.arena = Arena()
-        self.value: dict[int, str] = {}
-        self.slot: dict[int, Place] = {}
+        self.address: dict[int, Address] = {}
         self.rooms: dict[int, tuple[int, int]] = {}
-        self.pointer: dict[int, str] = {}
+        self.slice_pointer: dict[int, str] = {}
         self.constants: list[str] = []
-        self.given: dict[int, str] = {}
+        self.arguments: dict[int, str] = {}
         self.results: dict[int, str] = {}
 
-    # Shapes of values
+    # Addresses
 
-    def vector(self, number: int) -> bool:
-        """Whether a statement's value is a vector."""
-        if self.program.rows:
-            return self.order.varies(number)
-        return int(self.graph.length[number]) > 1
+    def unit(self, batched: bool) -> int:
+        """Return the numbers in memory per entry."""
+        return WIDTH if batched else 1
 
-    def unit(self, rows: bool) -> int:
-        """Numbers per entry of memory."""
-        return WIDTH if rows else 1
+    def base(self, buffer: Buffer) -> str:
+        """Return the pointer that a buffer's offset counts from."""
+        if buffer.space == "argument":
+            return self.arguments.setdefault(buffer.source, f"%argument{buffer.source}")
+        if buffer.space == "result":
+            return self.results.setdefault(buffer.source, f"%result{buffer.source}")
+        return self.slice_pointer[id(buffer)] if buffer.space == "slice" else "%arena"
 
-    # Memory
-
-    def base(self, memory: Memory) -> str:
-        """Where memory begins."""
-        if memory.place == "given":
-            return self.given.setdefault(memory.number, f"%given{memory.number}")
-        if memory.place == "result":
-            return self.results.setdefault(memory.number, f"%result{memory.number}")
-        if memory.place == "step":
-            return self.pointer[id(memory)]
-        return "%arena"
-
-    def offset(self, memory: Memory) -> int:
-        """Place of its first number, from there."""
-        if memory.place != "arena":
+    def offset(self, buffer: Buffer) -> int:
+        """Return the offset of a buffer's first entry from its base."""
+        if buffer.space != "arena":
             return 0
-        if memory.offset < 0:
-            memory.offset = self.arena.room((memory.size + WIDTH) * self.unit(memory.rows))
-        return memory.offset
+        if buffer.offset < 0:
+            size = (buffer.size + WIDTH) * self.unit(buffer.batched)
+            buffer.offset = self.arena.allocate(size)
+        return buffer.offset
 
-    def place_of(self, number: int) -> Place:
-        """Where the lanes of a row lie that is computed in a loop."""
-        found = self.slot.get(number)
-        if found is not None:
-            return found
-        op, args = self.graph.op[number], self.graph.args[number]
-        length = int(self.graph.length[number])
-        if op == "memory":
-            memory: Memory = args[0]
-            return Place(
-                self.base(memory),
-                self.offset(memory),
-                self.unit(memory.rows),
-                memory.rows,
-                memory,
-            )
-        if op == "lanes":
-            name = f"@lanes{number}"
-            room = -(-length // WIDTH) * WIDTH
-            values = [float(one) if self.graph.kind[number] != "i" else int(one) for one in args[0]]
-            kind = "i" if self.graph.kind[number] == "i" else "f"
-            values += [values[-1]] * (room - length)
-            row = ", ".join(f"{type_of(kind, False)} {literal(one, kind)}" for one in values)
-            form = f"[{room} x {type_of(kind, False)}]"
-            self.constants.append(f"{name} = internal constant {form} [{row}], align 64")
-            place = Place(name, 0, 1, False)
+    def buffer_address(self, buffer: Buffer, first: int = 0, stride: int = 1) -> Address:
+        """Return the address of entries of a buffer."""
+        unit = self.unit(buffer.batched)
+        start = self.offset(buffer) + first * unit
+        return Address(self.base(buffer), start, stride * unit, buffer.batched, buffer)
+
+    def in_memory(self, node: int) -> bool:
+        """Return whether the lanes of a node are in memory, not in a value."""
+        return self.graph.op[node] == "buffer" or self.schedule.is_looped(node)
+
+    def address_of(self, node: int) -> Address:
+        """Return the address of a row that is in memory; assign it if need be."""
+        known = self.address.get(node)
+        if known is not None:
+            return known
+        op, args = self.graph.op[node], self.graph.args[node]
+        if op == "buffer":
+            return self.buffer_address(args[0])
+        if op == "constants":
+            address = self._constant_row(node)
         else:
-            rows = self.order.varies(number)
-            unit = self.unit(rows)
-            room = length * unit
-            first = self.arena.room(room)
-            self.rooms[number] = (first, room)
-            place = Place("%arena", first, unit, rows)
-        self.slot[number] = place
-        return place
+            batched = self.schedule.varies(node)
+            unit = self.unit(batched)
+            size = int(self.graph.length[node]) * unit
+            first = self.arena.allocate(size)
+            self.rooms[node] = (first, size)
+            address = Address("%arena", first, unit, batched)
+        self.address[node] = address
+        return address
 
-    def _seen_in(self, number: int) -> Place | None:
-        """Where a row is seen without being copied: in memory, or in another row."""
-        op, args = self.graph.op[number], self.graph.args[number]
+    def _constant_row(self, node: int) -> Address:
+        values = self.graph.args[node][0]
+        name = f"@lanes{node}"
+        kind = "i" if self.graph.kind[node] == "i" else "f"
+        size = -(-len(values) // WIDTH) * WIDTH
+        padded = [*values, *[values[-1]] * (size - len(values))]
+        row = ", ".join(f"{type_name(kind, False)} {literal(one, kind)}" for one in padded)
+        array = f"[{size} x {type_name(kind, False)}]"
+        self.constants.append(f"{name} = internal constant {array} [{row}], align 64")
+        return Address(name, 0, 1, False)
+
+    def alias(self, node: int) -> Address | None:
+        """Return where a row can be read without a copy; None if nowhere."""
+        op, args = self.graph.op[node], self.graph.args[node]
         if op == "load":
-            memory: Memory = self.graph.args[args[0]][0]
-            unit = self.unit(memory.rows)
-            if not self.program.rows and (args[2] != 1 or not self._has_room(memory, args)):
+            _, first, stride, length = args
+            buffer: Buffer = self.graph.args[args[0]][0]
+            if not self.batched and (stride != 1 or not _is_padded(buffer, first, length)):
                 return None
-            first = self.offset(memory) + args[1] * unit
-            return Place(self.base(memory), first, args[2] * unit, memory.rows, memory)
-        if op == "take" and self.program.rows:
+            return self.buffer_address(buffer, first, stride)
+        if op == "shuffle" and self.batched:
             source = args[0] >> LANE_BITS
-            apart = np.diff(args)
-            if self.order.looped(source) and (apart == apart[0]).all() and abs(apart[0]) < LANE:
-                own = self.place_of(source)
-                first = own.of_lane(args[0] & LANE)
-                return Place(own.pointer, first, int(apart[0]) * own.step, own.rows, own.memory)
+            steps = np.diff(args)
+            constant = (steps == steps[0]).all() and abs(steps[0]) < LANE_MASK
+            if constant and self.schedule.is_looped(source):
+                return self.address_of(source).part(args[0] & LANE_MASK, int(steps[0]))
         return None
 
-    def _has_room(self, memory: Memory, args: tuple[int, ...]) -> bool:
-        """Whether the last vector of a row may be read whole."""
-        _, first, _, length = args
-        last = first + -(-length // WIDTH) * WIDTH
-        while memory.place == "step":
-            if not memory.steps:
-                return False
-            last += memory.offset + (memory.steps - 1) * memory.stride
-            memory = memory.number
-        return memory.place == "arena" or (memory.place == "given" and last <= memory.size)
+    # Copies
 
-    def _lies(self, number: int) -> bool:
-        """Whether lanes are in memory, and no value."""
-        return self.graph.op[number] == "memory" or self.order.looped(number)
+    def pointer(self, address: Address, index: str | int) -> str:
+        """Return the pointer to a lane."""
+        if isinstance(index, int):
+            return self.builder.pointer(address.pointer, address.of_lane(index))
+        start = self.builder.pointer(address.pointer, address.first)
+        if address.stride != 1:
+            index = self.builder.assign(f"mul i64 {index}, {address.stride}")
+        return self.builder.pointer(start, index)
 
-    def copy(self, source: Place, target: Place, count: int, kind: str) -> None:
-        """Copy numbers from one place to another."""
-        unit = self.unit(source.rows)
-        if source.rows == target.rows and source.step == unit and target.step == unit:
-            goes = self.text.place(target.pointer, target.first)
-            comes = self.text.place(source.pointer, source.first)
-            self.text.declared.add("declare void @llvm.memmove.p0.p0.i64(ptr, ptr, i64, i1)")
-            size = 8 * unit * count
-            given = f"ptr align 8 {goes}, ptr align 8 {comes}, i64 {size}, i1 false"
-            self.text.say(f"call void @llvm.memmove.p0.p0.i64({given})")
+    def load(self, address: Address, index: str | int, kind: str) -> str:
+        """Load a lane."""
+        return self.builder.load(self.pointer(address, index), kind, address.batched)
+
+    def store(self, address: Address, index: str | int, value: str, kind: str) -> None:
+        """Store a lane."""
+        self.builder.store(self.pointer(address, index), value, kind, address.batched)
+
+    def copy(self, source: Address, target: Address, count: int, kind: str) -> None:
+        """Copy lanes."""
+        unit, builder = self.unit(source.batched), self.builder
+        if source.batched == target.batched and source.stride == target.stride == unit:
+            to = builder.pointer(target.pointer, target.first)
+            of = builder.pointer(source.pointer, source.first)
+            builder.declarations.add("declare void @llvm.memmove.p0.p0.i64(ptr, ptr, i64, i1)")
+            args = f"ptr align 8 {to}, ptr align 8 {of}, i64 {8 * unit * count}, i1 false"
+            builder.line(f"call void @llvm.memmove.p0.p0.i64({args})")
             return
 
         def one(index: str | int) -> None:
-            value = self._at(source, index, kind)
-            if target.rows and not source.rows:
-                value = self.text.same(value, kind, None)
-            self._to(target, index, value, kind)
+            value = self.load(source, index, kind)
+            if target.batched and not source.batched:
+                value = builder.splat(value, kind)
+            self.store(target, index, value, kind)
 
         self.repeat(count, one)
 
-    def _where(self, place: Place, index: str | int) -> str:
-        if isinstance(index, int):
-            return self.text.place(place.pointer, place.of_lane(index))
-        start = self.text.place(place.pointer, place.first)
-        along = index if place.step == 1 else self.text.give(f"mul i64 {index}, {place.step}")
-        return self.text.place(start, along)
-
-    def _at(self, place: Place, index: str | int, kind: str) -> str:
-        return self.text.load(self._where(place, index), kind, place.rows)
-
-    def _to(self, place: Place, index: str | int, value: str, kind: str) -> None:
-        self.text.store(self._where(place, index), value, kind, place.rows)
+    # Loops of the generated code
 
     def repeat(self, count: int, body: Callable[[Any], None]) -> None:
-        """Something for every number below another."""
-        if count <= _UNROLLED:
-            for index in range(count):
-                body(index)
+        """Write code for every index below a count; a loop if there are many."""
+        if count > _UNROLLED:
+            self.loop(str(count), body)
             return
-        self.counted(str(count), body)
+        for index in range(count):
+            body(index)
 
-    def counted(self, count: str, body: Callable[[str], None], by: int = 1) -> None:
-        """A loop."""
-        text = self.text
-        before, head, after = text.label(), text.label(), text.label()
-        index = text.name()
-        text.say(f"br label %{before}")
-        text.say(f"{before}:")
-        text.say(f"br label %{head}")
-        text.say(f"{head}:")
-        latch = text.label()
-        text.say(f"{index} = phi i64 [ 0, %{before} ], [ {index}.next, %{latch} ]")
+    def loop(self, count: str, body: Callable[[str], None], step: int = 1) -> None:
+        """Write a loop; its body runs at least once."""
+        builder = self.builder
+        before, head, after = builder.label(), builder.label(), builder.label()
+        index = builder.name()
+        builder.join(before)
+        builder.join(head)
+        latch = builder.label()
+        builder.line(f"{index} = phi i64 [ 0, %{before} ], [ {index}.next, %{latch} ]")
         body(index)
-        text.say(f"br label %{latch}")
-        text.say(f"{latch}:")
-        text.say(f"{index}.next = add i64 {index}, {by}")
-        text.say(f"{index}.more = icmp ult i64 {index}.next, {count}")
-        text.say(f"br i1 {index}.more, label %{head}, label %{after}")
-        text.say(f"{after}:")
+        builder.join(latch)
+        builder.line(f"{index}.next = add i64 {index}, {step}")
+        builder.line(f"{index}.more = icmp ult i64 {index}.next, {count}")
+        builder.line(f"br i1 {index}.more, label %{head}, label %{after}")
+        builder.line(f"{after}:")
+
+
+def _is_padded(buffer: Buffer, first: int, length: int) -> bool:
+    """Return whether memory reaches to the end of the last vector of a row."""
+    end = first + -(-length // WIDTH) * WIDTH
+    while buffer.space == "slice":
+        if not buffer.steps:
+            return False
+        end += buffer.offset + (buffer.steps - 1) * buffer.stride
+        buffer = buffer.source
+    return buffer.space == "arena" or (buffer.space == "argument" and end <= buffer.size)
 
 
 __all__ = ["Storage"]

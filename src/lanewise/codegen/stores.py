@@ -1,4 +1,4 @@
-"""Writing tables to memory: what a loop carries on, what a branch or a program hands on."""
+"""Write stores of references to buffers: carried values, results of branches and functions."""
 
 from __future__ import annotations
 
@@ -6,95 +6,107 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lanewise.codegen.addresses import Place
-from lanewise.codegen.lanes import Lanes
-from lanewise.codegen.runs import Run, runs
-from lanewise.ir.control_flow import WIDTH, Put
-from lanewise.ir.graph import LANE, LANE_BITS
+from lanewise.codegen.addresses import Address
+from lanewise.codegen.runs import Run, find_runs
+from lanewise.codegen.values import Values
+from lanewise.ir.control_flow import WIDTH, Store
+from lanewise.ir.graph import LANE_BITS, LANE_MASK
 
 
-class Puts(Lanes):
-    """What a program that is being written puts in memory."""
+class StoreWriter:
+    """Write stores.
 
-    def puts(self, puts: Sequence[Put], mask: str | None = None) -> None:
-        """Write tables to memory, all as they were before; of rows those of a mask."""
-        targets = {id(put.memory) for put in puts}
-        for put in puts:
-            self._unhooked(put, targets)
-        for put in puts:
-            entries, places = put.table.tolist(), put.places.tolist()
-            kind, rows = put.memory.inside, put.memory.rows
-            base, start, unit = self.base(put.memory), self.offset(put.memory), self.unit(rows)
-            for run in runs(entries, places):
-                first = start + run.place * unit
-                target = Place(base, first, (run.apart if run.count > 1 else 1) * unit, rows)
+    Args:
+        values: Values of nodes.
+    """
+
+    def __init__(self, values: Values) -> None:
+        """Hold the function that is being written."""
+        self.values, self.storage, self.builder = values, values.storage, values.builder
+
+    def write(self, stores: Sequence[Store], mask: str | None = None) -> None:
+        """Write stores as if at once: all read what was there before.
+
+        Args:
+            stores: The stores.
+            mask: Which rows of a batch to write; None for all.
+        """
+        targets = {id(store.buffer) for store in stores}
+        for store in stores:
+            self._save_overwritten(store, targets)
+        for store in stores:
+            kind, target = store.buffer.kind, self.storage.buffer_address(store.buffer)
+            for run in find_runs(store.refs.tolist(), store.offsets.tolist()):
+                part = target.part(run.offset, run.offset_stride if run.count > 1 else 1)
                 if run.count > 1:
-                    self._put_run(run, kind, target, mask)
+                    self._write_run(run, kind, part, mask)
                 else:
-                    self._put_one(run.entry(0), kind, target, mask)
-                self.text.pause()
+                    self._write_entry(run.ref(0), kind, part, 0, mask)
+                self.builder.limit_block()
 
-    def _unhooked(self, put: Put, targets: set[int]) -> None:
-        """Copy rows aside that are seen in memory which is about to be written to elsewhere."""
-        unit = self.unit(put.memory.rows)
-        for number in {int(one) for one in np.unique(put.table >> LANE_BITS)}:
-            place = self.place_of(number) if self._lies(number) else None
-            if place is None or place.memory is None or id(place.memory) not in targets:
+    def _save_overwritten(self, store: Store, targets: set[int]) -> None:
+        """Copy rows that alias buffers which are about to be overwritten."""
+        storage = self.storage
+        for node in np.unique(store.refs >> LANE_BITS).tolist():
+            address = storage.address_of(node) if storage.in_memory(node) else None
+            if address is None or address.buffer is None or id(address.buffer) not in targets:
                 continue
-            if place.memory is put.memory and place.step == unit:
-                own = put.table >> LANE_BITS == number
-                goes = self.offset(put.memory) + put.places[own] * unit
-                comes = place.first + (put.table[own] & LANE) * place.step
-                if (goes == comes).all():
+            if address.buffer is store.buffer:
+                target, own = storage.buffer_address(store.buffer), store.refs >> LANE_BITS == node
+                to = target.first + store.offsets[own] * target.stride
+                of = address.first + (store.refs[own] & LANE_MASK) * address.stride
+                if (to == of).all():
                     continue
-            length = int(self.graph.length[number]) or place.memory.size
-            room = self.arena.room((length + WIDTH) * self.unit(place.rows))
-            aside = Place("%arena", room, self.unit(place.rows), place.rows)
-            self.copy(place, aside, length, self.graph.kind[number])
-            self.slot[number] = aside
+            length = int(storage.graph.length[node]) or address.buffer.size
+            unit = storage.unit(address.batched)
+            saved = Address(
+                "%arena", storage.arena.allocate((length + WIDTH) * unit), unit, address.batched
+            )
+            storage.copy(address, saved, length, storage.graph.kind[node])
+            storage.address[node] = saved
 
-    def _put_run(self, run: Run, kind: str, target: Place, mask: str | None) -> None:
-        number = run.statement
-        if self._lies(number):
-            source = self._along_run(run)
-            if (source.pointer, source.first, source.step) == (
-                target.pointer,
-                target.first,
-                target.step,
-            ):
-                return
-            if mask is None:
-                self.copy(source, target, run.count, kind)
-                return
+    def _write_run(self, run: Run, kind: str, target: Address, mask: str | None) -> None:
+        storage, builder = self.storage, self.builder
+        if storage.in_memory(run.node):
+            self._copy_run(self.values.run_address(run), run.count, kind, target, mask)
+        elif run.lane == 0 and run.lane_stride == 1 and target.stride == 1:
+            at = builder.pointer(target.pointer, target.first)
+            builder.store(at, self.values.value(run.node), kind, True, run.count)
+        else:
+            for number in range(run.count):
+                self._write_entry(run.ref(number), kind, target, number, mask)
 
-            def trip(index: str | int) -> None:
-                value = self._at(source, index, kind)
-                if not source.rows:
-                    value = self.text.same(value, kind, None)
-                self._to(target, index, self._chosen(mask, value, target, index, kind), kind)
-
-            self.repeat(run.count, trip)
+    def _copy_run(
+        self, source: Address, count: int, kind: str, target: Address, mask: str | None
+    ) -> None:
+        storage = self.storage
+        same = (source.pointer, source.first, source.stride)
+        if same == (target.pointer, target.first, target.stride):
             return
-        if run.lane == 0 and run.step == 1 and target.step == 1:
-            at = self.text.place(target.pointer, target.first)
-            self.text.store(at, self.value_of_row(number), kind, True, run.count)
+        if mask is None:
+            storage.copy(source, target, count, kind)
             return
-        for place in range(run.count):
-            own = Place(target.pointer, target.of_lane(place), 1, target.rows)
-            self._put_one(run.entry(place), kind, own, mask)
 
-    def _put_one(self, one: int, kind: str, place: Place, mask: str | None) -> None:
-        number = one >> LANE_BITS
-        value = self.lane(one)
-        if place.rows and not self._wide(number):
-            value = self.text.same(value, kind, self.graph.value(number))
-        if mask is not None and place.rows:
-            value = self._chosen(mask, value, place, 0, kind)
-        self.text.store(self.text.place(place.pointer, place.first), value, kind, place.rows)
+        def one(index: str | int) -> None:
+            value = storage.load(source, index, kind)
+            if not source.batched:
+                value = self.builder.splat(value, kind)
+            storage.store(target, index, self._blend(mask, value, target, index, kind), kind)
 
-    def _chosen(self, mask: str, value: str, place: Place, index: str | int, kind: str) -> str:
-        old = self._at(place, index, kind)
-        return self.text.each("select", [mask, value, old], ["b", kind, kind], True)
+        storage.repeat(count, one)
+
+    def _write_entry(
+        self, ref: int, kind: str, target: Address, lane: int, mask: str | None
+    ) -> None:
+        value = self.values.entry_for(ref, target.batched)
+        if mask is not None and target.batched:
+            value = self._blend(mask, value, target, lane, kind)
+        self.storage.store(target, lane, value, kind)
+
+    def _blend(self, mask: str, value: str, target: Address, index: str | int, kind: str) -> str:
+        """Return the new value for the rows of a mask and the stored one for others."""
+        old = self.storage.load(target, index, kind)
+        return self.builder.operation("select", [mask, value, old], ["b", kind, kind], True)
 
 
-__all__ = ["Puts"]
+__all__ = ["StoreWriter"]

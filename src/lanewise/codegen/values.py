@@ -1,193 +1,199 @@
-"""Values of statements: single numbers, vectors, and rows that are put together of others."""
+"""Produce the values of nodes: single numbers, vectors, rows put together from other rows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lanewise.codegen.addresses import Place
-from lanewise.codegen.runs import Run, runs
+from lanewise.codegen.addresses import Address
+from lanewise.codegen.builder import literal, type_name
+from lanewise.codegen.runs import Run, find_runs
 from lanewise.codegen.storage import Storage
-from lanewise.codegen.text import literal, type_of
 from lanewise.ir.control_flow import WIDTH
-from lanewise.ir.graph import LANE, LANE_BITS, Memory
+from lanewise.ir.graph import LANE_BITS, LANE_MASK, Buffer
 
 
-class Values(Storage):
-    """Values of a program that is being written."""
+class Values:
+    """Write the code that loads, shuffles and extracts.
 
-    def single(self, number: int) -> str:
-        """The value of a statement that is computed at once."""
-        if self.graph.op[number] == "const":
-            return literal(self.graph.args[number][0], self.graph.kind[number])
-        return self.value[number]
+    Args:
+        storage: The memory of the function.
 
-    def as_vector(self, number: int) -> str:
-        """A value that is computed at once as a vector."""
-        known = self.graph.value(number)
+    Attributes:
+        name: LLVM's names of values by node.
+    """
+
+    def __init__(self, storage: Storage) -> None:
+        """Begin without values."""
+        self.storage, self.builder = storage, storage.builder
+        self.graph, self.schedule = storage.graph, storage.schedule
+        self.name: dict[int, str] = {}
+
+    def is_vector(self, node: int) -> bool:
+        """Return whether the value of a node is a vector."""
+        if self.storage.batched:
+            return self.schedule.varies(node)
+        return int(self.graph.length[node]) > 1
+
+    def has_rows(self, node: int) -> bool:
+        """Return whether an entry of a node is a vector over rows of a batch."""
+        if self.storage.in_memory(node):
+            return self.storage.address_of(node).batched
+        return self.schedule.varies(node)
+
+    # Operands
+
+    def value(self, node: int) -> str:
+        """Return the value of a node that is not computed in a loop over lanes."""
+        kind = self.graph.kind[node]
+        if self.graph.op[node] == "const":
+            return literal(self.graph.args[node][0], kind)
+        if self.graph.op[node] == "constants" and node not in self.name:
+            lanes = list(self.graph.args[node][0])
+            lanes += [lanes[-1]] * (WIDTH - len(lanes))
+            row = ", ".join(f"{type_name(kind, False)} {literal(one, kind)}" for one in lanes)
+            self.name[node] = f"<{row}>"
+        return self.name[node]
+
+    def as_vector(self, node: int) -> str:
+        """Return a value as a vector."""
+        known = self.graph.constant_value(node)
         if known is not None:
-            return self.text.same("", self.graph.kind[number], known)
-        if self.vector(number):
-            return self.value_of_row(number)
-        return self.text.same(self.value[number], self.graph.kind[number], None)
+            return self.builder.splat("", self.graph.kind[node], known)
+        if self.is_vector(node):
+            return self.value(node)
+        return self.builder.splat(self.name[node], self.graph.kind[node])
 
-    def lane(self, one: int) -> str:
-        """An entry; a vector where rows of a batch differ in it."""
-        number, lane = one >> LANE_BITS, one & LANE
-        if int(self.graph.length[number]) == 1:
-            return self.single(number)
-        if self._lies(number):
-            place = self.place_of(number)
-            at = self.text.place(place.pointer, place.of_lane(lane))
-            return self.text.load(at, self.graph.kind[number], place.rows)
-        kind = self.graph.kind[number]
-        return self.text.give(
-            f"extractelement {type_of(kind, True)} {self.value_of_row(number)}, i64 {lane}"
-        )
+    def entry(self, ref: int) -> str:
+        """Return an entry; a vector over rows if rows of a batch differ in it."""
+        node, lane = ref >> LANE_BITS, ref & LANE_MASK
+        if int(self.graph.length[node]) == 1:
+            return self.value(node)
+        if self.storage.in_memory(node):
+            return self.storage.load(self.storage.address_of(node), lane, self.graph.kind[node])
+        return self.builder.extract(self.value(node), self.graph.kind[node], lane)
 
-    def _wide(self, number: int) -> bool:
-        """Whether an entry is a vector, with a number for every row."""
-        if self._lies(number):
-            return self.place_of(number).rows
-        return self.order.varies(number)
+    def entry_for(self, ref: int, batched: bool) -> str:
+        """Return an entry in the form that memory has it: a vector over rows if batched."""
+        value, node = self.entry(ref), ref >> LANE_BITS
+        if batched and not self.has_rows(node):
+            return self.builder.splat(value, self.graph.kind[node], self.graph.constant_value(node))
+        return value
 
-    def _lanes(self, number: int) -> str:
-        kind = self.graph.kind[number]
-        values = list(self.graph.args[number][0])
-        values += [values[-1]] * (WIDTH - len(values))
-        return "<" + ", ".join(f"{type_of(kind, False)} {literal(v, kind)}" for v in values) + ">"
+    # Nodes
 
-    def _load(self, number: int) -> None:
-        statement, first, step, length = self.graph.args[number]
-        memory: Memory = self.graph.args[statement][0]
-        kind, unit = self.graph.kind[number], self.unit(memory.rows)
-        start = self.offset(memory)
-        base = self.base(memory)
+    def load(self, node: int) -> None:
+        """Write a load of entries of a buffer."""
+        buffer_node, first, stride, length = self.graph.args[node]
+        buffer: Buffer = self.graph.args[buffer_node][0]
+        kind, storage = self.graph.kind[node], self.storage
+        source = storage.buffer_address(buffer, first, stride)
         if length == 1:
-            at = self.text.place(base, start + first * unit)
-            self.value[number] = self.text.load(at, kind, memory.rows)
+            self.name[node] = storage.load(source, 0, kind)
             return
-        seen = self._seen_in(number)
-        if self.order.looped(number):
-            if seen is None:
-                place = self.place_of(number)
-                self.copy(Place(base, start + first, step, False), place, length, kind)
+        alias = storage.alias(node)
+        if self.schedule.is_looped(node):
+            if alias is None:
+                storage.copy(source, storage.address_of(node), length, kind)
             else:
-                self.slot[number] = seen
+                storage.address[node] = alias
             return
-        if seen is not None:
-            at = self.text.place(base, start + first)
-            self.value[number] = self.text.load(at, kind, True)
+        if alias is not None:
+            at = self.builder.pointer(source.pointer, source.first)
+            self.name[node] = self.builder.load(at, kind, True)
             return
         value = "poison"
         for lane in range(length):
-            at = self.text.place(base, start + first + lane * step)
-            own = self.text.load(at, kind, False)
-            value = self._insert(value, own, kind, lane)
-        self.value[number] = value
+            value = self.builder.insert(value, storage.load(source, lane, kind), kind, lane)
+        self.name[node] = value
 
-    def _insert(self, vector: str, value: str, kind: str, lane: int) -> str:
-        own = type_of(kind, False)
-        return self.text.give(
-            f"insertelement {type_of(kind, True)} {vector}, {own} {value}, i64 {lane}"
-        )
-
-    def _take(self, number: int) -> None:
-        args, kind = self.graph.args[number], self.graph.kind[number]
-        if len(args) == 1:
-            self.value[number] = self.lane(args[0])
-        elif not self.order.looped(number):
-            self.value[number] = self._taken(args, kind)
+    def shuffle(self, node: int) -> None:
+        """Write a row put together from lanes of others."""
+        refs, kind = self.graph.args[node], self.graph.kind[node]
+        if len(refs) == 1:
+            self.name[node] = self.entry(refs[0])
+        elif not self.schedule.is_looped(node):
+            self.name[node] = self._shuffled(refs, kind)
         else:
-            seen = self._seen_in(number)
-            if seen is None:
-                self._fill(args, kind, self.place_of(number))
+            alias = self.storage.alias(node)
+            if alias is None:
+                self._fill(refs, kind, self.storage.address_of(node))
             else:
-                self.slot[number] = seen
+                self.storage.address[node] = alias
 
-    def _taken(self, entries: Sequence[int], kind: str) -> str:
-        """A vector of some entries."""
-        first = entries[0] >> LANE_BITS
-        ordered = all(one - entries[0] == lane for lane, one in enumerate(entries))
-        if ordered and self._in_vectors(first):
-            return self._vector_from(first, entries[0] & LANE)
-        own = type_of(kind, True)
+    def _shuffled(self, refs: Sequence[int], kind: str) -> str:
+        """Return a vector of some entries."""
+        first = refs[0] >> LANE_BITS
+        contiguous = all(one - refs[0] == lane for lane, one in enumerate(refs))
+        if contiguous and self._is_contiguous(first):
+            return self._vector_from(first, refs[0] & LANE_MASK)
         pieces: dict[tuple[int, int], dict[int, int]] = {}
         single: list[tuple[int, int]] = []
-        for lane, one in enumerate(entries):
-            number, at = one >> LANE_BITS, one & LANE
-            if self._in_vectors(number):
-                pieces.setdefault((number, at // WIDTH), {})[lane] = at % WIDTH
-            elif int(self.graph.length[number]) > 1 and not self.order.looped(number):
-                pieces.setdefault((number, 0), {})[lane] = at
+        for lane, one in enumerate(refs):
+            node, source_lane = one >> LANE_BITS, one & LANE_MASK
+            if self._is_contiguous(node):
+                piece = source_lane // WIDTH
+                pieces.setdefault((node, piece), {})[lane] = source_lane % WIDTH
+            elif int(self.graph.length[node]) > 1 and not self.schedule.is_looped(node):
+                pieces.setdefault((node, 0), {})[lane] = source_lane
             else:
                 single.append((lane, one))
         value = "poison"
         filled: set[int] = set()
-        for (number, piece), at in pieces.items():
-            lanes = [
-                WIDTH + at[lane] if lane in at else lane if lane in filled else -1
+        for (node, piece), lanes in pieces.items():
+            mask = ", ".join(
+                f"i32 {WIDTH + lanes[lane]}"
+                if lane in lanes
+                else f"i32 {lane}"
+                if lane in filled
+                else "i32 poison"
                 for lane in range(WIDTH)
-            ]
-            mask = ", ".join("i32 poison" if lane < 0 else f"i32 {lane}" for lane in lanes)
-            both = f"{own} {value}, {own} {self._vector_from(number, piece * WIDTH)}"
-            value = self.text.give(f"shufflevector {both}, <{WIDTH} x i32> <{mask}>")
-            filled |= set(at)
+            )
+            own = type_name(kind, True)
+            both = f"{own} {value}, {own} {self._vector_from(node, piece * WIDTH)}"
+            value = self.builder.assign(f"shufflevector {both}, <{WIDTH} x i32> <{mask}>")
+            filled |= set(lanes)
         for lane, one in single:
-            value = self._insert(value, self.lane(one), kind, lane)
+            value = self.builder.insert(value, self.entry(one), kind, lane)
         return value
 
-    def _in_vectors(self, number: int) -> bool:
-        """Whether a row lies in memory such that vectors may be read from any of its lanes on."""
-        if self.program.rows or self.graph.op[number] == "memory" or not self.order.looped(number):
+    def _is_contiguous(self, node: int) -> bool:
+        """Return whether a vector may be loaded from any lane of a row on."""
+        if self.storage.batched or self.graph.op[node] == "buffer":
             return False
-        place = self.place_of(number)
-        return place.pointer == "%arena" and place.step == 1
+        if not self.schedule.is_looped(node):
+            return False
+        address = self.storage.address_of(node)
+        return address.pointer == "%arena" and address.stride == 1
 
-    def _vector_from(self, number: int, lane: int) -> str:
-        """The lanes of a row from one on."""
-        if not self.order.looped(number):
-            return self.value_of_row(number)
-        place = self.place_of(number)
-        at = self.text.place(place.pointer, place.of_lane(lane))
-        return self.text.load(at, self.graph.kind[number], True)
+    def _vector_from(self, node: int, lane: int) -> str:
+        """Return the lanes of a row from one on."""
+        if not self.schedule.is_looped(node):
+            return self.value(node)
+        address = self.storage.address_of(node)
+        at = self.builder.pointer(address.pointer, address.of_lane(lane))
+        return self.builder.load(at, self.graph.kind[node], True)
 
-    def _fill(self, entries: Sequence[int], kind: str, place: Place) -> None:
-        """Put entries in memory one after the other."""
-        if not self.program.rows:
-            for lane in range(0, len(entries), WIDTH):
-                value = self._taken(entries[lane : lane + WIDTH], kind)
-                at = self.text.place(place.pointer, place.of_lane(lane))
-                self.text.store(at, value, kind, True)
+    def _fill(self, refs: Sequence[int], kind: str, target: Address) -> None:
+        """Store entries in memory one after the other."""
+        builder, storage = self.builder, self.storage
+        if not storage.batched:
+            for lane in range(0, len(refs), WIDTH):
+                value = self._shuffled(refs[lane : lane + WIDTH], kind)
+                at = builder.pointer(target.pointer, target.of_lane(lane))
+                builder.store(at, value, kind, True)
             return
-        for run in runs(entries, range(len(entries))):
-            target = Place(
-                place.pointer, place.of_lane(run.place), run.apart * place.step, place.rows
-            )
-            if run.count > 1 and self.order.looped(run.statement):
-                source = self._along_run(run)
-                self.copy(source, target, run.count, kind)
+        for run in find_runs(refs, range(len(refs))):
+            part = target.part(run.offset, run.offset_stride)
+            if run.count > 1 and self.schedule.is_looped(run.node):
+                storage.copy(self.run_address(run), part, run.count, kind)
                 continue
             for number in range(run.count):
-                at = target.of_lane(number)
-                self._store_lane(run.entry(number), kind, place.pointer, at, place.rows)
+                value = self.entry_for(run.ref(number), target.batched)
+                storage.store(part, number, value, kind)
 
-    def _along_run(self, run: Run) -> Place:
-        """Where the lanes of a run lie."""
-        own = self.place_of(run.statement)
-        return Place(own.pointer, own.of_lane(run.lane), run.step * own.step, own.rows, own.memory)
-
-    def _store_lane(self, one: int, kind: str, pointer: str, at: int, rows: bool) -> None:
-        value = self.lane(one)
-        number = one >> LANE_BITS
-        if rows and not self._wide(number):
-            value = self.text.same(value, kind, self.graph.value(number))
-        self.text.store(self.text.place(pointer, at), value, kind, rows)
-
-    def value_of_row(self, number: int) -> str:
-        """The vector of a short row."""
-        if self.graph.op[number] == "lanes" and number not in self.value:
-            self.value[number] = self._lanes(number)
-        return self.value[number]
+    def run_address(self, run: Run) -> Address:
+        """Return where the lanes of a run are."""
+        return self.storage.address_of(run.node).part(run.lane, run.lane_stride)
 
 
 __all__ = ["Values"]

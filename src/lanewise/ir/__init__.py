@@ -1,1 +1,1 @@
-"""The intermediate representation: statements, loops and branches."""
+"""Represent programs between JAX's trace and LLVM: nodes over lanes, loops and branches."""

@@ -1,4 +1,4 @@
-"""What a program is made of beside statements: loops, conditions, and what they write to memory."""
+"""Represent regions: loops, branches, and the stores that carry values out of blocks."""
 
 from __future__ import annotations
 
@@ -6,120 +6,128 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lanewise.ir.graph import Block, Graph, Memory, Table
+from lanewise.ir.graph import Block, Buffer, Graph, References
 
 WIDTH = 8
-"""Lanes that are computed at once."""
+"""Lanes of a vector."""
 
 
 @dataclass(eq=False)
-class Put:
-    """Entries to be written to memory.
+class Store:
+    """Entries to be written to a buffer.
 
     Attributes:
-        table: Entries, flat.
-        memory: Where to.
-        places: Which of its numbers they become.
+        refs: References to the entries, flat.
+        buffer: The buffer.
+        offsets: Position of each entry in the buffer.
     """
 
-    table: Table
-    memory: Memory
-    places: np.ndarray
+    refs: References
+    buffer: Buffer
+    offsets: np.ndarray
 
 
 @dataclass(eq=False)
-class Loop:
+class WhileLoop:
     """A `while` loop.
 
     Attributes:
-        before: What is carried into it.
-        test: The block that says whether to go on.
-        going: Its entry for that.
+        initial: Stores of the values carried into it.
+        condition: The block that computes whether to continue.
+        predicate: Reference to that boolean.
         body: The block that is repeated.
-        after: What it carries on.
-        rows: Whether every row of a batch goes on or stops by itself.
+        updates: Stores of the values carried to the next iteration.
+        batched: Whether every row of a batch stops independently.
     """
 
-    before: list[Put]
-    test: Block
-    going: int
+    initial: list[Store]
+    condition: Block
+    predicate: int
     body: Block
-    after: list[Put]
-    rows: bool
+    updates: list[Store]
+    batched: bool
 
 
 @dataclass(eq=False)
-class Steps:
-    """A loop along tables.
+class ScanLoop:
+    """A loop over the leading axis of arrays.
 
     Attributes:
-        before: What is carried into it, and tables that are put in memory first.
-        count: How many steps; None where the number is known only when the program is called.
-        reverse: Whether from the last on.
-        along: Memory of the present step, a part of that of its table.
-        tables: Entries of tables that lie in memory before the loop.
+        initial: Stores of the values carried into it, and of arrays copied to memory first.
+        length: Number of steps; None if only known at run time.
+        reverse: Whether it runs from the last step to the first.
+        slices: Buffers of the present step.
+        inputs: References into the buffers that these are slices of.
         body: The block that is repeated.
-        after: What it carries on, and what it adds to its tables.
+        updates: Stores of the carried values and of the results of a step.
     """
 
-    before: list[Put]
-    count: int | None
+    initial: list[Store]
+    length: int | None
     reverse: bool
-    along: list[Memory]
-    tables: list[int]
+    slices: list[Buffer]
+    inputs: list[int]
     body: Block
-    after: list[Put]
+    updates: list[Store]
 
 
 @dataclass(eq=False)
-class Choice:
-    """Blocks of which one is run.
+class Conditional:
+    """Blocks of which one is executed.
 
     Attributes:
-        which: Entry of its number.
-        branches: The blocks, and what each hands on.
-        rows: Whether rows of a batch may choose differently.
+        index: Reference to the number of the branch.
+        branches: The blocks, each with the stores of its results.
+        batched: Whether rows of a batch choose independently.
     """
 
-    which: int
-    branches: list[tuple[Block, list[Put]]]
-    rows: bool
+    index: int
+    branches: list[tuple[Block, list[Store]]]
+    batched: bool
 
 
 @dataclass(eq=False)
-class Rows:
-    """Rows of a batch, as many at once as there are lanes.
+class BatchLoop:
+    """A loop over the rows of a batch, `WIDTH` at a time.
 
     Attributes:
-        given: By number of the table that is given, memory of the present rows.
-        body: What is done with them.
-        put: What it hands on.
-        out: Memory that this is put in, for each table handed on.
+        inputs: Buffers of the present rows, by number of the argument.
+        body: The block that computes them.
+        stores: Stores of its results.
+        outputs: Buffers of these results.
     """
 
-    given: dict[int, Memory]
+    inputs: dict[int, Buffer]
     body: Block
-    put: list[Put]
-    out: list[Memory]
+    stores: list[Store]
+    outputs: list[Buffer]
 
 
 @dataclass(eq=False)
-class Program:
-    """A program read whole.
+class LoweredFunction:
+    """A function, lowered completely.
 
     Attributes:
-        graph: Its statements.
-        put: What the outermost block writes to what is handed on.
-        written: Statements of memory that is handed on as it is.
-        sizes: Numbers handed on, by output; of a row where there are rows.
-        rows: Whether it is a batch.
+        graph: Its nodes.
+        stores: Stores of its results in the outermost block.
+        in_place: Nodes of result buffers that regions write directly.
+        sizes: Number of entries of every result; of one row where there are rows.
+        batched: Whether it computes the rows of a batch.
     """
 
     graph: Graph
-    put: list[Put]
-    written: list[int]
+    stores: list[Store]
+    in_place: list[int]
     sizes: list[int]
-    rows: bool
+    batched: bool
 
 
-__all__ = ["WIDTH", "Choice", "Loop", "Program", "Put", "Rows", "Steps"]
+__all__ = [
+    "WIDTH",
+    "BatchLoop",
+    "Conditional",
+    "LoweredFunction",
+    "ScanLoop",
+    "Store",
+    "WhileLoop",
+]

@@ -1,14 +1,12 @@
-"""What a program computes, as a graph of statements over rows of numbers.
+"""Represent what a program computes as a graph of nodes over lanes.
 
-A statement makes a row of numbers ("lanes") from rows as long, or from single numbers; most often
-one lane stands for one flexure. An array of JAX is no thing of its own here: it is a table that
-tells for every entry which lane of which statement it is. To slice, transpose, pad or join arrays
-moves entries of such tables and costs a program nothing; zeros and ones are known when the program
-is made, and what is multiplied by them is left out.
+A node computes a row of numbers ("lanes") from rows of the same length or from single numbers. An
+array of JAX has no node of its own: it is an array of references, one per entry, each naming a lane
+of a node. Slices, transposes, padding and concatenations rearrange references and cost nothing at
+run time; known zeros and ones are folded when the program is made.
 
-Statements belong to blocks: the program, the body of a loop, the branch of a condition. A statement
-stands in the outermost block that holds all that it is made of, so that what does not change in a
-loop is computed once before it.
+Nodes belong to blocks: the function, the body of a loop, a branch. A node stands in the outermost
+block that has all its operands, so that what a loop does not change is computed before it.
 """
 
 from __future__ import annotations
@@ -18,81 +16,90 @@ from typing import Any
 
 import numpy as np
 
-# A program of more statements is not written out: to compile it would take minutes.
-_MOST = 400_000
+# A program of more nodes is refused: compiling it would take minutes.
+_MAX_NODES = 400_000
 
 
-class UnknownHereError(Exception):
-    """Something that cannot be made here; such a program is left to XLA."""
+class UnsupportedPrimitiveError(Exception):
+    """The traced function uses what this compiler does not support; the caller may use XLA.
+
+    Attributes:
+        primitive: Name of JAX's primitive; None where the program as a whole is refused.
+    """
+
+    def __init__(self, reason: str, primitive: str | None = None) -> None:
+        """Describe what is not supported."""
+        super().__init__(reason)
+        self.primitive = primitive
 
 
-# An entry of an array: number of the statement times this, plus the lane.
+# A reference to an entry: number of the node shifted by this, plus the lane.
 LANE_BITS = 32
-LANE = (1 << LANE_BITS) - 1
+LANE_MASK = (1 << LANE_BITS) - 1
 
-Table = np.ndarray
-"""Entries of an array, int64, in the shape of the array."""
+References = np.ndarray
+"""References to the entries of an array, int64, in the shape of the array."""
 
 
 @dataclass(eq=False)
 class Block:
-    """Statements that run together.
+    """Group nodes that run together.
 
     Attributes:
-        outer: The block around it.
-        depth: How many blocks are around it.
-        repeats: Whether it runs again and again, and not at most once each time.
+        parent: The block around it.
+        depth: Number of blocks around it.
+        repeats: Whether it runs repeatedly, as the body of a loop, not at most once as a branch.
     """
 
-    outer: Block | None = None
+    parent: Block | None = None
     depth: int = 0
     repeats: bool = False
 
-    def inner(self, *, repeats: bool) -> Block:
-        """A block inside this one."""
+    def nested(self, *, repeats: bool) -> Block:
+        """Return a new block inside this one."""
         return Block(self, self.depth + 1, repeats)
 
 
 @dataclass(eq=False)
-class Memory:
-    """Numbers that lie in memory: what is given, carried round a loop or handed on by a branch.
+class Buffer:
+    """Describe numbers in memory: an argument, a result, or values carried between blocks.
 
     Attributes:
-        place: Where: "given", "arena", "step" (a row of a table that a loop runs along).
-        size: How many numbers.
-        number: Which of those given; for "step" the memory that it is a row of.
-        offset: Where in the arena, when it is known.
-        rows: Whether every row of a batch has numbers of its own.
-        inside: Numbers of the kind "f", "i" or "b".
-        stride: For "step": how far the memory moves from step to step.
-        steps: For "step": how many steps there are; 0 where that is not known.
+        space: "argument", "result", "arena", or "slice" (what one step of a scan sees of a buffer).
+        size: Number of entries.
+        source: Index of the argument or result; for "slice" the buffer that it is a part of.
+        offset: Position in the arena once assigned; for "slice" that of the first step.
+        batched: Whether every row of a batch has its own entries.
+        kind: Kind of its numbers: "f", "i" or "b".
+        stride: For "slice": entries from one step to the next.
+        steps: For "slice": number of steps; 0 if only known at run time.
     """
 
-    place: str
+    space: str
     size: int
-    number: Any = None
+    source: Any = None
     offset: int = -1
-    rows: bool = False
-    inside: str = "f"
+    batched: bool = False
+    kind: str = "f"
     stride: int = 0
     steps: int = 0
 
 
 class Graph:
-    """All statements of a program, by number.
+    """Hold all nodes of a program, by number.
 
     Attributes:
-        op: What is done; "const", "lanes" (given numbers), "memory", "load", "take", "reduce",
-            "along" (running sum) or an operation lane by lane.
-        args: Statements that it is made of, or, for some, what else it needs.
-        length: How many lanes.
-        kind: "f" numbers, "i" whole numbers, "b" yes or no.
-        owner: The block it stands in.
-        block: The block that is read at present.
+        op: Operation of every node: "const", "constants" (a row of known numbers), "buffer",
+            "load", "shuffle", "reduce", "prefix", "region" (a loop or branch), or an operation
+            lane by lane.
+        args: Operands: numbers of nodes, for some operations other data.
+        kind: "f" floats, "i" integers, "b" booleans.
+        owner: The block of every node.
+        block: The block that nodes are added for at present.
     """
 
     def __init__(self) -> None:
-        """Begin with nothing but the outermost block."""
+        """Begin with the outermost block alone."""
         self.top = Block()
         self.block = self.top
         self.op: list[str] = []
@@ -100,22 +107,18 @@ class Graph:
         self.kind: list[str] = []
         self.owner: list[Block] = []
         self._length = np.zeros(4096, np.int64)
-        self._known: dict[Any, int] = {}
-
-    def __len__(self) -> int:
-        """Number of statements."""
-        return len(self.op)
+        self._interned: dict[Any, int] = {}
 
     @property
     def length(self) -> np.ndarray:
-        """How many lanes every statement has; 0 where it is memory."""
+        """Number of lanes of every node; 0 for buffers and regions."""
         return self._length
 
     def add(self, op: str, args: tuple[Any, ...], length: int, kind: str, owner: Block) -> int:
-        """A new statement."""
+        """Add a node and return its number."""
         number = len(self.op)
-        if number == _MOST:
-            raise UnknownHereError("a program that is too long to be written out")
+        if number == _MAX_NODES:
+            raise UnsupportedPrimitiveError(f"a program of more than {_MAX_NODES} operations")
         if number == len(self._length):
             self._length = np.concatenate([self._length, np.zeros_like(self._length)])
         self._length[number] = length
@@ -125,62 +128,67 @@ class Graph:
         self.owner.append(owner)
         return number
 
-    def once(
+    def intern(
         self, op: str, args: tuple[Any, ...], length: int, kind: str, owner: Block, key: Any = None
     ) -> int:
-        """A statement, the same one where it is there already."""
+        """Return the visible node that computes the same, or add one."""
         key = (op, kind, args if key is None else key)
-        found = self._known.get(key)
-        if found is None or not self._is_around(self.owner[found]):
-            found = self._known[key] = self.add(op, args, length, kind, owner)
-        return found
+        node = self._interned.get(key)
+        if node is None or not self._is_visible(self.owner[node]):
+            node = self._interned[key] = self.add(op, args, length, kind, owner)
+        return node
 
-    def _is_around(self, block: Block) -> bool:
-        """Whether what stands in a block is there for the block that is read."""
+    def _is_visible(self, block: Block) -> bool:
+        """Return whether the present block is that block or inside it."""
         here: Block | None = self.block
         while here is not None and here.depth > block.depth:
-            here = here.outer
+            here = here.parent
         return here is block
 
-    def const(self, value: Any, kind: str) -> int:
-        """A number that is known."""
-        number = _as_kind(value, kind)
+    def constant(self, value: Any, kind: str) -> int:
+        """Return the node of a known number."""
+        number = float(value) if kind == "f" else bool(value) if kind == "b" else int(value)
         key = float(number).hex() if kind == "f" else number
-        return self.once("const", (number,), 1, kind, self.top, key=key)
+        return self.intern("const", (number,), 1, kind, self.top, key=key)
 
-    def value(self, statement: int) -> Any:
-        """The number that is known; None where it is not."""
-        return self.args[statement][0] if self.op[statement] == "const" else None
+    def constant_value(self, node: int) -> Any:
+        """Return the number of a constant node; None for others."""
+        return self.args[node][0] if self.op[node] == "const" else None
 
-    def home(self, statements: Any) -> Block:
-        """The block for what is made of some statements.
+    def placement(self, operands: Any) -> Block:
+        """Return the block for a node with these operands.
 
-        It is taken out of loops in which it does not change, but not out of a condition alone.
+        It is hoisted out of loops that do not change it, but not out of a branch alone.
         """
-        most = self.top
-        for one in statements:
-            if self.owner[one].depth > most.depth:
-                most = self.owner[one]
-        found = here = self.block
-        while here is not most:
-            assert here.outer is not None
+        innermost = self.top
+        for node in operands:
+            if self.owner[node].depth > innermost.depth:
+                innermost = self.owner[node]
+        hoisted = here = self.block
+        while here is not innermost:
+            assert here.parent is not None
             if here.repeats:
-                found = here.outer
-            here = here.outer
-        return found
+                hoisted = here.parent
+            here = here.parent
+        return hoisted
 
-    def memory(self, memory: Memory, owner: Block) -> int:
-        """A statement that stands for memory; its lanes are its numbers."""
-        return self.add("memory", (memory,), 0, memory.inside, owner)
-
-
-def _as_kind(value: Any, kind: str) -> Any:
-    return float(value) if kind == "f" else bool(value) if kind == "b" else int(value)
+    def add_buffer(self, buffer: Buffer, owner: Block) -> int:
+        """Add a node that stands for a buffer; its lanes are the buffer's entries."""
+        return self.add("buffer", (buffer,), 0, buffer.kind, owner)
 
 
-def entry(statement: int, lane: int = 0) -> int:
-    """The entry of a table for a lane of a statement."""
-    return (statement << LANE_BITS) + lane
+def reference(node: int, lane: int = 0) -> int:
+    """Return the reference to a lane of a node."""
+    return (node << LANE_BITS) + lane
 
 
-__all__ = ["LANE", "LANE_BITS", "Block", "Graph", "Memory", "Table", "UnknownHereError", "entry"]
+__all__ = [
+    "LANE_BITS",
+    "LANE_MASK",
+    "Block",
+    "Buffer",
+    "Graph",
+    "References",
+    "UnsupportedPrimitiveError",
+    "reference",
+]

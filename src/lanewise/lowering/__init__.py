@@ -1,1 +1,1 @@
-"""From JAX's trace to the graph of statements."""
+"""Lower JAX's traces to nodes, loops and branches."""

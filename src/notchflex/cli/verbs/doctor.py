@@ -20,6 +20,11 @@ from notchflex.results.files.writing import STANDARD_OUTPUT, check_output
 BUILDERS = ("test", "dev", "docs", "all")
 """Extras for those who change the program, or of all others together."""
 
+_BACKENDS = {
+    "native": "native: lanewise and LLVM {llvm} at level {optimisation} compile for {processor}",
+    "xla": "xla: NOTCHFLEX_BACKEND asks for it; programs are some ten times slower",
+}
+
 
 ClearCache = Annotated[
     bool,
@@ -68,9 +73,13 @@ def examination() -> dict[str, Any]:
     from notchflex.solver.programs import shipped, store
 
     use_compile_cache()
+    from lanewise import target
     from notchflex._canary import canary
     from notchflex._jax import jax
+    from notchflex.solver.programs.backend import backend, optimisation_level
 
+    chosen, level = backend(), optimisation_level()
+    llvm, processor, _ = target().split(" ", 2)
     sum_of_squares = canary()
     folder, kept = store.program_folder(), store.usage()
     return {
@@ -85,6 +94,12 @@ def examination() -> dict[str, Any]:
             "kind": jax.default_backend(),
             "names": [str(device) for device in jax.devices()],
             "x64": bool(jax.config.jax_enable_x64),  # pyright: ignore[reportAttributeAccessIssue]
+        },
+        "backend": {
+            "name": chosen,
+            "llvm": llvm,
+            "processor": processor,
+            "optimisation": level,
         },
         "canary": {"expected": sum_of_squares.expected, "computed": sum_of_squares.computed},
         "extras": _extras(),
@@ -168,7 +183,7 @@ def _print(found: dict[str, Any]) -> None:
 
     missing = "not installed"
     device = found["device"]
-    cache = found["compile_cache"]
+    backend, cache = found["backend"], found["compile_cache"]
     section(
         f"notchflex {found['version']}",
         [
@@ -182,6 +197,7 @@ def _print(found: dict[str, Any]) -> None:
         [
             ("device", f"{device['kind']}: {', '.join(device['names'])}"),
             ("floats", "64 bits" if device["x64"] else "32 bits"),
+            ("backend", _BACKENDS[backend["name"]].format(**backend)),
             ("known sum", "right" if found["healthy"] else "WRONG"),
             (
                 "programs",

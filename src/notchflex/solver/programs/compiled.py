@@ -1,14 +1,13 @@
 """Functions compiled to machine code for this processor, kept on disk.
 
-`lanewise` compiles them. What it cannot compile (an unknown primitive, a program that is too long
-to be written out), and batches on a GPU, are compiled by XLA from the same function.
+`lanewise` compiles them. XLA compiles the same functions where lanewise does not support them
+(with a warning), for batches on a GPU, and if `NOTCHFLEX_BACKEND=xla` asks for it.
 """
 
 from __future__ import annotations
 
 import json
 import threading
-import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial, update_wrapper
@@ -16,9 +15,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lanewise import Program, UnknownHereError, machine_code, processor, source
+from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code, target
 from notchflex._jax import jax, jit, jnp
 from notchflex.solver.programs import shipped, store
+from notchflex.solver.programs.backend import backend, optimisation_level, warn_of_xla
 
 # Rows that XLA's programs are made for; more are cut up, fewer filled up.
 _PIECES = (64, 256, 1024)
@@ -163,7 +163,7 @@ class Native:
         self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
     ) -> CompiledFunction | None:
         """The program for these arguments; None where XLA must make it."""
-        if getattr(jax.config, "jax_disable_jit"):  # noqa: B009
+        if getattr(jax.config, "jax_disable_jit") or backend() == "xla":  # noqa: B009
             return None
         vectors, others = arguments[: self._vectors], arguments[self._vectors :]
         shapes = tuple(
@@ -193,7 +193,8 @@ class Native:
     ) -> CompiledFunction | None:
         """The program, from disk or compiled and put there; None where XLA must make it."""
         key = repr((self._name, how, by_row, shapes, others))
-        on_processor = f"{key} {processor()}"
+        level = optimisation_level()
+        on_processor = f"{key} {target()} {level}"
         content = store.read(on_processor)
         if content is None:
             text = shipped.read(key) or self._trace(key, how, by_row, shapes, others)
@@ -201,7 +202,7 @@ class Native:
                 return None
             Native.compiled += 1
             head, body = _parts(text)
-            content = _content(head, machine_code(body.decode()))
+            content = _content(head, machine_code(body.decode(), level))
             store.write(on_processor, content)
         return CompiledFunction(content)
 
@@ -216,20 +217,16 @@ class Native:
         """The program as text, traced now; None where XLA must make it."""
         function, zeros = partial(self._with, others), [np.zeros(shape) for shape in shapes]
         try:
-            made, tree = source(
+            made, tree = lower(
                 function, zeros, self._lanes(*others), by_row, carries=how == "along"
             )
-        except UnknownHereError as error:
-            warnings.warn(
-                f"{self._name} is compiled by XLA, which makes it some ten times slower: {error}",
-                RuntimeWarning,
-                stacklevel=2,
-            )
+        except UnsupportedPrimitiveError as error:
+            warn_of_xla(self._name, error)
             return None
         Native.traced += 1
         if Native.traced % _TRACES == 0:
             jax.clear_caches()
-        content = _content([made.sizes, made.room, by_row, _structure(tree)], made.text.encode())
+        content = _content([made.sizes, made.memory, by_row, _structure(tree)], made.text.encode())
         shipped.record(key, content)
         return content
 

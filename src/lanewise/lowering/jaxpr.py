@@ -1,0 +1,248 @@
+"""Lower a jaxpr, JAX's trace of a function: equation by equation, loops and branches included."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from lanewise._jax import jax
+from lanewise.elementary import ELEMENTARY
+from lanewise.ir.control_flow import Conditional, ScanLoop, Store, WhileLoop
+from lanewise.ir.graph import Block, Buffer, Graph, References, UnsupportedPrimitiveError, reference
+from lanewise.lowering.arrays import ArrayLowering
+from lanewise.lowering.buffers import BufferLayout, Layout
+from lanewise.lowering.data_movement import DATA_MOVEMENT
+from lanewise.lowering.primitives import ELEMENTWISE, PRIMITIVES, kind_of
+from lanewise.lowering.scan_inputs import ScanInputs
+
+# Primitives that call another function, and the parameter that holds it.
+_CALLS = {
+    "jit": "jaxpr",
+    "pjit": "jaxpr",
+    "closed_call": "call_jaxpr",
+    "core_call": "call_jaxpr",
+    "custom_jvp_call": "call_jaxpr",
+    "custom_vjp_call": "call_jaxpr",
+    "remat": "jaxpr",
+    "remat2": "jaxpr",
+    "checkpoint": "jaxpr",
+}
+
+
+class JaxprLowering:
+    """Lower functions that JAX has traced to one graph.
+
+    Args:
+        lane_sizes: Sizes of axes along which rows are laid out.
+    """
+
+    def __init__(self, lane_sizes: Sequence[int]) -> None:
+        """Begin with an empty graph."""
+        self.graph = Graph()
+        self.arrays = ArrayLowering(self.graph, lane_sizes)
+        self.buffers = BufferLayout(self.arrays)
+
+    @contextmanager
+    def inside(self, block: Block) -> Generator[None]:
+        """Lower what follows into a block."""
+        outer, self.graph.block = self.graph.block, block
+        try:
+            yield
+        finally:
+            self.graph.block = outer
+
+    def add_region(self, region: Any, block: Block) -> None:
+        """Add a loop or branch to a block, behind all nodes added so far."""
+        self.graph.add("region", (region,), 0, "f", block)
+
+    def function(
+        self, closed: Any, args: Sequence[References], *, scalar: bool = False
+    ) -> list[References]:
+        """Return the results of a traced function.
+
+        Args:
+            closed: The function, a closed jaxpr.
+            args: Its arguments.
+            scalar: Whether it was traced for single numbers and is applied entry by entry.
+        """
+        consts = [self.arrays.constant(np.asarray(value)) for value in closed.consts]
+        return self._jaxpr(closed.jaxpr, consts, args, scalar)
+
+    def _jaxpr(
+        self, jaxpr: Any, consts: Sequence[References], args: Sequence[References], scalar: bool
+    ) -> list[References]:
+        values: dict[Any, References] = {}
+        values.update(zip(jaxpr.constvars, consts, strict=True))
+        values.update(zip(jaxpr.invars, args, strict=True))
+
+        def value(variable: Any) -> References:
+            if hasattr(variable, "val"):
+                return self.arrays.constant(np.asarray(variable.val))
+            return values[variable]
+
+        for equation in jaxpr.eqns:
+            operands = [value(variable) for variable in equation.invars]
+            if scalar and equation.primitive.name == "broadcast_in_dim":
+                results = [operands[0]]
+            else:
+                results = self._equation(equation, operands, scalar)
+            values.update(zip(equation.outvars, results, strict=True))
+        return [value(variable) for variable in jaxpr.outvars]
+
+    def _equation(self, equation: Any, operands: list[References], scalar: bool) -> Any:
+        name, params = equation.primitive.name, equation.params
+        for variable in equation.outvars:
+            kind_of(variable.aval.dtype)
+        if name in DATA_MOVEMENT:
+            moved = DATA_MOVEMENT[name](*operands, **params)
+            results = moved if isinstance(moved, list) else [moved]
+            return list(map(self.buffers.as_rows, results)) if name == "reshape" else results
+        if name in ELEMENTWISE:
+            return [self.arrays.elementwise(ELEMENTWISE[name], *operands)]
+        if name in ELEMENTARY:
+            for at, variable in enumerate(equation.invars):
+                if kind_of(variable.aval.dtype) != "f":
+                    operands[at] = self.arrays.elementwise("to_float", operands[at])
+            return self.function(_elementary(name, len(operands)), operands, scalar=True)
+        if name in _CALLS:
+            inner = params[_CALLS[name]]
+            if hasattr(inner, "consts"):
+                return self.function(inner, operands, scalar=scalar)
+            return self._jaxpr(inner, [], operands, scalar)
+        if name in _CONTROL_FLOW:
+            return _CONTROL_FLOW[name](self, operands, params)
+        if name in PRIMITIVES:
+            return [PRIMITIVES[name](self.arrays, operands, params, equation)]
+        raise UnsupportedPrimitiveError(f"JAX's primitive `{name}`", name)
+
+    # Loops and branches
+
+    def _allocate(self, avals: Sequence[Any]) -> list[Layout]:
+        return [self.buffers.allocate(one.shape, kind_of(one.dtype)) for one in avals]
+
+    def _store(self, arrays: Sequence[References], layouts: Sequence[Layout]) -> list[Store]:
+        return [self.buffers.store(*pair) for pair in zip(arrays, layouts, strict=True)]
+
+    def _read(self, layouts: Sequence[Layout], block: Block) -> list[References]:
+        return [self.buffers.read(layout, block) for layout in layouts]
+
+    def while_loop(self, operands: list[References], params: dict[str, Any]) -> list[References]:
+        """Lower `while`: carried values lie in buffers, which both blocks read."""
+        first, second = params["cond_nconsts"], params["body_nconsts"]
+        condition_consts, body_consts = operands[:first], operands[first : first + second]
+        layouts = self._allocate(params["body_jaxpr"].out_avals)
+        condition, body = (self.graph.block.nested(repeats=True) for _ in range(2))
+        with self.inside(condition):
+            args = [*condition_consts, *self._read(layouts, condition)]
+            (going,) = self.function(params["cond_jaxpr"], args)
+            predicate = int(self.arrays.loaded(going).reshape(()))
+        with self.inside(body):
+            args = [*body_consts, *self._read(layouts, body)]
+            updates = self._store(self.function(params["body_jaxpr"], args), layouts)
+        initial = self._store(operands[first + second :], layouts)
+        batched = self.buffers.batched
+        loop = WhileLoop(initial, condition, predicate, body, updates, batched)
+        self.add_region(loop, self.graph.block)
+        return self._read(layouts, self.graph.block)
+
+    def scan(self, operands: list[References], params: dict[str, Any]) -> list[References]:
+        """Lower `scan`: carried values lie in buffers, a step sees slices of inputs and results."""
+        consts, carried = params["num_consts"], params["num_carry"]
+        closed, length = params["jaxpr"], params["length"]
+        start, arrays = operands[consts : consts + carried], operands[consts + carried :]
+        avals = closed.out_avals
+        if length == 0:
+            empty = [np.zeros((0, *one.shape), one.dtype) for one in avals[carried:]]
+            return [*start, *map(self.arrays.constant, empty)]
+        layouts = self._allocate(avals[:carried])
+        initial = self._store(start, layouts)
+        body = self.graph.block.nested(repeats=True)
+        inputs = ScanInputs(self.arrays, body, length, self.buffers.batched)
+        present = [inputs.present(refs) for refs in arrays]
+        initial += inputs.initial
+        with self.inside(body):
+            present = list(map(self.buffers.as_rows, present))
+            carry = self._read(layouts, body)
+            results = self.function(closed, [*operands[:consts], *carry, *present])
+            updates = self._store(results[:carried], layouts)
+            steps = self._scan_results(avals[carried:], length)
+            updates += self._store(results[carried:], steps)
+        inputs.slices += [buffer for buffer, _ in steps]
+        loop = ScanLoop(
+            initial, length, params["reverse"], inputs.slices, inputs.inputs, body, updates
+        )
+        self.add_region(loop, self.graph.block)
+        return [*self._read(layouts, self.graph.block), *self._stacked(steps, length)]
+
+    def _scan_results(self, avals: Sequence[Any], length: int) -> list[Layout]:
+        """Return the slices that a step writes its results to."""
+        layouts: list[Layout] = []
+        batched = self.buffers.batched
+        for aval in avals:
+            size, positions = self.buffers.positions(aval.shape)
+            kind = kind_of(aval.dtype)
+            whole = Buffer("arena", size * length, batched=batched, kind=kind)
+            layouts.append(
+                (Buffer("slice", size, whole, 0, batched, kind, size, length), positions)
+            )
+        return layouts
+
+    def _stacked(self, steps: Sequence[Layout], length: int) -> list[References]:
+        """Return the results of all steps of a scan, as arrays with steps as leading axis."""
+        results: list[References] = []
+        for own, positions in steps:
+            starts = np.arange(length).reshape(-1, *(1,) * positions.ndim) * own.stride
+            node = self.graph.add_buffer(own.source, self.graph.block)
+            results.append(reference(node) + starts + positions)
+        return results
+
+    def cond(self, operands: list[References], params: dict[str, Any]) -> list[References]:
+        """Lower `cond` and `switch`: results that all branches share need no buffer."""
+        branches = params["branches"]
+        index = self.arrays.loaded(operands[0])
+        known = self.arrays.known(index)
+        if known is not None:
+            number = int(np.clip(int(known), 0, len(branches) - 1))
+            return self.function(branches[number], operands[1:])
+        blocks = [self.graph.block.nested(repeats=False) for _ in branches]
+        results: list[list[References]] = []
+        for branch, block in zip(branches, blocks, strict=True):
+            with self.inside(block):
+                results.append(self.function(branch, operands[1:]))
+        layouts = self._allocate(branches[0].out_avals)
+        same = [
+            all(np.array_equal(one, own[0]) for one in own) for own in zip(*results, strict=True)
+        ]
+        lowered: list[tuple[Block, list[Store]]] = []
+        for block, arrays in zip(blocks, results, strict=True):
+            with self.inside(block):
+                stores = [
+                    self.buffers.store(refs, layout)
+                    for refs, layout, shared in zip(arrays, layouts, same, strict=True)
+                    if not shared
+                ]
+            lowered.append((block, stores))
+        region = Conditional(int(index.reshape(())), lowered, self.buffers.batched)
+        self.add_region(region, self.graph.block)
+        return [
+            refs if shared else self.buffers.read(layout, self.graph.block)
+            for refs, layout, shared in zip(results[0], layouts, same, strict=True)
+        ]
+
+
+@cache
+def _elementary(name: str, count: int) -> Any:
+    return jax.make_jaxpr(ELEMENTARY[name])(*[1.0] * count)
+
+
+_CONTROL_FLOW: dict[str, Callable[..., list[References]]] = {
+    "while": JaxprLowering.while_loop,
+    "scan": JaxprLowering.scan,
+    "cond": JaxprLowering.cond,
+}
+
+__all__ = ["JaxprLowering"]

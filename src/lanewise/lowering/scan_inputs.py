@@ -1,0 +1,103 @@
+"""Find what one step of a scan sees of the arrays that it runs along.
+
+Entry by entry an array is the same at every step, moves through a buffer by a constant stride, or
+neither. The first costs nothing, the second a pointer; only the third is copied to memory before
+the loop. Structural zeros stay known inside the loop, and arguments are read in place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lanewise.ir.control_flow import Store
+from lanewise.ir.graph import LANE_BITS, LANE_MASK, Block, Buffer, Graph, References, reference
+from lanewise.lowering.arrays import ArrayLowering
+
+
+@dataclass
+class ScanInputs:
+    """Collect what a scan needs of its input arrays.
+
+    Attributes:
+        arrays: Lowers operations on arrays.
+        body: The block of the loop.
+        length: Number of steps.
+        batched: Whether the loop belongs to rows of a batch.
+        initial: Stores before the loop.
+        slices: Buffers of the present step.
+        inputs: References into the buffers that these are slices of.
+    """
+
+    arrays: ArrayLowering
+    body: Block
+    length: int
+    batched: bool
+    initial: list[Store] = field(default_factory=list[Store])
+    slices: list[Buffer] = field(default_factory=list[Buffer])
+    inputs: list[int] = field(default_factory=list[int])
+
+    def present(self, refs: References) -> References:
+        """Return the entries of the present step.
+
+        Args:
+            refs: Entries, steps as leading axis.
+        """
+        graph = self.arrays.graph
+        rows = _without_loads(graph, refs).reshape(self.length, -1)
+        first = rows[0]
+        result = first.copy()
+        steps = rows[1:] - rows[:-1]
+        moving = np.flatnonzero((steps != 0).any(axis=0))
+        if moving.size:
+            stride = steps[0, moving]
+            even = (steps[:, moving] == stride).all(axis=0)
+            even &= (stride > 0) & (stride < LANE_MASK >> 1)
+            even &= graph.length[first[moving] >> LANE_BITS] == 0
+            groups = (first[moving] >> LANE_BITS) * (LANE_MASK + 1) + stride
+            for group in np.unique(groups[even]):
+                members = moving[even & (groups == group)]
+                result[members] = self._strided(first[members], int(steps[0, members[0]]))
+            rest = moving[~even]
+            if rest.size:
+                result[rest] = self._copied(self.arrays.loaded(rows[:, rest]))
+        return result.reshape(refs.shape[1:])
+
+    def _strided(self, first: References, stride: int) -> References:
+        """Return the entries of a buffer that advances by a stride."""
+        graph = self.arrays.graph
+        whole: Buffer = graph.args[int(first[0]) >> LANE_BITS][0]
+        lanes = first & LANE_MASK
+        start = int(lanes.min())
+        size = int(lanes.max()) - start + 1
+        own = Buffer("slice", size, whole, start, whole.batched, whole.kind, stride, self.length)
+        self.slices.append(own)
+        self.inputs.append(int(first[0]))
+        return reference(graph.add_buffer(own, self.body)) + lanes - start
+
+    def _copied(self, refs: References) -> References:
+        """Return the entries of an array that is copied to memory before the loop."""
+        graph = self.arrays.graph
+        kind, size = graph.kind[int(refs[0, 0]) >> LANE_BITS], refs.shape[1]
+        whole = Buffer("arena", refs.size, batched=self.batched, kind=kind)
+        self.initial.append(Store(refs.ravel(), whole, np.arange(refs.size)))
+        own = Buffer("slice", size, whole, 0, self.batched, kind, size, self.length)
+        self.slices.append(own)
+        return reference(graph.add_buffer(own, self.body)) + np.arange(size)
+
+
+def _without_loads(graph: Graph, refs: References) -> References:
+    """Return the same entries; lanes of loads as entries of the buffers they were loaded from."""
+    flat = refs.ravel()
+    nodes = flat >> LANE_BITS
+    result = flat.copy()
+    for node in np.unique(nodes).tolist():
+        if graph.op[node] == "load":
+            buffer, first, stride, _ = graph.args[node]
+            own = nodes == node
+            result[own] = reference(buffer, first) + (flat[own] & LANE_MASK) * stride
+    return result.reshape(refs.shape)
+
+
+__all__ = ["ScanInputs"]
