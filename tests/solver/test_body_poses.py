@@ -7,7 +7,7 @@ import pytest
 
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.motion import Motion, exponential, identity
-from notchflex.solver.residual import body_poses
+from notchflex.solver.body_poses import body_poses
 
 
 @pytest.mark.parametrize("size", [3, 6])

@@ -16,8 +16,8 @@ from notchflex.mechanics.flexure import relative_pose
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.tendon.wall_arc import WallArc
 from notchflex.robot import Robot
+from notchflex.solver.body_poses import body_poses
 from notchflex.solver.programs.prepare import prepare
-from notchflex.solver.residual import body_poses
 
 
 def bodies_from_angles(

@@ -1,9 +1,14 @@
-"""Stiffness of the whole robot against its modes, its tendons held where they stick.
+"""Stiffness of the whole robot against its modes, its tendons held where they stick; stability.
 
 Tension ratios, contact forces and base tensions are eliminated: a contact that sticks holds its
 tendon, one that slides keeps its tension ratio at the bound, which moves with the shape. The
 stiffness is not symmetric then. The rows of every flexure are those of Newton's linear step; here
 they are assembled to one dense matrix per state, for many states at once.
+
+An equilibrium is stable where every eigenvalue has a positive real part. Where the symmetric part
+of the stiffness is positive definite, which is found at a fraction of their cost, they have. The
+converse does not hold (a stuck contact adds the product of two different vectors), so elsewhere the
+eigenvalues themselves are found.
 """
 
 from __future__ import annotations
@@ -12,7 +17,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import jnp
 from notchflex.loads.command import Command
@@ -165,3 +170,40 @@ def _condense_on_modes(
     stiffness[finite] = some[:, own[:, None], own] - some[:, own[:, None], others] @ response
     sign[finite] = np.linalg.slogdet(some)[0]
     return HeldStiffness(stiffness, sign)
+
+
+def stable(
+    prepared: PreparedChain, commands: Command, solved: SolverState
+) -> Bool[np.ndarray, " s"]:
+    """Return whether every state is stable, contacts that stick held."""
+    verdicts = [
+        sign > 0.0 and bool(_positive_definite(one) or _smallest(one) > 0.0)
+        for stiffness, signs in held_stiffness(prepared, commands, solved)
+        for one, sign in zip(stiffness, signs, strict=True)
+    ]
+    return np.array(verdicts, bool)
+
+
+def stability(
+    prepared: PreparedChain, commands: Command, solved: SolverState
+) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
+    """Return the smallest real part of the eigenvalues and the determinant's sign, by state."""
+    found = list(held_stiffness(prepared, commands, solved))
+    smallest = [_smallest(one) for stiffness, _ in found for one in stiffness]
+    return np.array(smallest), np.array([one for _, sign in found for one in sign])
+
+
+def _positive_definite(stiffness: Float[np.ndarray, "m m"]) -> bool:
+    """Whether the symmetric part is positive definite."""
+    try:
+        np.linalg.cholesky(stiffness + stiffness.T)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _smallest(stiffness: Float[np.ndarray, "m m"]) -> float:
+    """Smallest real part of the eigenvalues; NaN where the state is not finite."""
+    if not np.isfinite(stiffness).all():
+        return float("nan")
+    return float(np.real(np.linalg.eigvals(stiffness)).min())

@@ -14,12 +14,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.loads.applied import BodyLoads, body_wrench
+from notchflex.loads.applied import BodyLoads
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.contact import GapResponse
 from notchflex.mechanics.flexure import FlexureState
 from notchflex.mechanics.motion import Motion, identity
 from notchflex.mechanics.tendon import Crossing, TendonGroup
+from notchflex.solver.body_poses import external_wrenches
 from notchflex.solver.element import Memory, Unknowns, clip_symmetric, signorini, trial_log_ratio
 
 
@@ -145,7 +146,7 @@ def evaluate(
     rotation, wrenches, at_base = None, None, None
     if on_bodies:
         assert flexure.pose is not None
-        rotation, external, at_base = _external(flexure.pose, applied)
+        rotation, external, at_base = external_wrenches(flexure.pose, applied)
         wrenches = _wrenches(chain, flexure.pose, unknowns, spans, contacts, external)
     balance = _balance(chain, unknowns, flexure, spans, contacts, wrenches)
     contact_force = tuple(
@@ -280,44 +281,6 @@ def _spans(
 def slip_mask(group: TendonGroup) -> Float[Array, "n t 2"]:
     """1 where a tendon can slide over an edge: not where it is fixed, nor where it does not run."""
     return jnp.stack([group.visits, group.visits * (1.0 - group.ends)], axis=-1)
-
-
-def _external(
-    pose: Motion, applied: BodyLoads | None
-) -> tuple[Float[Array, "n d d"] | None, Float[Array, "n w"] | None, Float[Array, " w"] | None]:
-    """Rotations of the bodies, sums of the loads on each and beyond in its frame, and on all."""
-    if applied is None:
-        return None, None, None
-    bodies = body_poses(pose)
-    distal: Motion = jax.tree.map(lambda leaf: leaf[1:], bodies)
-    wrench = jax.vmap(body_wrench)(distal.rotation, jax.tree.map(lambda leaf: leaf[1:], applied))
-    in_base = jax.vmap(Motion.wrench)(distal, wrench)
-    summed = jnp.cumsum(in_base[::-1], axis=0)[::-1]
-    inside = jax.vmap(Motion.wrench_inside)(distal, summed)
-    return distal.rotation, inside, summed[0]
-
-
-def body_poses(relative: Motion) -> Motion:
-    """Return the poses of bodies 0 to n in the frame of the base, from those between neighbours.
-
-    A prefix product: first over pairs, then over fours, until all start at the base.
-    """
-    dimensions = relative.translation.shape[-1]
-    poses = jax.tree.map(
-        lambda first, rest: jnp.concatenate([first[None], rest]), identity(dimensions), relative
-    )
-    reach = 1
-    while reach < len(poses.translation):
-        joined = jax.vmap(Motion.then)(
-            jax.tree.map(lambda leaf, reach=reach: leaf[:-reach], poses),
-            jax.tree.map(lambda leaf, reach=reach: leaf[reach:], poses),
-        )
-        poses = jax.tree.map(
-            lambda near, far, reach=reach: jnp.concatenate([near[:reach], far]), poses, joined
-        )
-        poses = jax.lax.optimization_barrier(poses)
-        reach *= 2
-    return poses
 
 
 def _wrenches(

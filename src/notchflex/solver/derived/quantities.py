@@ -13,11 +13,12 @@ from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import FlexureState, in_space, relative_pose, turn_doubt
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
 from notchflex.solver.block_elimination import Iterate
+from notchflex.solver.body_poses import body_poses
 from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.moments import moment_error
 from notchflex.solver.element import Unknowns, bound_side
 from notchflex.solver.programs.pytree_layout import PytreeLayout
-from notchflex.solver.residual import Evaluation, body_poses, evaluate, in_tendon_order
+from notchflex.solver.residual import Evaluation, evaluate, in_tendon_order
 
 # A state whose moments are off by this part of the largest is none.
 MODES_FAIL = 0.35

@@ -19,6 +19,7 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
 from notchflex.solver.derived.quantities import Shape, notch_lips, quantities, shape, unpad_quantity
+from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.capacity import pad_rows, padded_indices
 from notchflex.solver.programs.compiled import native
@@ -26,7 +27,6 @@ from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
 from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.residual import evaluate
-from notchflex.solver.stability import stability, stable
 
 # Columns behind the two states and the shape, see `_status`.
 _STATUS = 7
