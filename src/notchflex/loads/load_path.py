@@ -300,7 +300,7 @@ def _as_given(values: np.ndarray) -> float | list[float | None] | None:
 def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     """Check the external loads, one entry per step."""
     try:
-        given = tuple(external)
+        given: tuple[Any, ...] = tuple(external)
     except TypeError:
         given = (None,)
     different = {id(one): one for one in given}.values()

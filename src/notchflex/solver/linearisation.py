@@ -262,6 +262,7 @@ def _external_rows(here: _Linearisation, turn: Float[Array, "n a z"]) -> Float[A
     chain, at, unit = here.chain, here.at, here.unit
     assert at.wrenches is not None
     assert at.wrenches.external is not None
+    assert at.rotation is not None
     on_bodies = jax.tree.map(lambda leaf: leaf[1:], here.applied)
     on_body = jnp.einsum("nwa,naz->nwz", jax.vmap(_by_turn)(at.rotation, on_bodies), turn)
     if chain.follows:

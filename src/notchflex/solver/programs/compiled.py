@@ -239,7 +239,7 @@ class Native:
         key = (how, by_row, others)
         if key not in self._jitted:
             function = partial(self._with, others)
-            if how == "along":
+            if by_row is not None and how == "along":
                 function = partial(_scan, function, by_row)
             elif by_row is not None:
                 function = jax.vmap(function, in_axes=[0 if rows else None for rows in by_row])
