@@ -9,9 +9,9 @@ from jaxtyping import Array
 
 from notchflex._jax import jax, jnp
 from notchflex.errors import InputError
-from notchflex.loads.validation import shown
+from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import Advance, Solved
+from notchflex.solver.continuation import LoadStepResult, SolverState
 from notchflex.solver.derived.quantities import Quantities, Shape, believable, quantities, shape
 from notchflex.solver.newton import Settings
 
@@ -30,7 +30,7 @@ OUTPUTS = (
 """What can be asked of a batch or of a function that can be differentiated."""
 
 
-def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
+def check_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     """The names of outputs, checked.
 
     Raises:
@@ -39,7 +39,7 @@ def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     wrong = [name for name in names if name not in OUTPUTS]
     if wrong or not names:
-        said = f"there is no output {shown(wrong[0])}" if wrong else "no output is asked"
+        said = f"there is no output {short_repr(wrong[0])}" if wrong else "no output is asked"
         raise InputError(f"{said}; there are {', '.join(OUTPUTS)}")
     return names
 
@@ -47,10 +47,10 @@ def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 def followed(
     chain: Chain,
     commands: Any,
-    start: Solved,
+    start: SolverState,
     settings: Settings,
     outputs: tuple[str, ...],
-    stepping: Callable[[Chain, Any, Solved, Settings], Advance],
+    stepping: Callable[[Chain, Any, SolverState, Settings], LoadStepResult],
 ) -> dict[str, Array]:
     """Follow a path of loads, and tell of every state what is asked.
 
@@ -60,17 +60,17 @@ def followed(
 
     Args:
         chain: The chain.
-        commands: The loads, as leading axis; for `answered` with what came of them.
+        commands: The loads, as leading axis; for `differentiable_load_step` with what came of them.
         start: The state before the first.
         settings: How hard to try.
         outputs: Names of what is asked.
-        stepping: `advance`, or `answered` for derivatives of what is solved already.
+        stepping: `advance`, or `differentiable_load_step` for derivatives of what is solved already.
 
     Returns:
         By name, loads as leading axis; after a load that failed the last good state.
     """
 
-    def step(state: tuple[Solved, Array], command: Any) -> tuple[Any, dict[str, Array]]:
+    def step(state: tuple[SolverState, Array], command: Any) -> tuple[Any, dict[str, Array]]:
         last, alive = state
         came = stepping(chain, command, last, settings)
         solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), came.solved, last)
@@ -84,23 +84,25 @@ def followed(
     return jax.lax.scan(step, (start, jnp.array(True)), commands)[1]
 
 
-def _told(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
+def _told(chain: Chain, solved: SolverState, outputs: tuple[str, ...]) -> dict[str, Array]:
     """What is asked of a state, and whether it may be believed."""
     own = shape(chain, solved)
     holds = believable(own.friction_holds, own.moment_error, own.bend_possible)
     return _named(chain, solved, own, outputs) | {"_holds": holds}
 
 
-def reported(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
+def reported(chain: Chain, solved: SolverState, outputs: tuple[str, ...]) -> dict[str, Array]:
     """Return quantities of a solved state by name, in the frame of the base."""
     return _named(chain, solved, shape(chain, solved), outputs)
 
 
-def _named(chain: Chain, solved: Solved, own: Shape, outputs: tuple[str, ...]) -> dict[str, Array]:
+def _named(
+    chain: Chain, solved: SolverState, own: Shape, outputs: tuple[str, ...]
+) -> dict[str, Array]:
     known = {**own._asdict(), "tip_rotation": own.body_rotation[-1]}
     if any(name in Quantities._fields for name in outputs):
         known |= quantities(chain, solved)._asdict()
     return {name: known[name] for name in outputs if name in known}
 
 
-__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "followed", "known_outputs", "reported"]
+__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "followed", "check_outputs", "reported"]

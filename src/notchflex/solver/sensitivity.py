@@ -16,14 +16,21 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import stroke
 from notchflex.solver.block_elimination import linear_step
-from notchflex.solver.continuation import Advance, Solved, advance, on_the_way
+from notchflex.solver.continuation import (
+    LoadStepResult,
+    SolverState,
+    interpolate_command,
+    solve_load_step,
+)
 from notchflex.solver.element import Memory
-from notchflex.solver.newton import Point, Settings
+from notchflex.solver.newton import Iterate, Settings
 from notchflex.solver.residual import evaluate
 
 
-def solved_path(chain: Chain, commands: Command, start: Solved, settings: Settings) -> Advance:
-    """Follow a path of loads without derivatives; `answered` gives what came of it some.
+def solved_path(
+    chain: Chain, commands: Command, start: SolverState, settings: Settings
+) -> LoadStepResult:
+    """Follow a path of loads without derivatives; `differentiable_load_step` gives what came of it some.
 
     Args:
         chain: The chain.
@@ -37,28 +44,28 @@ def solved_path(chain: Chain, commands: Command, start: Solved, settings: Settin
     """
     chain, commands, start, settings = _still((chain, commands, start, settings))
 
-    def step(last: Solved, command: Command) -> tuple[Solved, Advance]:
-        came = advance(chain, command, last, settings)
+    def step(last: SolverState, command: Command) -> tuple[SolverState, LoadStepResult]:
+        came = solve_load_step(chain, command, last, settings)
         return came.solved, came
 
     return jax.lax.scan(step, start, commands)[1]
 
 
-def answered(
-    chain: Chain, item: tuple[Command, Advance], last: Solved, settings: Settings
-) -> Advance:
+def differentiable_load_step(
+    chain: Chain, item: tuple[Command, LoadStepResult], last: SolverState, settings: Settings
+) -> LoadStepResult:
     """A load that is solved already, from a solved state, with derivatives by all it takes.
 
-    They are NaN where it was not reached, and where nobody knows them, see `answering`.
+    They are NaN where it was not reached, and where nobody knows them, see `attach_derivatives`.
     """
     del settings  # it was needed to solve
     command, came = item
-    way = Way(came.between, came.part_before, came.parts, came.converged)
-    return came._replace(solved=answering(chain, command, last, came.solved, way))
+    way = SubstepHistory(came.between, came.part_before, came.parts, came.converged)
+    return came._replace(solved=attach_derivatives(chain, command, last, came.solved, way))
 
 
-class Way(NamedTuple):
-    """How a solved state was come to from the one before, told by `Advance`.
+class SubstepHistory(NamedTuple):
+    """How a solved state was come to from the one before, told by `LoadStepResult`.
 
     Attributes:
         between: The state before the last part of the load.
@@ -67,7 +74,7 @@ class Way(NamedTuple):
         reached: Whether the load was reached.
     """
 
-    between: Solved
+    between: SolverState
     part_before: Float[Array, ""]
     parts: Int[Array, ""]
     reached: Bool[Array, ""]
@@ -77,7 +84,9 @@ class Way(NamedTuple):
 _PARTS_FOLLOWED = 2
 
 
-def answering(chain: Chain, command: Command, last: Solved, solved: Solved, way: Way) -> Solved:
+def attach_derivatives(
+    chain: Chain, command: Command, last: SolverState, solved: SolverState, way: SubstepHistory
+) -> SolverState:
     """A solved state with its derivatives by chain, command and the state before.
 
     Contacts remember: where loads on the bodies came on before the tendons, the derivatives go
@@ -98,13 +107,15 @@ def answering(chain: Chain, command: Command, last: Solved, solved: Solved, way:
         whole = (way.parts <= 1) | (not chain.friction.remembers)
         return _answering_part(chain, command, last, solved, way.reached & whole)
     known = way.reached & (way.parts <= _PARTS_FOLLOWED)
-    halfway = on_the_way(chain, command, last, _still(way.part_before))
+    halfway = interpolate_command(chain, command, last, _still(way.part_before))
     items = (halfway, way.between, way.parts > 1), (command, solved, jnp.array(True))
 
-    def follow(before: Solved, item: tuple[Command, Solved, Array]) -> tuple[Solved, None]:
+    def follow(
+        before: SolverState, item: tuple[Command, SolverState, Array]
+    ) -> tuple[SolverState, None]:
         towards, found, taken = item
 
-        def answer() -> Solved:
+        def answer() -> SolverState:
             return _answering_part(chain, towards, before, found, known)
 
         return jax.lax.cond(taken, answer, lambda: before), None
@@ -114,13 +125,13 @@ def answering(chain: Chain, command: Command, last: Solved, solved: Solved, way:
 
 
 def _answering_part(
-    chain: Chain, command: Command, last: Solved, solved: Solved, reached: Bool[Array, ""]
-) -> Solved:
+    chain: Chain, command: Command, last: SolverState, solved: SolverState, reached: Bool[Array, ""]
+) -> SolverState:
     """The same of a load, or a part of one, that was solved in one go."""
     point = _still(solved.point)
     at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
     step = linear_step(chain, command, point.unknowns, last.memory, point.base_tension, at)
-    moved = Point(step.unknowns, step.base_tension)
+    moved = Iterate(step.unknowns, step.base_tension)
     point = jax.tree.map(lambda value, by: value + by, point, moved)
     at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
     memory = Memory(
@@ -128,8 +139,8 @@ def _answering_part(
         slid=tuple(span.slid for span in at.spans),
         bound=tuple(span.bound for span in at.spans),
     )
-    drawn = stroke(chain, point.base_tension, at.base)
-    answer = Solved(point, memory, drawn, command.applied)
+    released_length = stroke(chain, point.base_tension, at.base)
+    answer = SolverState(point, memory, released_length, command.applied)
     return jax.tree.map(
         lambda value, varied: _varying(value, varied, reached), _still(solved), answer
     )
@@ -157,4 +168,4 @@ def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Arra
     return jnp.zeros_like(varied), tangents[1] * jnp.where(known, 1.0, jnp.nan)
 
 
-__all__ = ["Way", "answered", "answering", "solved_path"]
+__all__ = ["SubstepHistory", "differentiable_load_step", "attach_derivatives", "solved_path"]

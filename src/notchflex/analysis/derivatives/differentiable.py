@@ -17,18 +17,18 @@ from notchflex.analysis.derivatives.callback import outputs_function
 from notchflex.analysis.derivatives.kinks import Kink, kinks
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.derivatives.tangent import PathTangents
-from notchflex.analysis.outputs import known_outputs
-from notchflex.analysis.solve import check_refinement, prepared_for
+from notchflex.analysis.outputs import check_outputs
+from notchflex.analysis.solve import check_refinement, prepare_for
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import command
 from notchflex.loads.conversion import load_path
-from notchflex.loads.validation import robot_given, shown
+from notchflex.loads.make_commands import make_commands
+from notchflex.loads.validation import check_is_robot, short_repr
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import Prepared, prepared
+from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run
 
 _TENDONS = ("tension", "stroke")
@@ -87,7 +87,7 @@ def differentiable(
         >>> f"{by['notch.depth']:.2f} rad/mm, {by['tension'][0, 0]:.3f} rad/N"
         '13.30 rad/mm, 1.520 rad/N'
     """
-    path = load_path(loads, robot_given(robot).number_of_tendons)
+    path = load_path(loads, check_is_robot(robot).number_of_tendons)
     check_refinement(refinement)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if not names or len(set(names)) < len(names):
@@ -105,7 +105,7 @@ def differentiable(
             start[name] = np.array([getattr(one, name) for one in path.external])
     start = {name: jnp.asarray(start[name], float) for name in names}
     return Differentiable(
-        robot, path, start, known_outputs(outputs), settings or DEFAULT, refinement
+        robot, path, start, check_outputs(outputs), settings or DEFAULT, refinement
     )
 
 
@@ -206,8 +206,8 @@ class Differentiable:
     def _path(self, values: Mapping[str, Any]) -> EquilibriumPath:
         """Solve the path at some values."""
         robot, load = self._robot(values), self._load(values)
-        ready = self._prepared(robot)
-        loads = command(load, robot, ready.chain)
+        ready = self._prepare(robot)
+        loads = make_commands(load, robot, ready.chain)
         came = run(ready, loads, None, self.settings, each_from_start=False)
         return EquilibriumPath(robot, load, ready, came, settings=self.settings)
 
@@ -234,7 +234,7 @@ class Differentiable:
     def _taken(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Values of all parameters, in their shapes."""
         if not isinstance(values, Mapping | None):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise InputError(f"give values by name of the parameter; got {shown(values)}")
+            raise InputError(f"give values by name of the parameter; got {short_repr(values)}")
         given = dict(values or {})
         wrong = [name for name in given if name not in self.start]
         if wrong:
@@ -257,7 +257,7 @@ class Differentiable:
             return jnp.broadcast_to(jnp.asarray(value, float), wanted)
         except (TypeError, ValueError):
             raise InputError(
-                f"`{name}` must be numbers of shape {wanted}; got {shown(value)}"
+                f"`{name}` must be numbers of shape {wanted}; got {short_repr(value)}"
             ) from None
 
     @cached_property
@@ -269,13 +269,13 @@ class Differentiable:
     def _tip(self) -> tuple[str, ...]:
         return tuple(name for name in _TIP if name in self.start)
 
-    def _prepared(self, robot: Robot) -> Prepared:
+    def _prepared(self, robot: Robot) -> PreparedChain:
         if self._tip:  # may point anywhere
-            return prepared(robot, "space", loaded=True, refinement=self.refinement, flat=False)
-        return prepared_for(robot, self.load, None, self.refinement)
+            return prepare(robot, "space", loaded=True, refinement=self.refinement, flat=False)
+        return prepare_for(robot, self.load, None, self.refinement)
 
     @cached_property
-    def ready(self) -> Prepared:
+    def ready(self) -> PreparedChain:
         """The robot as it is, as arrays."""
         return self._prepared(self.robot)
 
@@ -347,7 +347,7 @@ class _Solver:
         """Change of loads and chain, packed for the long chain, per unit of every value."""
         values, of = self._named(flat), self._of
         steps = len(of.load)
-        size = of.ready.long.chain_form.size
+        size = of.ready.long.chain_layout.size
         for name, value in values.items():
             if name in of.numbers:
                 change = self._by_number(values, name)
@@ -384,10 +384,10 @@ class _Solver:
         """The long chain and all loads as one vector."""
         of = self._of
         robot, load = of._robot(values), of._load(values)  # pyright: ignore[reportPrivateUsage]
-        ready = of._prepared(robot)  # pyright: ignore[reportPrivateUsage]
-        if ready.chain_form is not of.ready.chain_form:
+        ready = of._prepare(robot)  # pyright: ignore[reportPrivateUsage]
+        if ready.chain_layout is not of.ready.chain_layout:
             raise InputError("with these values the robot has another form; it must stay the same")
-        loads, _ = ready.long_commands(command(load, robot, ready.chain))
+        loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
         return np.concatenate([ready.long.vector, loads.ravel()])
 
 

@@ -17,13 +17,13 @@ from notchflex._jax import jax
 from notchflex.analysis.outputs import reported
 from notchflex.loads.command import Command
 from notchflex.results.path import EquilibriumPath
-from notchflex.solver.derived.quantities import of_own
-from notchflex.solver.programs.capacity import lengthen
+from notchflex.solver.derived.quantities import unpad_quantity
+from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.pytree_layout import Form, lane_sizes
-from notchflex.solver.programs.run import Run
-from notchflex.solver.programs.static_structure import KnownForm
-from notchflex.solver.sensitivity import Way, answering
+from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
+from notchflex.solver.programs.run import SolverRun
+from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.sensitivity import SubstepHistory, attach_derivatives
 
 _VECTORS = ("tip_position", "body_position", "base_force", "base_moment")
 _ROTATIONS = ("tip_rotation", "body_rotation")
@@ -60,36 +60,36 @@ class PathTangents:
             that did not converge, or was so hard that its derivatives are not known.
         """
         long = self.path.prepared.long
-        form = long.known_form
+        form = long.static_structure
         varies = chain is not None
         change = form.pack(chain) if varies else np.zeros(1)
         remembers = np.array([1.0 if self.remembers else 0.0])
         rows = (False, False, False, False, *(True,) * 6)
         before, states, between, how = self._states
-        packed, command_form = self._packed
-        given = (np.zeros(long.state.size), long.known_vector, change, remembers)
+        packed, command_layout = self._packed
+        given = (np.zeros(long.state.size), long.dynamic_vector, change, remembers)
         steps = (before, states, packed, loads, between, how)
-        others = (form, command_form, long.state, self.outputs, varies)
+        others = (form, command_layout, long.state, self.outputs, varies)
         found = _tangent.along(rows, *given, *steps, *others)
         return {name: self._own(name, values) for name, values in found.items()}
 
     @cached_property
-    def _packed(self) -> tuple[np.ndarray, Form]:
+    def _packed(self) -> tuple[np.ndarray, PytreeLayout]:
         """The loads packed for the long chain, and the form of one of them."""
-        return self.path.prepared.long_commands(self.path.commands)
+        return self.path.prepared.padded_commands(self.path.commands)
 
     @cached_property
     def _states(self) -> tuple[np.ndarray, ...]:
         """States before, at and between the loads, for the long chain, and how they were found."""
         ready, came = self.path.prepared, self.path.run
-        assert isinstance(came, Run)
+        assert isinstance(came, SolverRun)
         before = np.concatenate([came.first[None], came.states[:-1]])
         every = (before, came.states, came.between)
         how = np.stack([came.part_before, came.parts, self.path.converged], axis=1)
-        return (*(lengthen(one, ready.state, ready.long.state) for one in every), how)
+        return (*(pad_rows(one, ready.state, ready.long.state) for one in every), how)
 
     def _own(self, name: str, values: np.ndarray) -> np.ndarray:
-        own = of_own(self.path.chain, name, values)
+        own = unpad_quantity(self.path.chain, name, values)
         turn = self.path.base_to_world
         if turn is None or name not in (*_VECTORS, *_ROTATIONS):
             return own
@@ -108,9 +108,9 @@ def _tangent(
     load_change: Float[Array, " command"],
     between: Float[Array, " state"],
     how: Float[Array, " 3"],
-    chain_form: KnownForm,
-    command_form: Form,
-    state_form: Form,
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
     outputs: tuple[str, ...],
     varies: bool,
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
@@ -118,14 +118,14 @@ def _tangent(
 
     The program for loads alone, where the chain does not vary, is a fifth shorter.
     """
-    solved, halfway = state_form.unpack(state), state_form.unpack(between)
-    way = Way(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+    solved, halfway = state_layout.unpack(state), state_layout.unpack(between)
+    way = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
 
     def told(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
-        own, last = chain_form.unpack(varied), state_form.unpack(before)
-        command: Command = command_form.unpack(load)
-        found = answering(own, command, last, solved, way)
-        return state_form.pack(found), reported(own, found, outputs)
+        own, last = chain_layout.unpack(varied), state_layout.unpack(before)
+        command: Command = command_layout.unpack(load)
+        found = attach_derivatives(own, command, last, solved, way)
+        return state_layout.pack(found), reported(own, found, outputs)
 
     at, changes = (load, before), (load_change, remembers[0] * last_change)
     if varies:

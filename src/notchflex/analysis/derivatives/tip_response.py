@@ -14,14 +14,14 @@ from notchflex.analysis.derivatives.kinks import Kink, kinks
 from notchflex.analysis.derivatives.tangent import PathTangents
 from notchflex.analysis.solve import check_refinement
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.applied import Applied
-from notchflex.loads.command import Command, command
+from notchflex.loads.applied import BodyLoads
 from notchflex.loads.conversion import load_path
-from notchflex.loads.validation import robot_given
+from notchflex.loads.make_commands import Command, make_commands
+from notchflex.loads.validation import check_is_robot
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import prepared
+from notchflex.solver.programs.prepare import prepare
 from notchflex.solver.programs.run import run
 
 
@@ -82,10 +82,10 @@ def tip_response(
         >>> found.jacobian.shape, found.compliance.shape
         ((2, 6, 1), (2, 6, 6))
     """
-    path = load_path(loads, robot_given(robot).number_of_tendons)
+    path = load_path(loads, check_is_robot(robot).number_of_tendons)
     check_refinement(refinement)
-    ready = prepared(robot, "space", loaded=True, refinement=refinement, flat=False)
-    commands = command(path, robot, ready.chain)
+    ready = prepare(robot, "space", loaded=True, refinement=refinement, flat=False)
+    commands = make_commands(path, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=False)
     found = EquilibriumPath(robot, path, ready, came)
     # Each state is varied alone: what the contacts remember of the state before stays.
@@ -99,10 +99,10 @@ def tip_response(
     return TipResponse(found, slopes[..., :tendons], slopes[..., tendons:] @ turn.T)
 
 
-def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
+def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s make_commands"]]:
     """Changes of the loads, packed: a unit of every drive, then of tip moment and force."""
     long = path.prepared.long
-    packed, form = path.prepared.long_commands(path.commands)
+    packed, form = path.prepared.padded_commands(path.commands)
     none: Command = form.unpack(np.zeros(form.size))
     assert none.applied is not None  # the chain is assembled for loads
     units = [none._replace(value=constant(row)) for row in np.eye(long.chain.tendons)]
@@ -122,7 +122,7 @@ def _pose_change(
     return np.concatenate([0.5 * np.stack(turned, axis=-1), changes["tip_position"]], axis=-1)
 
 
-def _with_tip(applied: Applied, wrench: Float[np.ndarray, " 6"], length: float) -> Applied:
+def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float) -> BodyLoads:
     """Loads with a moment and a force more at the tip, dead in the base frame."""
     moment, force = wrench[:3], wrench[3:]
     last = np.zeros(len(applied.dead_force))

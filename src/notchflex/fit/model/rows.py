@@ -19,21 +19,21 @@ from notchflex._jax import jax, jnp
 from notchflex.analysis.axis_points import AxisPlaces, points_on_axis
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.outputs import followed
-from notchflex.analysis.solve import prepared_for
+from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.applied import is_unloaded
-from notchflex.loads.command import Command, filled
+from notchflex.loads.command import Command, pad_commands
 from notchflex.mechanics.chain import Chain
-from notchflex.results.path import command
+from notchflex.results.path import make_commands
 from notchflex.robot import Robot
 from notchflex.solver.continuation import at_rest
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.kept_xla import kept
-from notchflex.solver.programs.prepare import Prepared, lengthened
-from notchflex.solver.programs.pytree_layout import Form
+from notchflex.solver.programs.prepare import PreparedChain, pad_prepared
+from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.threads import number_of_cores, on_cores
-from notchflex.solver.sensitivity import answered, solved_path
+from notchflex.solver.sensitivity import differentiable_load_step, solved_path
 
 SENSOR = ("sensor.force_offset", "sensor.stroke_slack")
 """Numbers of the measurement itself: what a force gauge shows at no force (N), and the stroke that
@@ -102,45 +102,45 @@ class Rows:
         return self.robot.with_values(own) if own else self.robot
 
     @cached_property
-    def _ready(self) -> Prepared:
+    def _ready(self) -> PreparedChain:
         return self._prepared(self.robot)
 
-    def _prepared(self, robot: Robot) -> Prepared:
-        ready = prepared_for(robot, self.load)
-        return lengthened(ready, max(self.flexures, ready.chain.flexures), self.edges)
+    def _prepared(self, robot: Robot) -> PreparedChain:
+        ready = prepare_for(robot, self.load)
+        return pad_prepared(ready, max(self.flexures, ready.chain.flexures), self.edges)
 
     @cached_property
     def edges(self) -> int:
         """Most edges at which a tendon may meet the wall, with as many flexures."""
-        own = prepared_for(self.robot, self.load).chain
+        own = prepare_for(self.robot, self.load).chain
         more = max(self.flexures - own.flexures, 0)
         return own.contacts.shape[1] + 2 * more
 
     @cached_property
-    def _command_form(self) -> Form:
-        return self._ready.command_form(self._commands(self.robot, self._ready))
+    def _command_layout(self) -> PytreeLayout:
+        return self._ready.command_layout(self._commands(self.robot, self._ready))
 
-    def _commands(self, robot: Robot, ready: Prepared) -> Any:
-        own = prepared_for(robot, self.load).chain
+    def _commands(self, robot: Robot, ready: PreparedChain) -> Any:
+        own = prepare_for(robot, self.load).chain
         by_stroke = not np.isnan(self.load.stroke).all()
-        return filled(command(self.load, robot, own), ready.chain.flexures, by_stroke)
+        return pad_commands(make_commands(self.load, robot, own), ready.chain.flexures, by_stroke)
 
     def _vector(self, own: Float[np.ndarray, " k"]) -> Float[np.ndarray, " all"]:
         """Chain and, where they depend on the robot (weights), loads, as one vector."""
         values = dict(zip(self.own, own.tolist(), strict=True))
         robot = self.robot.with_values(values) if values else self.robot
-        ready = self._prepared(robot)
-        if ready.chain_form is not self._ready.chain_form:
+        ready = self._prepare(robot)
+        if ready.chain_layout is not self._ready.chain_layout:
             raise InputError(f"with {values} {robot.name} has another form; it must stay the same")
-        packed = ready.chain_form.pack(ready.chain)
+        packed = ready.chain_layout.pack(ready.chain)
         if is_unloaded(self.load):
             return packed
         commands = self._commands(robot, ready)
-        return np.concatenate([packed, self._command_form.pack(commands, leading=1).ravel()])
+        return np.concatenate([packed, self._command_layout.pack(commands, leading=1).ravel()])
 
     @cached_property
     def _still_commands(self) -> Float[np.ndarray, "p command"]:
-        return self._command_form.pack(self._commands(self.robot, self._ready), leading=1)
+        return self._command_layout.pack(self._commands(self.robot, self._ready), leading=1)
 
     def at(self, numbers: Float[np.ndarray, " k"]) -> Predicted:
         """Outputs at every row, and their derivatives by all numbers.
@@ -170,7 +170,7 @@ class Rows:
     def _run(
         self, vector: np.ndarray, tangents: np.ndarray, sensor: np.ndarray, turns: np.ndarray
     ) -> Predicted:
-        size = self._ready.chain_form.size
+        size = self._ready.chain_layout.size
         commands, moved = self._still_commands, np.zeros((len(tangents), 0, 0))
         if len(vector) > size:
             commands = vector[size:].reshape(commands.shape)
@@ -180,7 +180,7 @@ class Rows:
         rows = np.array([(*path, *(path[-1],) * (steps - len(path))) for path in self.paths])
         piece = _piece(len(rows))
         index = np.minimum(np.arange(-(-len(rows) // piece) * piece), len(rows) - 1)
-        forms = (self._ready.chain_form, self._command_form, self.outputs)
+        forms = (self._ready.chain_layout, self._command_layout, self.outputs)
         chain = (vector[:size], tangents[:, :size])
 
         def some(start: int) -> Any:
@@ -234,8 +234,8 @@ def _follow_all(
     sensor_moves: Float[Array, "k 2"],
     numbers: Float[Array, " settings"],
     places: AxisPlaces | None,
-    chain_form: Form,
-    command_form: Form,
+    chain_layout: PytreeLayout,
+    command_layout: PytreeLayout,
     outputs: tuple[str, ...],
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Outputs of paths, and how they change, numbers as leading axis."""
@@ -245,19 +245,21 @@ def _follow_all(
     asked = tuple(dict.fromkeys((*plain, *bodies, "converged")))
 
     def loads(path: Array, gauge: Array, shown: Array) -> Command:
-        given: Command = command_form.unpack(path)
+        given: Command = command_layout.unpack(path)
         true = jnp.maximum(given.either(shown - gauge[1], shown - gauge[0]), 0.0)
         return given._replace(value=jnp.where(jnp.isnan(shown), given.value, true))
 
     def one(path: Array, moves: Array | None, shown: Array) -> tuple[Any, Any]:
         # Solved once, and looked at again for its slopes: nothing that iterates is differentiated.
-        parts: Chain = chain_form.unpack(chain)
+        parts: Chain = chain_layout.unpack(chain)
         ways = solved_path(parts, loads(path, sensor, shown), at_rest(parts), settings)
 
         def told(vector: Array, given: Array, gauge: Array) -> dict[str, Array]:
-            parts: Chain = chain_form.unpack(vector)
+            parts: Chain = chain_layout.unpack(vector)
             items: Any = (loads(given, gauge, shown), ways)
-            found = followed(parts, items, at_rest(parts), settings, asked, answered)
+            found = followed(
+                parts, items, at_rest(parts), settings, asked, differentiable_load_step
+            )
             if places is not None:
                 poses = (found["body_position"], found["body_rotation"])
                 found |= {"axis_points": jax.vmap(partial(points_on_axis, places))(*poses)}

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.analysis.axis_points import AxisPlaces, axis_places
-from notchflex.analysis.solve import prepared_for
+from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import Unknown
@@ -191,7 +191,7 @@ def _lengths(
     """How many flexures each robot's arrays have: as many as the longest of its kind."""
     kind = {label: tuple({type(notch) for notch in one.notches}) for label, one in robots.items()}
     own = {
-        label: max(prepared_for(one, data.load).chain.flexures for data in measurements[label])
+        label: max(prepare_for(one, data.load).chain.flexures for data in measurements[label])
         for label, one in robots.items()
     }
     return {label: max(own[one] for one in robots if kind[one] == kind[label]) for label in robots}

@@ -88,7 +88,7 @@ def base_moment(path: EquilibriumPath) -> Float[np.ndarray, "s 3"]:
 @_formula
 def closed(path: EquilibriumPath) -> Bool[np.ndarray, "s n"]:
     """Compare contact force and gap: one of them is zero, but for rounding."""
-    return path.contact_force > path.gap * np.asarray(path.chain.lip_stiffness)
+    return path.contact_force > path.gap * np.asarray(path.chain.contact_stiffness)
 
 
 @_formula

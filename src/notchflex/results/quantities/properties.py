@@ -162,7 +162,7 @@ class PathQuantities:
     def closed(self) -> Bool[np.ndarray, "s n"]:
         """Closed, shape (s, n).
 
-        True where the lips of a notch touch.
+        True where the lips of a notch response.
         """
         return self.quantity("closed")
 
@@ -497,7 +497,7 @@ class EquilibriumQuantities:
     def closed(self) -> Bool[np.ndarray, " n"]:
         """Closed, shape (n,).
 
-        True where the lips of a notch touch.
+        True where the lips of a notch response.
         """
         return self.quantity("closed")
 

@@ -115,7 +115,7 @@ def _rows() -> tuple[Quantity, ...]:
         ),
         q(
             "closed", "closed", "", "",
-            "True where the lips of a notch touch.",
+            "True where the lips of a notch response.",
             "closed", "notch_{notch}_closed", ("notch",), kind=bool,
         ),
         q(

@@ -8,16 +8,16 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jnp
-from notchflex.loads.applied import Applied, body_wrench
+from notchflex.loads.applied import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import FlexureState, in_space, relative_pose, turn_doubt
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
-from notchflex.solver.continuation import Solved
+from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.moments import moment_error
-from notchflex.solver.element import Unknowns, at_bound
-from notchflex.solver.newton import Point
-from notchflex.solver.programs.pytree_layout import Form
-from notchflex.solver.residual import Evaluation, body_poses, evaluate, per_tendon
+from notchflex.solver.element import Unknowns, bound_side
+from notchflex.solver.newton import Iterate
+from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.residual import Evaluation, body_poses, evaluate, in_tendon_order
 
 # A state whose moments are off by this part of the largest is none.
 MODES_FAIL = 0.35
@@ -43,13 +43,13 @@ class Shape(NamedTuple):
     bend_possible: Bool[Array, "*s"]
 
     @staticmethod
-    def form(flexures: int, tendons: int) -> Form:
+    def form(flexures: int, tendons: int) -> PytreeLayout:
         """How it is packed for a robot of so many flexures and tendons."""
         bodies = flexures + 1
         shapes = ((tendons,), (tendons,), (flexures,), (), (bodies, 3), (bodies, 3, 3), (3,), ())
         numbers = [np.zeros(shape) for shape in shapes]
         no = np.zeros((), bool)
-        return Form.of(Shape(*numbers[:7], no, numbers[7], no))  # pyright: ignore
+        return PytreeLayout.of(Shape(*numbers[:7], no, numbers[7], no))  # pyright: ignore
 
 
 def believable(friction_holds: Any, moment_error: Any, bend_possible: Any) -> Any:
@@ -57,7 +57,7 @@ def believable(friction_holds: Any, moment_error: Any, bend_possible: Any) -> An
     return friction_holds & (moment_error < MODES_FAIL) & bend_possible
 
 
-def shape(chain: Chain, solved: Solved) -> Shape:
+def shape(chain: Chain, solved: SolverState) -> Shape:
     """The shape of a solved state."""
     point = solved.point
     at = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
@@ -173,13 +173,13 @@ _BY_CONTACT = (
 
 def _turning(chain: Chain, at: Evaluation) -> tuple[Array, Array]:
     """Turning angles at both edges of all gaps; 0 where a tendon has no contact."""
-    visited = per_tendon(chain, tuple(group.visits for group in chain.groups)) > 0.0
+    visited = in_tendon_order(chain, tuple(group.visits for group in chain.groups)) > 0.0
     angles = [(s.crossing.exit_turning, s.crossing.entry_turning) for s in at.spans]
     first, second = _each(chain, angles)
     return jnp.where(visited, first, 0.0), jnp.where(visited, second, 0.0)
 
 
-def quantities(chain: Chain, solved: Solved) -> Quantities:
+def quantities(chain: Chain, solved: SolverState) -> Quantities:
     """Everything else that is reported of a solved state, in the frame of the base.
 
     Slid lengths, stroke and energy use the robot file's axial stiffness of the tendon; the
@@ -190,14 +190,14 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
     flexure = at.flexure
     gap_tension, body_tension = _each(chain, [(s.gap_tension, s.body_tension) for s in at.spans])
     turning = _turning(chain, at)
-    body_length = per_tendon(chain, tuple(group.body_length for group in chain.groups))
+    body_length = in_tendon_order(chain, tuple(group.body_length for group in chain.groups))
     compliance = jnp.broadcast_to(1.0 / chain.axial_stiffness, gap_tension.shape)
-    drawn, stretch = _each(chain, [(s.drawn, s.stretch) for s in at.spans])
-    drawn_behind, stretch_behind = _each(
-        chain, [(s.drawn_behind, s.stretch_behind) for s in at.spans]
+    released_length, stretch = _each(chain, [(s.released_length, s.stretch) for s in at.spans])
+    released_length, tension_length = _each(
+        chain, [(s.released_length, s.tension_length) for s in at.spans]
     )
-    at_entry = drawn + (stretch + body_tension * body_length) * compliance
-    at_exit = drawn_behind + stretch_behind * compliance
+    at_entry = released_length + (stretch + body_tension * body_length) * compliance
+    at_exit = released_length + tension_length * compliance
     log_ratio = _each(chain, [(own[..., 0], own[..., 1]) for own in point.unknowns.log_ratio])
     bound = _each(chain, [(s.bound[..., 0], s.bound[..., 1]) for s in at.spans])
     contact = along_contacts(chain, log_ratio[0], log_ratio[1])
@@ -219,7 +219,7 @@ def quantities(chain: Chain, solved: Solved) -> Quantities:
         contact_slid=along_contacts(chain, at_exit, at_entry),
         contact_bound=limit,
         contact_turning=along_contacts(chain, turning[0], turning[1]),
-        contact_state=at_bound(contact, limit),
+        contact_state=bound_side(contact, limit),
         base_force=base[3:],
         base_moment=base[:3],
         stored_energy=_stored_energy(chain, point, at, gap_tension, body_tension),
@@ -232,9 +232,13 @@ def notch_lips(
     """Contact force and what is left of the narrowest opening of every notch (N, mm)."""
     force = jnp.zeros(chain.flexures)
     gap = jnp.full(chain.flexures, jnp.inf)
-    for group, own, touch in zip(chain.lips, unknowns.lip_force, at.touches, strict=True):
-        force = force + jnp.sum(own * group.closes, axis=-1)
-        gap = jnp.minimum(gap, jnp.min(jnp.where(group.closes > 0.0, touch.gap, jnp.inf), axis=-1))
+    for group, own, contact in zip(
+        chain.contact_pairs, unknowns.contact_force, at.contacts, strict=True
+    ):
+        force = force + jnp.sum(own * group.has_contact, axis=-1)
+        gap = jnp.minimum(
+            gap, jnp.min(jnp.where(group.has_contact > 0.0, contact.gap, jnp.inf), axis=-1)
+        )
     return force, jnp.where(jnp.isinf(gap), jnp.nan, gap)
 
 
@@ -246,7 +250,7 @@ def largest_moment(flexure: FlexureState) -> Float[Array, " n"]:
 
 
 def base_wrench(
-    chain: Chain, base_tension: Float[Array, " t"], at: Evaluation, applied: Applied | None
+    chain: Chain, base_tension: Float[Array, " t"], at: Evaluation, applied: BodyLoads | None
 ) -> Float[Array, " 6"]:
     """What the holder does to the tube: moment about the base's origin, and force.
 
@@ -287,7 +291,7 @@ def _chords(chain: Chain, flexure: FlexureState) -> Float[Array, " n"]:
 
 def _stored_energy(
     chain: Chain,
-    point: Point,
+    point: Iterate,
     at: Evaluation,
     gap_tension: Float[Array, "n t"],
     body_tension: Float[Array, "n t"],
@@ -297,9 +301,9 @@ def _stored_energy(
     density = jax.vmap(jax.vmap(chain.law.energy))(
         in_space(flexure.strain), chain.rods.section, chain.memory
     )
-    natural_gap = per_tendon(chain, tuple(group.natural_gap for group in chain.groups))
-    body_length = per_tendon(chain, tuple(group.body_length for group in chain.groups))
-    visits = per_tendon(chain, tuple(group.visits for group in chain.groups))
+    natural_gap = in_tendon_order(chain, tuple(group.natural_gap for group in chain.groups))
+    body_length = in_tendon_order(chain, tuple(group.body_length for group in chain.groups))
+    visits = in_tendon_order(chain, tuple(group.visits for group in chain.groups))
     compliance = jnp.broadcast_to(1.0 / chain.axial_stiffness, gap_tension.shape)
     in_tendons = gap_tension**2 * natural_gap + body_tension**2 * body_length
     return (
@@ -312,10 +316,10 @@ def _stored_energy(
 def _each(chain: Chain, pairs: list[tuple[Array, Array]]) -> tuple[Array, Array]:
     """Pairs of values per group, each of the two in the order of the robot's tendons."""
     first, second = zip(*pairs, strict=True)
-    return per_tendon(chain, first), per_tendon(chain, second)
+    return in_tendon_order(chain, first), in_tendon_order(chain, second)
 
 
-def of_own(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
+def unpad_quantity(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
     """Return a quantity of a chain whose contacts are all edges of all gaps as that of its own.
 
     Args:

@@ -13,15 +13,15 @@ from notchflex._jax import constant
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, assemble, padded
 from notchflex.robot import Robot
-from notchflex.solver.continuation import Solved, at_rest, unloaded
+from notchflex.solver.continuation import SolverState, at_rest, unloaded
 from notchflex.solver.derived.quantities import Shape
-from notchflex.solver.programs.capacity import capacity, lengthen
-from notchflex.solver.programs.pytree_layout import Form
-from notchflex.solver.programs.static_structure import KnownForm
+from notchflex.solver.programs.capacity import capacity, pad_rows
+from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.programs.static_structure import StaticStructure
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedChain:
     """A chain, and how it and what belongs to it are packed.
 
     Attributes:
@@ -31,27 +31,27 @@ class Prepared:
     chain: Chain
 
     @cached_property
-    def chain_form(self) -> Form:
-        """Form of the chain."""
-        return Form.of(self.chain)
+    def chain_layout(self) -> PytreeLayout:
+        """PytreeLayout of the chain."""
+        return PytreeLayout.of(self.chain)
 
     @cached_property
     def vector(self) -> Float[np.ndarray, " chain"]:
         """The chain as one vector."""
-        return np.asarray(self.chain_form.pack(self.chain))
+        return np.asarray(self.chain_layout.pack(self.chain))
 
     @cached_property
-    def known_form(self) -> KnownForm:
-        """Form of what is not known of the chain beforehand."""
-        return KnownForm.of(self.chain_form, [self.chain], self.vector[None])
+    def static_structure(self) -> StaticStructure:
+        """PytreeLayout of what is not known of the chain beforehand."""
+        return StaticStructure.of(self.chain_layout, [self.chain], self.vector[None])
 
     @cached_property
-    def known_vector(self) -> Float[np.ndarray, " unknown"]:
+    def dynamic_vector(self) -> Float[np.ndarray, " unknown"]:
         """That as one vector."""
-        return self.known_form.pack(self.vector)
+        return self.static_structure.pack(self.vector)
 
     @cached_property
-    def long(self) -> Prepared:
+    def long(self) -> PreparedChain:
         """The robot with as many flexures as programs are compiled for.
 
         Its tendons are taken to meet the wall at every edge of every gap; where they do is for the
@@ -60,15 +60,17 @@ class Prepared:
         chain = self.chain
         more = padded(chain, capacity(chain.flexures), chain.contacts.shape[1])
         edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
-        return Prepared(dataclasses.replace(more, contacts=edges))
+        return PreparedChain(dataclasses.replace(more, contacts=edges))
 
-    def long_commands(self, commands: Command) -> tuple[Float[np.ndarray, "s command"], Form]:
+    def padded_commands(
+        self, commands: Command
+    ) -> tuple[Float[np.ndarray, "s command"], PytreeLayout]:
         """Loads packed for the long chain, and the form of one of them."""
-        own, form = self.command_form(commands), self.long.command_form(commands)
-        return lengthen(own.pack(commands, leading=1), own, form), form
+        own, form = self.command_layout(commands), self.long.command_layout(commands)
+        return pad_rows(own.pack(commands, leading=1), own, form), form
 
     @cached_property
-    def rest(self) -> Solved:
+    def rest(self) -> SolverState:
         """The free robot with slack tendons."""
         return at_rest(self.chain)
 
@@ -83,34 +85,34 @@ class Prepared:
         return np.append(self.rest_vector, 1.0)
 
     @cached_property
-    def state(self) -> Form:
-        """Form of a solved state."""
-        return Form.of(self.rest)
+    def state(self) -> PytreeLayout:
+        """PytreeLayout of a solved state."""
+        return PytreeLayout.of(self.rest)
 
-    def command_form(self, commands: Command) -> Form:
-        """Form of one of some loads: by tensions alone, or some by stroke."""
-        return self._tension_form if commands.by_stroke is None else self._stroke_form
+    def command_layout(self, commands: Command) -> PytreeLayout:
+        """PytreeLayout of one of some loads: by tensions alone, or some by stroke."""
+        return self._tension_layout if commands.by_stroke is None else self._stroke_layout
 
     @cached_property
-    def _tension_form(self) -> Form:
+    def _tension_layout(self) -> PytreeLayout:
         return self._form_of_commands(None)
 
     @cached_property
-    def _stroke_form(self) -> Form:
+    def _stroke_layout(self) -> PytreeLayout:
         return self._form_of_commands(np.zeros(self.chain.tendons, bool))
 
-    def _form_of_commands(self, by_stroke: np.ndarray | None) -> Form:
+    def _form_of_commands(self, by_stroke: np.ndarray | None) -> PytreeLayout:
         value = constant(np.zeros(self.chain.tendons))
-        return Form.of(Command(value, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
+        return PytreeLayout.of(Command(value, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
 
     @cached_property
-    def shape(self) -> Form:
-        """Form of what is told of the shape of every state."""
+    def shape(self) -> PytreeLayout:
+        """PytreeLayout of what is told of the shape of every state."""
         return Shape.form(self.chain.flexures, self.chain.tendons)
 
 
 @lru_cache(maxsize=6)
-def prepared(
+def prepare(
     robot: Robot,
     level: str = "tendons",
     *,
@@ -118,19 +120,19 @@ def prepared(
     follows: bool = True,
     refinement: int = 0,
     flat: bool = True,
-) -> Prepared:
+) -> PreparedChain:
     """A robot ready to be solved; for the arguments see `notchflex.mechanics.chain.assemble`.
 
     The last robots asked for are remembered: a control loop solves the same one again and again.
     """
-    return Prepared(
+    return PreparedChain(
         assemble(robot, level, loaded=loaded, follows=follows, refinement=refinement, flat=flat)
     )
 
 
-def lengthened(ready: Prepared, flexures: int, edges: int) -> Prepared:
+def pad_prepared(ready: PreparedChain, flexures: int, edges: int) -> PreparedChain:
     """A robot ready to be solved beside longer ones; for the arguments see `chain.padded`."""
     chain = ready.chain
     if (chain.flexures, chain.contacts.shape[1]) == (flexures, edges):
         return ready
-    return Prepared(padded(chain, flexures, edges))
+    return PreparedChain(padded(chain, flexures, edges))
