@@ -9,7 +9,10 @@ __version__ = "0.1.0"
 
 # Public name -> the package that exports it. `__init__.pyi` lists the same names for type checkers.
 _HOME = {
-    **dict.fromkeys(("InputError", "RobotFileError"), "notchflex.errors"),
+    **dict.fromkeys(
+        ("ConvergenceError", "ErrorCode", "Failure", "InputError", "RobotFileError"),
+        "notchflex.errors",
+    ),
     **dict.fromkeys(
         (
             "ArcNotch",
@@ -40,7 +43,6 @@ _HOME = {
             "BodyForce",
             "Closing",
             "ClosingStatus",
-            "ConvergenceError",
             "Differentiable",
             "Equilibrium",
             "Kink",

@@ -1,6 +1,9 @@
 from notchflex._plot import plot as plot
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
+from notchflex.errors import ConvergenceError as ConvergenceError
+from notchflex.errors import ErrorCode as ErrorCode
+from notchflex.errors import Failure as Failure
 from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.fit import Calibration as Calibration
@@ -50,7 +53,6 @@ from notchflex.statics import Batch as Batch
 from notchflex.statics import BodyForce as BodyForce
 from notchflex.statics import Closing as Closing
 from notchflex.statics import ClosingStatus as ClosingStatus
-from notchflex.statics import ConvergenceError as ConvergenceError
 from notchflex.statics import Differentiable as Differentiable
 from notchflex.statics import Equilibrium as Equilibrium
 from notchflex.statics import EquilibriumPath as EquilibriumPath

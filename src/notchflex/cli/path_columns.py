@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.results.quantities import AXES, CONTACT_STATES, QUANTITIES
-from notchflex.results.quantity import Quantity
 from notchflex.results.spans import holds
 from notchflex.robot._explain import nearest
 

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.plotting.curves import COLOUR, LINE, failures, solved_only
 from notchflex.plotting.drive import LOADING, UNLOADING, branches, drive
@@ -20,7 +21,6 @@ from notchflex.plotting.style import house_style, sequence_colours
 from notchflex.plotting.with_matplotlib import draw_panel
 from notchflex.results.csv import Entry, entries_of, is_listed
 from notchflex.results.quantities import QUANTITIES
-from notchflex.results.quantity import Quantity
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from notchflex._quantity import Quantity
 from notchflex.results.files import write_text
 from notchflex.results.quantities import AXES, QUANTITIES, span_names
-from notchflex.results.quantity import Quantity
 from notchflex.results.spans import holds, spans_of
 
 if TYPE_CHECKING:

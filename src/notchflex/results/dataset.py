@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex._extras import need
+from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.results.quantities import AXES, CONTACT_STATES, QUANTITIES
-from notchflex.results.quantity import Quantity
 from notchflex.results.record import Record, path_of, record_of
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex import __version__
+from notchflex._quantity import Quantity
 from notchflex.results.files import write_text
 from notchflex.results.quantities import CONTACT_STATES, QUANTITIES, units
-from notchflex.results.quantity import Quantity
 from notchflex.results.spans import holds, spans_of
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.results.quantities import AXES, QUANTITIES
-from notchflex.results.quantity import Quantity
 
 _PATTERNS = {
     "tendon": r"(?:_(?P<tendon>[1-9]\d*))?",

@@ -5,7 +5,7 @@ from notchflex.statics.batch import Batch, simulate_batch, solve_batch
 from notchflex.statics.closing import Closing, closing
 from notchflex.statics.closing_search import ClosingStatus
 from notchflex.statics.differentiable import Differentiable, differentiable
-from notchflex.statics.equilibrium import ConvergenceError, Equilibrium
+from notchflex.statics.equilibrium import Equilibrium
 from notchflex.statics.external import BodyForce, ExternalLoad
 from notchflex.statics.kinematics import (
     SharedStroke,
@@ -32,7 +32,6 @@ __all__ = [
     "BodyForce",
     "Closing",
     "ClosingStatus",
-    "ConvergenceError",
     "Differentiable",
     "Equilibrium",
     "EquilibriumPath",

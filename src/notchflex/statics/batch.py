@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._cores import number_of_cores, on_cores
+from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
 from notchflex.native import WIDTH
@@ -30,7 +31,6 @@ from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.outputs import DEFAULT_OUTPUTS, known_outputs
 from notchflex.statics.packing import Form
 from notchflex.statics.prepare import Prepared, lengthened
-from notchflex.statics.quantities import BY_BODY, BY_FLEXURE
 from notchflex.statics.solve import prepared_for
 
 # Rows of a piece at most, by how many rows there are.
@@ -218,11 +218,11 @@ def _put(
     shape = tuple(np.maximum(found[name].shape[1:], values.shape[1:]))
     if shape != found[name].shape[1:]:
         wider = [(0, 0), *((0, b - a) for a, b in zip(found[name].shape[1:], shape, strict=True))]
-        found[name] = np.pad(found[name], wider, constant_values=np.nan)
+        found[name] = np.pad(found[name], wider, constant_values=_empty(values))
     first, last = int(rows[0]), int(rows[-1]) + 1
     own = rows if last - first > len(rows) else slice(first, last)
     if shape != values.shape[1:]:
-        found[name][own] = np.nan
+        found[name][own] = _empty(values)
     found[name][(own, *(slice(size) for size in values.shape[1:]))] = values
 
 
@@ -271,12 +271,18 @@ class _Table:
 
 
 def _of_own(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
-    """Values by flexure or body with NaN where a robot has none, rows and steps as leading axes."""
-    own = flexures + (name in BY_BODY)
-    if name in (*BY_FLEXURE, *BY_BODY) and (own < values.shape[2]).any():
+    """Values by flexure or body, empty where a robot has none, rows and steps as leading axes."""
+    along = REGISTERED[name].per[:1]
+    own = flexures + (along == ("body",))
+    if along in (("notch",), ("body",)) and (own < values.shape[2]).any():
         beyond = np.arange(values.shape[2]) >= own[:, None]
-        values[np.broadcast_to(beyond[:, None], values.shape[:3])] = np.nan
+        values[np.broadcast_to(beyond[:, None], values.shape[:3])] = _empty(values)
     return values
+
+
+def _empty(values: np.ndarray) -> float:
+    """What stands where a robot has no number: NaN, or 0 in whole numbers and flags."""
+    return np.nan if values.dtype.kind == "f" else 0
 
 
 def _tables(

@@ -11,19 +11,22 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._jax import constant
+from notchflex._quantity import REGISTERED, Quantity
 from notchflex._summary import Displayed, Summary
 from notchflex.chain import Chain
+from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.motion import rotation_about
 from notchflex.robot import Robot
 from notchflex.statics.actuation import Command
 from notchflex.statics.applied import out_of_frame
 from notchflex.statics.command import command
-from notchflex.statics.equilibrium import ConvergenceError, Equilibrium
+from notchflex.statics.equilibrium import Equilibrium
+from notchflex.statics.front import friction_front
 from notchflex.statics.load import LoadPath
 from notchflex.statics.newton import DEFAULT, Settings
-from notchflex.statics.path_formulas import FORMULAS
 from notchflex.statics.prepare import Prepared
-from notchflex.statics.quantity_properties import PathQuantities
+from notchflex.statics.quantity_properties import QUANTITIES, PathQuantities
+from notchflex.statics.reason import why_not
 from notchflex.statics.recorded import Recorded
 from notchflex.statics.run import Run
 from notchflex.statics.state import State
@@ -89,12 +92,24 @@ class EquilibriumPath(PathQuantities, Displayed):
         """
         kept = self._kept
         if name not in kept:
-            own = FORMULAS.get(name)
-            kept[name] = self.solver_quantity(name) if own is None else own(self)
+            own = REGISTERED.get(name)
+            if own is None or not own.title:
+                raise InputError(
+                    f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}"
+                )
+            computed = own.source in ("path", "derived")
+            kept[name] = own.formula(self) if computed else self._in_world(own)
         return kept[name]
 
+    def _in_world(self, quantity: Quantity) -> np.ndarray:
+        """Vectors and rotations of the solver are in the frame of the base."""
+        turn, values = self.base_to_world, self.solver_quantity(quantity.name)
+        if turn is None or not quantity.in_world:
+            return values
+        return turn @ values if "row" in quantity.per else values @ turn.T
+
     def solver_quantity(self, name: str) -> np.ndarray:
-        """Return what the solver reports of every step, by its name in `Shape` or `Quantities`.
+        """Return what the solver reports of every step, by its name.
 
         Steps that were not tried repeat the last one that was: the solver leaves their rows empty.
         """
@@ -116,7 +131,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         turn = self.load.base_rotation
         return np.asarray(rotation_about(constant(turn))) if any(turn.tolist()) else None
 
-    @property
+    @cached_property
     def front(self) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
         """How far the friction has reversed along every tendon, m and eta, (s, t) each.
 
@@ -125,7 +140,12 @@ class EquilibriumPath(PathQuantities, Displayed):
         base; m is one more than there are when all have turned (eta is then NaN). A tendon that
         is pulled for the first time has m = 1 and eta = 1.
         """
-        return self.quantity("front")
+        return friction_front(self.contact_log_ratio, self.contact_bound)
+
+    @cached_property
+    def failures(self) -> list[tuple[Failure | None, str]]:
+        """What stopped the solver at every step, and the sentence that says so; None and ""."""
+        return [why_not(self, step) for step in range(len(self))]
 
     @cached_property
     def commands(self) -> Command:
@@ -232,7 +252,8 @@ class EquilibriumPath(PathQuantities, Displayed):
         """
         if not self.converged.all():
             step = int(np.argmin(self.converged))
-            raise ConvergenceError(f"step {step + 1} of {len(self)}: {self.reason[step]}")
+            failure, text = self.failures[step]
+            raise ConvergenceError(f"step {step + 1} of {len(self)}: {text}", failure)
         return self
 
 

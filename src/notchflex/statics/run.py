@@ -22,7 +22,8 @@ from notchflex.statics.known import KnownForm
 from notchflex.statics.newton import Settings
 from notchflex.statics.packing import Form, lane_sizes
 from notchflex.statics.prepare import Prepared
-from notchflex.statics.quantities import Shape, notch_lips, of_own, quantities, shape
+from notchflex.statics.quantities import Shape, of_own, quantities, shape
+from notchflex.statics.solved_state import notch_lips
 from notchflex.statics.stability import stability, stable
 from notchflex.statics.stepping import Solved, advance
 from notchflex.statics.walk import evaluate
@@ -105,7 +106,7 @@ class Run:
         return {name: of_own(own.chain, name, values) for name, values in every.items()}
 
     def quantity(self, name: str) -> np.ndarray:
-        """What is reported of each state, by its name in `Shape` or `Quantities`."""
+        """What is reported of each state, by its name in the registry."""
         if name not in Shape._fields:
             return self._more[name][1:]
         long = self._prepared.long
@@ -264,4 +265,4 @@ def _quantities(
     state_form: Form,
 ) -> tuple[Array, dict[str, Array]]:
     """What is reported of a state beyond its shape, by name; nothing is carried on."""
-    return carried, quantities(chain_form.unpack(vector), state_form.unpack(state))._asdict()
+    return carried, quantities(chain_form.unpack(vector), state_form.unpack(state))
