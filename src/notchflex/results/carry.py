@@ -185,13 +185,16 @@ def _from_json(file: str | FilePath) -> EquilibriumPath:
 def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
     """Whether the steps of a document are those of a path, but for steps that were not tried.
 
-    Version 0.1.0 wrote zeros for the shape of those.
+    Version 0.1.0 wrote zeros for the shape of those, and no `reason_code`.
     """
     wanted = plain(path_document(path))["steps"]
     if not isinstance(steps, list) or len(steps) != len(wanted):
         return False
-    pairs = zip(wanted, steps, np.asarray(path.run.tried), strict=True)
-    return all(one == other for one, other, tried in pairs if tried)
+    return all(
+        isinstance(other, dict) and one == {"reason_code": one["reason_code"], **other}
+        for one, other, tried in zip(wanted, steps, np.asarray(path.run.tried), strict=True)
+        if tried
+    )
 
 
 def _no_kind(file: str | FilePath, suffix: str, done: str) -> str:

@@ -47,18 +47,19 @@ def path_document(path: EquilibriumPath) -> dict[str, Any]:
 
     Returns:
         `name`, `version`, `robot` (its whole description), `units` (JSON key to unit),
-        `converged`, `reason` and `steps`, a list of S objects. None stands where there is no
+        `converged`, `reason`, `reason_code` (the name of a `Failure`) and `steps`, a list of S objects. None stands where there is no
         number. Angles in deg, lengths in mm, forces in N. Where loads act from outside in any
         step, `load` tells those of every step.
     """
     outside = _outside(path)
-    failed = [str(r) for r, good in zip(path.reason, path.converged, strict=True) if not good]
+    failed = next((step for step, good in enumerate(path.converged) if not good), None)
     steps = [_step(path, index, outside) for index in range(len(path))]
     return {
         **document_head(path.robot),
         "units": units() | (LOAD_UNITS if outside else {}),
-        "converged": not failed,
-        "reason": failed[0] if failed else "",
+        "converged": failed is None,
+        "reason": "" if failed is None else str(path.reason[failed]),
+        "reason_code": "" if failed is None else str(path.reason_code[failed]),
         "steps": steps,
     }
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._jax import constant
-from notchflex._quantity import REGISTERED, Quantity
+from notchflex._quantity import Quantity
 from notchflex._summary import Displayed, Summary
 from notchflex.chain import Chain
 from notchflex.errors import ConvergenceError, Failure, InputError
@@ -92,11 +92,10 @@ class EquilibriumPath(PathQuantities, Displayed):
         """
         kept = self._kept
         if name not in kept:
-            own = REGISTERED.get(name)
-            if own is None or not own.title:
-                raise InputError(
-                    f"there is no quantity {name!r}; there are {', '.join(QUANTITIES)}"
-                )
+            own = QUANTITIES.get(name)
+            if own is None:
+                known = ", ".join(QUANTITIES)
+                raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {known}")
             computed = own.source in ("path", "derived")
             kept[name] = own.formula(self) if computed else self._in_world(own)
         return kept[name]
