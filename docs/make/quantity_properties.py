@@ -22,7 +22,7 @@ def module() -> str:
         for name, one in QUANTITIES.items()
     ]
     above, _, below = FILE.read_text(encoding="utf-8").partition(MARK)
-    return above + MARK + "".join(lines) + below[below.index("\n\n") :]
+    return above + MARK + "".join(lines).rstrip() + below[below.index("\n\n") :]
 
 
 if __name__ == "__main__":

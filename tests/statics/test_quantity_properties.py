@@ -109,7 +109,11 @@ nf.save_path(path, "path.parquet")
 assert (nf.read_path("path.parquet").tip_height == height).all()
 found = nf.solve_batch(wrist, load, outputs=["tip_height", "tip_position"])
 assert (found["tip_height"] == found["tip_position"][:, 2]).all()
-height = nf.differentiable(wrist, load, outputs=["tip_height"])
+import jax
+bend = nf.differentiable(wrist, load, ["tension"], outputs=["tip_height", "tip_position"])
+slopes = jax.jacobian(bend)(bend.start)
+by_tension = slopes["tip_height"]["tension"]
+assert (by_tension == slopes["tip_position"]["tension"][:, 2]).all() and by_tension[2, 2, 0] < 0.0
 """
 
 

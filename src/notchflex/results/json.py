@@ -47,9 +47,9 @@ def path_document(path: EquilibriumPath) -> dict[str, Any]:
 
     Returns:
         `name`, `version`, `robot` (its whole description), `units` (JSON key to unit),
-        `converged`, `reason`, `reason_code` (the name of a `Failure`) and `steps`, a list of S objects. None stands where there is no
-        number. Angles in deg, lengths in mm, forces in N. Where loads act from outside in any
-        step, `load` tells those of every step.
+        `converged`, `reason`, `reason_code` (name of a `Failure`) and `steps`, a list of S
+        objects. None stands where there is no number. Angles in deg, lengths in mm, forces in N.
+        Where external loads act in any step, `load` holds those of every step.
     """
     outside = _outside(path)
     failed = next((step for step, good in enumerate(path.converged) if not good), None)
