@@ -34,7 +34,6 @@ from notchflex.cli.options import (
     chosen_robot,
     robot_files,
 )
-from notchflex.cli.path_columns import parse_columns
 from notchflex.cli.simulate_files import check_files, write_files
 from notchflex.cli.spec import load_columns, parse_vector
 from notchflex.errors import InputError
@@ -146,6 +145,8 @@ def simulate(
     loading. Prints a table as wide as the terminal (the variable COLUMNS says otherwise) unless
     `--json -` or `--csv -` prints something else.
     """
+    from notchflex.cli.path_columns import parse_columns
+
     terminal.be_quiet(quiet)
     named = () if columns is None else parse_columns(columns)
     chosen = chosen_robot(robot, settings)
