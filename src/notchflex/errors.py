@@ -85,6 +85,10 @@ class ErrorCode(_Coded):
         "use one of the names that the message lists",
     )
     WRONG_TYPE = ("a value is of another kind than is needed", "give what the message asks for")
+    BAD_SYNTAX = (
+        "a text is not written in the form that is needed",
+        "write it as the message shows",
+    )
     NOT_A_NUMBER = ("a text stands where a number is needed", "write a number")
     NOT_FINITE = ("a number is NaN or infinite", "give finite numbers only")
     OUT_OF_RANGE = ("a number is outside its range", "give a number in the range of the message")
@@ -104,7 +108,7 @@ class ErrorCode(_Coded):
         "a robot description has a value that is missing or not allowed",
         "change the keys that the message names; see the page on robot files",
     )
-    OTHER_ROBOT = (
+    STATE_OF_ANOTHER_ROBOT = (
         "a state or a file belongs to another robot, or to other values of this one",
         "use it with its own robot, or start from rest",
     )
@@ -120,6 +124,7 @@ class ErrorCode(_Coded):
         "install the extra that the message names",
     )
     NOT_CONVERGED = ("a solve that the result needs did not converge", "take smaller loads")
+    PROCESS_FAILED = ("a process that was started failed", "read its message")
     NO_CONNECTION = ("the viewer cannot be served or does not answer", "choose another address")
 
 
@@ -153,6 +158,7 @@ class InputError(ValueError):
 
     UNKNOWN_NAME = _Raised()
     WRONG_TYPE = _Raised()
+    BAD_SYNTAX = _Raised()
     NOT_A_NUMBER = _Raised()
     NOT_FINITE = _Raised()
     OUT_OF_RANGE = _Raised()
@@ -163,7 +169,7 @@ class InputError(ValueError):
     TOO_FEW_DATA = _Raised()
     UNSUPPORTED = _Raised()
     INVALID_ROBOT = _Raised()
-    OTHER_ROBOT = _Raised()
+    STATE_OF_ANOTHER_ROBOT = _Raised()
     FILE_NOT_FOUND = _Raised()
     FILE_UNREADABLE = _Raised()
     FILE_UNWRITABLE = _Raised()
@@ -173,6 +179,7 @@ class InputError(ValueError):
     TABLE_ROWS = _Raised()
     MISSING_PACKAGE = _Raised()
     NOT_CONVERGED = _Raised()
+    PROCESS_FAILED = _Raised()
     NO_CONNECTION = _Raised()
 
 

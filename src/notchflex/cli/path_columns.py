@@ -141,12 +141,12 @@ def parse_columns(text: str) -> list[str]:
     for place, name in enumerate(names):
         if name not in allowed:
             got = repr(name) if name else "an empty name"
-            raise InputError(
+            raise InputError.UNKNOWN_NAME(
                 f"--columns {text}: {got} is not the name of a quantity{nearest(name, allowed)}. "
                 f"Allowed: {', '.join(allowed)}."
             )
         if name in names[:place]:
-            raise InputError(f"--columns {text}: {name} is given twice; give it once.")
+            raise InputError.CONFLICT(f"--columns {text}: {name} is given twice; give it once.")
     return names
 
 

@@ -221,7 +221,7 @@ def _start(file: str) -> SavedState:
 
 def _refinement(text: str) -> int:
     if text not in ("0", "1", "2", "3"):
-        raise InputError(f"--refinement {text}: give a whole number from 0 to 3.")
+        raise InputError.OUT_OF_RANGE(f"--refinement {text}: give a whole number from 0 to 3.")
     return int(text)
 
 

@@ -100,14 +100,14 @@ def read_table(source: str | os.PathLike[str]) -> Table:
         # utf-8-sig: spreadsheets put a byte-order mark before the first column's name.
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
+        raise InputError.FILE_NOT_FOUND(f"{path}: there is no such file.") from None
     except IsADirectoryError:
-        raise InputError(f"{path} is a folder; name a CSV file.") from None
+        raise InputError.FILE_UNREADABLE(f"{path} is a folder; name a CSV file.") from None
     except UnicodeDecodeError:
-        raise InputError(f"{path} is no text in UTF-8; save it as CSV.") from None
+        raise InputError.FILE_UNREADABLE(f"{path} is no text in UTF-8; save it as CSV.") from None
     except (OSError, ValueError) as problem:
         words = getattr(problem, "strerror", None) or str(problem)
-        raise InputError(f"{path} cannot be read: {words}.") from None
+        raise InputError.FILE_UNREADABLE(f"{path} cannot be read: {words}.") from None
     separator = _separator(text)
     table: list[tuple[int, tuple[str, ...]]] = []
     try:
@@ -116,23 +116,29 @@ def read_table(source: str | os.PathLike[str]) -> Table:
             if any(field.strip() for field in row) and not row[0].lstrip().startswith("#"):
                 table.append((reader.line_num, tuple(field.strip() for field in row)))
     except csv.Error as problem:
-        raise InputError(f"{path} is no CSV: {problem}.") from None
+        raise InputError.FILE_UNREADABLE(f"{path} is no CSV: {problem}.") from None
     if not table:
-        raise InputError(f"{path} is empty; it needs a header and at least one row of numbers.")
+        raise InputError.TABLE_ROWS(
+            f"{path} is empty; it needs a header and at least one row of numbers."
+        )
     (_, header), *body = table
     if len(header) == 1 and "\t" in header[0]:
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{path}: the columns are separated by tabs; save it with commas between the columns "
             "and points in the numbers."
         )
     for column in header:
         if column and header.count(column) > 1:
-            raise InputError(f"{path}: the column {column} is there more than once; keep one.")
+            raise InputError.TABLE_COLUMNS(
+                f"{path}: the column {column} is there more than once; keep one."
+            )
     if not body:
-        raise InputError(f"{path} has a header and no rows; it needs at least one row of numbers.")
+        raise InputError.TABLE_ROWS(
+            f"{path} has a header and no rows; it needs at least one row of numbers."
+        )
     for line, row in body:
         if len(row) != len(header):
-            raise InputError(
+            raise InputError.TABLE_ROWS(
                 f"{path}, line {line}: {len(row)} entries for {len(header)} columns; "
                 "every row needs one entry for each column."
             )
@@ -162,7 +168,7 @@ def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) ->
                 found.setdefault(number[1], (line, entry))
     if len(found) == 2:
         (line, entry), (other_line, other) = sorted(found.values())
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{path}: {entry} in line {line} and {other} in line {other_line} have different "
             "decimal separators; write all numbers with points, or all with commas."
         )
@@ -192,7 +198,7 @@ def no_tendon_column(table: Table, tendons: int) -> InputError:
     label = "" if tendons == 1 else 1
     wanted = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
     more = "" if tendons == 1 else f" (and so on to tendon {tendons})"
-    return InputError(
+    return InputError.TABLE_COLUMNS(
         f"{table.name}: there is no column {wanted[0]} or {wanted[1]}{more}; {table.columns}."
     )
 
@@ -202,9 +208,15 @@ def _number(text: str, column: str, line: int, name: str, decimal: str) -> float
         value = float(text if decimal == "." else text.replace(decimal, ".", 1))
     except ValueError:
         got = repr(text) if text else "nothing"
-        raise InputError(f"{name}, line {line}: {column} is {got}; give a number.") from None
+        raise InputError.NOT_A_NUMBER(
+            f"{name}, line {line}: {column} is {got}; give a number."
+        ) from None
     if not math.isfinite(value):
-        raise InputError(f"{name}, line {line}: {column} is {text}; give a finite number.")
+        raise InputError.NOT_FINITE(
+            f"{name}, line {line}: {column} is {text}; give a finite number."
+        )
     if abs(value) > LARGEST:
-        raise InputError(f"{name}, line {line}: {column} is {text}; give at most {LARGEST:g}.")
+        raise InputError.OUT_OF_RANGE(
+            f"{name}, line {line}: {column} is {text}; give at most {LARGEST:g}."
+        )
     return value

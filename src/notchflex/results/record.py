@@ -86,20 +86,20 @@ def path_of(record: Record, source: str) -> EquilibriumPath:
     """
     if record.facts.get("format") != FORMAT:
         got = record.facts.get("format")
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{source} is laid out as {got!r}, not as {FORMAT!r}: it cannot be made a path of by "
             f"notchflex {__version__}; write it again with this version."
         )
     try:
         return _path_of(record)
     except InputError as problem:
-        raise InputError(f"{source} cannot be read back: {problem}") from None
+        raise InputError.FILE_DAMAGED(f"{source} cannot be read back: {problem}") from None
     except KeyError as problem:
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{source} cannot be read back: {problem.args[0]} is missing; write it again."
         ) from None
     except (TypeError, ValueError, IndexError) as problem:
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{source} cannot be read back: it is damaged ({problem}); write it again."
         ) from None
 
@@ -132,7 +132,7 @@ def decoded(document: Any, source: str) -> Record:
         }
         return Record(dict(document["facts"]), arrays)
     except (AttributeError, KeyError, TypeError, ValueError) as problem:
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{source} cannot be read back: what it holds for that is damaged ({problem}); "
             "write it again."
         ) from None
@@ -241,7 +241,7 @@ def _path_of(record: Record) -> EquilibriumPath:
 
 def _of_shape(array: NDArray[Any], shape: tuple[int, ...], name: str) -> NDArray[Any]:
     if array.shape != shape:
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{name} has the shape {array.shape}, and this robot and its loads ask for {shape}."
         )
     return array

@@ -60,11 +60,11 @@ def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
             try:
                 found.setdefault(quantity.name, {})[index] = _numbers(quantity, values)
             except (TypeError, ValueError):
-                raise InputError(
+                raise InputError.NOT_A_NUMBER(
                     f"{file}: the column {header} holds what is no number; write the table again."
                 ) from None
     if not found:
-        raise InputError(
+        raise InputError.TABLE_COLUMNS(
             f"{file} has no column of a path (such as {QUANTITIES['total_angle'].header()}); give "
             "a table that --csv or --parquet wrote."
         )
@@ -76,13 +76,13 @@ def _csv(file: str | FilePath) -> Mapping[str, Sequence[Any]]:
         text = FilePath(file).read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as problem:
         reason = getattr(problem, "strerror", None) or "it is not UTF-8 text"
-        raise InputError(f"{file} cannot be read: {reason}.") from None
+        raise InputError.FILE_UNREADABLE(f"{file} cannot be read: {reason}.") from None
     try:
         header, *rows = list(csv.reader(io.StringIO(text)))
         columns = list(zip(*rows, strict=True)) or [()] * len(header)
         return dict(zip(header, columns, strict=True))
     except (csv.Error, ValueError):
-        raise InputError(
+        raise InputError.TABLE_ROWS(
             f"{file} is no table: its rows must have as many fields as its first line has names."
         ) from None
 

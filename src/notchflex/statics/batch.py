@@ -148,12 +148,12 @@ def simulate_batch(
     try:
         given = [loads] if isinstance(loads, LoadPath) else list(loads)
     except TypeError:
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             f"simulate_batch needs a notchflex.LoadPath, or some in order; got {shown(loads)}"
         ) from None
     paths = [load_path(one, tendons) for one in given]
     if not paths or len({len(path) for path in paths}) > 1:
-        raise InputError("a batch needs one path or more, all of equally many steps")
+        raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
     joined = paths[0] if len(paths) == 1 else joined_paths(paths)
     rows = len(paths)
     return Batch(_simulate(every, joined, rows, outputs, settings, refinement, cores, progress))
@@ -165,7 +165,9 @@ def _robots(robots: Any) -> list[Robot]:
     except TypeError:
         every = []
     if not every or not all(isinstance(robot, Robot) for robot in every):
-        raise InputError(f"a batch needs a notchflex.Robot, or some of them; got {shown(robots)}")
+        raise InputError.WRONG_TYPE(
+            f"a batch needs a notchflex.Robot, or some of them; got {shown(robots)}"
+        )
     return every
 
 
@@ -183,10 +185,10 @@ def _simulate(
     asked = known_outputs(outputs)
     threads = number_of_cores() if cores is None else whole(cores, "cores")
     if threads < 1:
-        raise InputError(f"cores must be 1 or more, or None for all; got {threads}")
+        raise InputError.OUT_OF_RANGE(f"cores must be 1 or more, or None for all; got {threads}")
     count = max(len(robots), paths)
     if len(robots) not in (1, count) or paths not in (1, count):
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             "a batch needs as many robots as loads, or one of either; "
             f"got {len(robots)} robots and {paths} loads"
         )

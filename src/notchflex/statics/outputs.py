@@ -33,7 +33,7 @@ def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     wrong = [name for name in names if name not in OUTPUTS]
     if wrong or not names:
         said = f"there is no output {shown(wrong[0])}" if wrong else "no output is asked"
-        raise InputError(f"{said}; there are {', '.join(OUTPUTS)}")
+        raise InputError.UNKNOWN_NAME(f"{said}; there are {', '.join(OUTPUTS)}")
     return names
 
 

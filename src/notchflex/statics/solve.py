@@ -134,7 +134,7 @@ def solve_each(
 def check_refinement(refinement: int) -> None:
     """Raise if there is no such refinement."""
     if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
         )
 
@@ -148,7 +148,7 @@ def prepared_for(
     """The robot with modes enough for all loads of a path, and for the state before it."""
     check_refinement(refinement)
     if from_state is not None and from_state.refinement != refinement:
-        raise InputError(
+        raise InputError.CONFLICT(
             f"the state was computed with refinement {from_state.refinement}, not {refinement}; "
             "go on with the same"
         )
