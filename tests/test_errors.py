@@ -11,6 +11,7 @@ import notchflex as nf
 from notchflex.errors import InputError, RobotFileError
 
 ROOT = Path(__file__).parents[1]
+CLASSES = ("InputError", "RobotFileError")
 SOURCES = sorted((ROOT / "src" / "notchflex").rglob("*.py"))
 
 
@@ -18,13 +19,13 @@ def made_without_code(file: Path) -> list[int]:
     """Lines where an input error is made by its class with a message only, or with another code."""
     lines = []
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if not isinstance(node, ast.Call):
-            continue
-        made = node.func
-        if isinstance(made, ast.Name) and made.id in ("InputError", "RobotFileError"):
-            # Another error that is told with more words keeps its code.
-            if not (len(node.args) == 2 and ast.unparse(node.args[1]).endswith(".code")):
-                lines.append(node.lineno)
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in (
+            "InputError",
+            "RobotFileError",
+        ):
+            # An error that is raised again with more words keeps its code.
+            keeps = len(node.args) == 2 and ast.unparse(node.args[1]).endswith(".code")
+            lines += [] if keeps else [node.lineno]
     return lines
 
 

@@ -16,12 +16,13 @@ HEAD = """\
 
 Every failure has a code, which programs can compare; messages may change from version to version.
 
-- **Invalid input** raises [`InputError`][notchflex.InputError]. Its message names the value, what is allowed and what to
-  do; its `code` is an [`ErrorCode`](#invalid-input). On the command line the message goes to standard error, and the exit
-  code is 2.
-- **A load without equilibrium** raises nothing. `reason` of the result says why, and `reason_code` is the name of a
-  [`Failure`](#failures-of-a-solve); both are in the JSON document too. The exit code is 1. `raise_if_failed()` raises
-  [`ConvergenceError`][notchflex.ConvergenceError], whose `code` is the `Failure`.
+- **Invalid input** raises [`InputError`][notchflex.InputError]. Its message names the value, what
+  is allowed and what to do; its `code` is an [`ErrorCode`](#invalid-input). On the command line the
+  message goes to standard error, and the exit code is 2.
+- **A load without equilibrium** raises nothing. `reason` of the result says why, and `reason_code`
+  is the name of a [`Failure`](#failures-of-a-solve); both are in the JSON document too. The exit
+  code is 1. `raise_if_failed()` raises [`ConvergenceError`][notchflex.ConvergenceError], whose
+  `code` is the `Failure`.
 
 ```python
 import notchflex as nf
@@ -29,8 +30,11 @@ import notchflex as nf
 try:
     nf.load_robot("pacheco2021")
 except nf.InputError as error:
-    if error.code is nf.ErrorCode.UNKNOWN_NAME:
-        print(nf.list_robots())
+    print(f"{error.code}: {error.code.remedy}")
+```
+
+```text
+UNKNOWN_NAME: use one of the names that the message lists
 ```
 """
 

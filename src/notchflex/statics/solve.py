@@ -11,6 +11,7 @@ from notchflex.robot import Robot
 from notchflex.statics.applied import follows, is_planar, is_unloaded
 from notchflex.statics.command import command
 from notchflex.statics.equilibrium import Equilibrium
+from notchflex.statics.given import robot_given
 from notchflex.statics.load import Load, LoadPath, load_path
 from notchflex.statics.newton import DEFAULT, Settings
 from notchflex.statics.path import EquilibriumPath
@@ -52,7 +53,7 @@ def simulate(
         >>> bool(path.total_angle[3] == path.total_angle[2] > path.total_angle[1])
         True
     """
-    load = load_path(loads, robot.number_of_tendons)
+    load = load_path(loads, robot_given(robot).number_of_tendons)
     if from_state is not None:
         check_robot(from_state, robot)
     ready = prepared_for(robot, load, from_state, refinement)
@@ -122,7 +123,7 @@ def solve_each(
         >>> path.converged.tolist()
         [True, True, True]
     """
-    load = load_path(loads, robot.number_of_tendons)
+    load = load_path(loads, robot_given(robot).number_of_tendons)
     ready = prepared_for(robot, load, refinement=refinement)
     commands = command(load, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=True)
