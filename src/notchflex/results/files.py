@@ -45,41 +45,36 @@ def check_output(target: str, option: str, *, inputs: Iterable[str | Path] = ())
             f"{option} {target!r} cannot be written: it holds a null character."
         )
     path = Path(target)
-    folder = path.parent
     try:
-        if path.is_dir():
-            raise InputError.FILE_UNWRITABLE(
-                f"{option} {target}: this is a folder; give the name of a file to write in it."
-            )
-        if not folder.exists():
-            raise InputError.FILE_NOT_FOUND(
-                f"{option} {target}: the folder {folder} does not exist; "
-                "make it first or choose another."
-            )
-        if not folder.is_dir():
-            raise InputError.FILE_UNWRITABLE(
-                f"{option} {target}: {folder} is a file, not a folder."
-            )
-        if path.exists() and not os.access(path, os.W_OK):
-            raise InputError.FILE_UNWRITABLE(
-                f"{option} {target}: this file may not be written; choose another."
-            )
-        if _replaceable(path) and not _folder_takes_files(folder):
-            raise InputError.FILE_UNWRITABLE(
-                f"{option} {target}: no file may be written in the folder {folder}; choose another."
-            )
-        for source in inputs:
+        obstacle = _obstacle(path)
+        for source in [] if obstacle else inputs:
             if Path(source).exists() and path.exists() and path.samefile(source):
                 raise InputError.CONFLICT(
                     f"{option} {target}: this would replace the file that is read; choose another."
                 )
-    except (OSError, ValueError) as problem:
-        if isinstance(problem, InputError):
-            raise
-        words = getattr(problem, "strerror", None) or str(problem)
+    except OSError as problem:
+        words = problem.strerror or problem
         raise InputError.FILE_UNWRITABLE(
             f"{option} {target!r} cannot be written: {words}."
         ) from None
+    if obstacle:
+        raise InputError.FILE_UNWRITABLE(f"{option} {target}: {obstacle}.")
+
+
+def _obstacle(path: Path) -> str:
+    """Say why a file cannot be written, "" if it can."""
+    folder = path.parent
+    if path.is_dir():
+        return "this is a folder; give the name of a file to write in it"
+    if not folder.exists():
+        return f"the folder {folder} does not exist; make it first or choose another"
+    if not folder.is_dir():
+        return f"{folder} is a file, not a folder"
+    if path.exists() and not os.access(path, os.W_OK):
+        return "this file may not be written; choose another"
+    if _replaceable(path) and not _folder_takes_files(folder):
+        return f"no file may be written in the folder {folder}; choose another"
+    return ""
 
 
 def check_folder(
@@ -225,6 +220,30 @@ def replacing(target: str | Path) -> Generator[Path]:
         ) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def read_text(source: str | os.PathLike[str], kind: str) -> str:
+    """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it.
+
+    Args:
+        source: Path of the file.
+        kind: What kind of file it is, for messages.
+
+    Raises:
+        InputError: It is missing, a folder, no text or cannot be read.
+    """
+    try:
+        return Path(source).read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError.FILE_NOT_FOUND(f"{source}: there is no such file.") from None
+    except IsADirectoryError:
+        raise InputError.FILE_UNREADABLE(f"{source} is a folder; name a {kind}.") from None
+    except UnicodeDecodeError:
+        saved = f"save it as {kind.removesuffix(' file')}"
+        raise InputError.FILE_UNREADABLE(f"{source} is no text in UTF-8; {saved}.") from None
+    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
+        words = getattr(problem, "strerror", None) or problem
+        raise InputError.FILE_UNREADABLE(f"{source} cannot be read: {words}.") from None
 
 
 def write_text(target: str | Path, text: str) -> None:

@@ -19,40 +19,32 @@ def commanded_tension(path: EquilibriumPath) -> np.ndarray:
     return path.load.tension
 
 
-@quantity(
-    "path", "commanded stroke", "u", "mm",
-    key="load.stroke_mm", per=("tendon",), after="commanded_tension",
-)  # fmt: skip
+@quantity("path", "commanded stroke", "u", "mm", key="load.stroke_mm", per=("tendon",),
+          after="commanded_tension")  # fmt: skip
 def commanded_stroke(path: EquilibriumPath) -> np.ndarray:
     """Tendon length commanded to be drawn out at the base; empty (NaN) where not commanded."""
     return path.load.stroke
 
 
-@quantity(
-    "path", "total chord angle", r"\psi", "deg", key="total_chord_angle_deg",
-    column="total_chord_deg", after="chord_angle", optional=True,
-)  # fmt: skip
+@quantity("path", "total chord angle", r"\psi", "deg", key="total_chord_angle_deg",
+          column="total_chord_deg", after="chord_angle", optional=True)  # fmt: skip
 def total_chord_angle(path: EquilibriumPath) -> np.ndarray:
     """Sum of the chord angles, where every flexure has one."""
     return path.chord_angle.sum(axis=-1)
 
 
-@quantity(
-    "path", "dissipation", "D_i", "N mm", per=("tendon", "contact"), after="contact_bound",
-    note="Integrated by the trapezoid rule from step to step, as is the tendon work, so the two "
-    "balance with the stored energy as the steps get small. A few coarse steps across a reversal "
-    "give a rough value, which may even decrease.",
-)  # fmt: skip
+@quantity("path", "dissipation", "D_i", "N mm", per=("tendon", "contact"), after="contact_bound",
+          note="Integrated by the trapezoid rule from step to step, as is the tendon work, so the "
+          "two balance with the stored energy as the steps get small. A few coarse steps across a "
+          "reversal give a rough value, which may even decrease.")  # fmt: skip
 def dissipation(path: EquilibriumPath) -> np.ndarray:
     """Work that a friction contact has turned to heat since the start of the path."""
     # The tension drop at every contact over the slid length.
     return _accumulated(path, "span_tension", "contact_slid")
 
 
-@quantity(
-    "path", "friction front", "m", key="front.m", column="tendon{tendon}_front_m",
-    per=("tendon",), after="dissipation", kind=int,
-)  # fmt: skip
+@quantity("path", "friction front", "m", key="front.m", column="tendon{tendon}_front_m",
+          per=("tendon",), after="dissipation", kind=int)  # fmt: skip
 def front_contact(path: EquilibriumPath) -> np.ndarray:
     """Contact up to which the friction of a tendon has turned from loading to unloading.
 
@@ -62,29 +54,23 @@ def front_contact(path: EquilibriumPath) -> np.ndarray:
     return path.front[0]
 
 
-@quantity(
-    "path", "friction at the front", r"\eta", key="front.eta", column="tendon{tendon}_front_eta",
-    per=("tendon",), after="front_contact",
-)  # fmt: skip
+@quantity("path", "friction at the front", r"\eta", key="front.eta",
+          column="tendon{tendon}_front_eta", per=("tendon",), after="front_contact")  # fmt: skip
 def front_eta(path: EquilibriumPath) -> np.ndarray:
     """Friction of that contact over its largest, from 1 (loading) to -1 (unloading)."""
     return path.front[1]
 
 
-@quantity(
-    "path", "tendon work", "W", "N mm",
-    key="tendon_work_Nmm", column="tendon{tendon}_work_Nmm", per=("tendon",),
-)  # fmt: skip
+@quantity("path", "tendon work", "W", "N mm", key="tendon_work_Nmm",
+          column="tendon{tendon}_work_Nmm", per=("tendon",))  # fmt: skip
 def tendon_work(path: EquilibriumPath) -> np.ndarray:
     """Work done on a tendon at the base since the start of the path."""
     return _accumulated(path, "tension", "stroke")
 
 
-@quantity(
-    "path", "converged", key="converged", column="converged", kind=bool,
-    note="A solved state beyond the limits of the friction law or of the strain modes counts as "
-    "not converged.",
-)  # fmt: skip
+@quantity("path", "converged", key="converged", column="converged", kind=bool,
+          note="A solved state beyond the limits of the friction law or of the strain modes "
+          "counts as not converged.")  # fmt: skip
 def converged(path: EquilibriumPath) -> np.ndarray:
     """True where the equilibrium was found."""
     return np.asarray(path.run.converged) & believable(path.solver_quantity)
@@ -108,9 +94,8 @@ def stable(path: EquilibriumPath) -> np.ndarray:
     return path.run.stable(path.commands)
 
 
-@quantity(
-    "path", "smallest eigenvalue", r"\lambda_\mathrm{min}", "N mm", key="smallest_eigenvalue_Nmm"
-)
+@quantity("path", "smallest eigenvalue", r"\lambda_\mathrm{min}", "N mm",
+          key="smallest_eigenvalue_Nmm")  # fmt: skip
 def smallest_eigenvalue(path: EquilibriumPath) -> np.ndarray:
     """Smallest real part of an eigenvalue of the stiffness, sticking contacts held."""
     return path.stability[0]
