@@ -134,8 +134,8 @@ _Error = TypeVar("_Error", bound="InputError")
 class _Raised:
     """What `InputError.UNKNOWN_NAME(message)` calls: makes an error of this class with its code."""
 
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._code = ErrorCode[name]
+    def __init__(self, code: ErrorCode) -> None:
+        self._code = code
 
     def __get__(self, thing: object, owner: type[_Error]) -> Callable[[str], _Error]:
         return lambda message: owner(message, self._code)
@@ -156,31 +156,16 @@ class InputError(ValueError):
         super().__init__(message)
         self.code = code
 
-    UNKNOWN_NAME = _Raised()
-    WRONG_TYPE = _Raised()
-    BAD_SYNTAX = _Raised()
-    NOT_A_NUMBER = _Raised()
-    NOT_FINITE = _Raised()
-    OUT_OF_RANGE = _Raised()
-    WRONG_SHAPE = _Raised()
-    MISSING_VALUE = _Raised()
-    CONFLICT = _Raised()
-    NO_DATA = _Raised()
-    TOO_FEW_DATA = _Raised()
-    UNSUPPORTED = _Raised()
-    INVALID_ROBOT = _Raised()
-    STATE_OF_ANOTHER_ROBOT = _Raised()
-    FILE_NOT_FOUND = _Raised()
-    FILE_UNREADABLE = _Raised()
-    FILE_UNWRITABLE = _Raised()
-    FILE_FORMAT = _Raised()
-    FILE_DAMAGED = _Raised()
-    TABLE_COLUMNS = _Raised()
-    TABLE_ROWS = _Raised()
-    MISSING_PACKAGE = _Raised()
-    NOT_CONVERGED = _Raised()
-    PROCESS_FAILED = _Raised()
-    NO_CONNECTION = _Raised()
+    # In the order of `ErrorCode`; a test compares the names.
+    # fmt: off
+    (
+        UNKNOWN_NAME, WRONG_TYPE, BAD_SYNTAX, NOT_A_NUMBER, NOT_FINITE, OUT_OF_RANGE,
+        WRONG_SHAPE, MISSING_VALUE, CONFLICT, NO_DATA, TOO_FEW_DATA, UNSUPPORTED,
+        INVALID_ROBOT, STATE_OF_ANOTHER_ROBOT, FILE_NOT_FOUND, FILE_UNREADABLE,
+        FILE_UNWRITABLE, FILE_FORMAT, FILE_DAMAGED, TABLE_COLUMNS, TABLE_ROWS,
+        MISSING_PACKAGE, NOT_CONVERGED, PROCESS_FAILED, NO_CONNECTION
+    ) = map(_Raised, list(ErrorCode)[1:])
+    # fmt: on
 
 
 class RobotFileError(InputError):
