@@ -7,14 +7,14 @@ pictures, terminal): mm, N, MPa, deg; `Quantity.scale` takes a number from the i
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, Literal, TypeVar
 
 DEGREES = 180.0 / math.pi
 
+_Formula = TypeVar("_Formula", bound=Callable[[Any], Any])
 Source = Literal["solve", "state", "derived", "path"]
 """Where a formula is evaluated: in the program that solves a load, in a second program for what is
 asked of a solved state, from other quantities of a state wherever those are, or from a whole path.
@@ -32,44 +32,59 @@ _SIZES = {
 """The size of every axis that a quantity may have."""
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Quantity:
-    """One quantity of a solved state, and how it is written at the edges.
+    """One quantity of a solved state, and how it is written at the edges; decorates its formula.
+
+    The name of the formula becomes the name of the quantity: the attribute of `EquilibriumPath` and
+    `Equilibrium`. The docstring becomes its description. The argument of the formula is the state
+    or the path.
 
     Attributes:
-        name: The attribute of `EquilibriumPath` and `Equilibrium` that holds it.
+        source: Where its formula is evaluated.
         title: What an axis or a table calls it, without its unit; "" for what only the solver uses.
         symbol: The symbol, as mathtext.
-        unit: The unit at the edges; "" for numbers without one.
-        description: One sentence that says exactly what it is: the docstring of the formula.
+        unit: The unit at the edges; "" for numbers without one. What is in "deg" is in rad inside.
         key: The key in a step of the JSON document; a dot goes one object deeper. "" if left out.
         column: The CSV column; `{tendon}`, `{notch}`, `{axis}` and `{span}` are filled in.
             "" where it has no column.
         per: What its entries stand for within one step, outermost first: "tendon", "notch",
             "body", "axis", "span", "contact", "row". Empty for a single number.
-        source: Where its formula is evaluated.
-        formula: The formula; its argument is the state or the path.
+        after: Name of the quantity that it follows in tables; "" for the first place, None for the
+            last.
         in_world: Whether the formula's vectors or rotations, which are in the frame of the base,
             are turned into the world.
         optional: Whether it is left out of files where no entry of a path holds a number.
         kind: What an entry is: `float`, `bool`, `int` or `str`.
-        note: Sentences for the documentation of the Python property.
+        note: More sentences for the documentation of the Python property.
     """
 
-    name: str
-    title: str
-    symbol: str
-    unit: str
-    description: str
-    key: str
-    column: str
-    per: tuple[str, ...]
     source: Source
-    formula: Callable[[Any], Any]
+    title: str = ""
+    symbol: str = ""
+    unit: str = ""
+    _: KW_ONLY
+    key: str = ""
+    column: str = ""
+    per: tuple[str, ...] = ()
+    after: str | None = None
     in_world: bool = False
     optional: bool = False
     kind: type = float
     note: str = ""
+
+    def __call__(self, formula: _Formula) -> _Formula:
+        """Register a formula as this quantity."""
+        self.name, self.formula = formula.__name__, formula
+        self.description = " ".join((formula.__doc__ or "").split())
+        entries, names = list(REGISTERED.items()), ["", *REGISTERED]
+        if self.name in names:
+            raise ValueError(f"the quantity {self.name} is registered twice")
+        place = len(entries) if self.after is None else names.index(self.after)
+        entries.insert(place, (self.name, self))
+        REGISTERED.clear()
+        REGISTERED.update(entries)
+        return formula
 
     @property
     def scale(self) -> float:
@@ -145,59 +160,3 @@ class Quantity:
 
 REGISTERED: dict[str, Quantity] = {}
 """Every quantity by its name, in the order of tables and files."""
-
-
-def quantity(
-    source: Source,
-    title: str = "",
-    symbol: str = "",
-    unit: str = "",
-    *,
-    key: str = "",
-    column: str = "",
-    per: tuple[str, ...] = (),
-    after: str | None = None,
-    in_world: bool = False,
-    optional: bool = False,
-    kind: type = float,
-    note: str = "",
-) -> Callable[[Callable[[Any], Any]], Callable[[Any], Any]]:
-    """Register a formula as a quantity: its name is the function's, its text the docstring.
-
-    For the other arguments see `Quantity`.
-
-    Args:
-        source: Where the formula is evaluated.
-        title: What tables call the quantity.
-        symbol: Its symbol.
-        unit: Its unit at the edges; an angle in "deg" is in rad inside.
-        key: Its JSON key.
-        column: Its CSV column.
-        per: Its axes.
-        after: Name of the quantity that it follows in tables; "" for the first place, None for the
-            last.
-        in_world: Whether it is turned from the frame of the base into the world.
-        optional: Whether files leave it out where it has no number.
-        kind: What an entry is.
-        note: More text.
-
-    Returns:
-        The decorator.
-    """
-
-    def register(formula: Callable[[Any], Any]) -> Callable[[Any], Any]:
-        name = formula.__name__
-        text = " ".join(inspect.cleandoc(formula.__doc__ or "").split())
-        one = Quantity(
-            name, title, symbol, unit, text, key, column, per, source, formula, in_world,
-            optional, kind, note,
-        )  # fmt: skip
-        names = list(REGISTERED)
-        place = len(names) if after is None else names.index(after) + 1 if after else 0
-        entries = [*REGISTERED.items()]
-        entries.insert(place, (name, one))
-        REGISTERED.clear()
-        REGISTERED.update(entries)
-        return formula
-
-    return register

@@ -87,7 +87,7 @@ def test_values_are_what_the_registry_says(path, name):
         assert type(value) is quantity.kind
 
 
-TIP_HEIGHT = """@quantity(
+TIP_HEIGHT = """@Quantity(
     "state", "tip height", "h", "mm", key="tip_height_mm", column="tip_height_mm"
 )
 def tip_height(state: SolvedState) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array
 
 from notchflex._jax import jax, jnp
-from notchflex._quantity import REGISTERED, quantity
+from notchflex._quantity import REGISTERED, Quantity
 from notchflex.chain import Chain
 from notchflex.flexure import in_space, turn_doubt
 from notchflex.statics.element import at_bound
@@ -33,21 +33,21 @@ MODES_FAIL = 0.35
 _DOUBT = 2e-6
 
 
-@quantity("solve", "tendon tension", "T", "N", key="tendon_tension_N",
+@Quantity("solve", "tendon tension", "T", "N", key="tendon_tension_N",
           column="tendon{tendon}_force_N", per=("tendon",))  # fmt: skip
 def tension(state: SolvedState) -> Array:
     """Tension of a tendon at the base, as it is in the solved state."""
     return state.solved.point.base_tension
 
 
-@quantity("solve", "tendon stroke", "u", "mm", key="tendon_stroke_mm",
+@Quantity("solve", "tendon stroke", "u", "mm", key="tendon_stroke_mm",
           column="tendon{tendon}_displacement_mm", per=("tendon",))  # fmt: skip
 def stroke(state: SolvedState) -> Array:
     """Tendon length drawn out at the base since the state without load."""
     return state.solved.stroke
 
 
-@quantity("solve", "notch angle", r"\theta_j", "deg", key="notch_angle_deg",
+@Quantity("solve", "notch angle", r"\theta_j", "deg", key="notch_angle_deg",
           column="notch_{notch}_deg", per=("notch",))  # fmt: skip
 def notch_angle(state: SolvedState) -> Array:
     """Rotation of the body beyond a notch against the body before it.
@@ -57,7 +57,7 @@ def notch_angle(state: SolvedState) -> Array:
     return notch_angles(state.chain, state.relative.rotation)
 
 
-@quantity("state", "chord angle", r"\psi_j", "deg", key="chord_angle_deg",
+@Quantity("state", "chord angle", r"\psi_j", "deg", key="chord_angle_deg",
           column="notch_{notch}_chord_deg", per=("notch",), optional=True)  # fmt: skip
 def chord_angle(state: SolvedState) -> Array:
     """Angle by which the chord of a strip has turned in its plane of bending.
@@ -70,7 +70,7 @@ def chord_angle(state: SolvedState) -> Array:
     return jnp.where(chord > 0.0, angle, jnp.nan)
 
 
-@quantity("solve", "total bending angle", r"\theta", "deg", key="total_angle_deg",
+@Quantity("solve", "total bending angle", r"\theta", "deg", key="total_angle_deg",
           column="total_deg")  # fmt: skip
 def total_angle(state: SolvedState) -> Array:
     """Bending angle of the robot.
@@ -82,7 +82,7 @@ def total_angle(state: SolvedState) -> Array:
     return bending_angle(state.chain.notch_frame, angles, tip)
 
 
-@quantity("solve", "body position", "p_b", "mm", per=("body", "axis"), in_world=True)
+@Quantity("solve", "body position", "p_b", "mm", per=("body", "axis"), in_world=True)
 def body_position(state: SolvedState) -> Array:
     """Origin of every rigid body in the world, base first.
 
@@ -91,13 +91,13 @@ def body_position(state: SolvedState) -> Array:
     return state.bodies.translation
 
 
-@quantity("solve", "body rotation", "R_b", per=("body", "row", "axis"), in_world=True)
+@Quantity("solve", "body rotation", "R_b", per=("body", "row", "axis"), in_world=True)
 def body_rotation(state: SolvedState) -> Array:
     """Rotation matrix of every rigid body, base first, in the world."""
     return state.bodies.rotation
 
 
-@quantity("solve", "tip position", "p", "mm", key="tip_position_mm", column="tip_{axis}_mm",
+@Quantity("solve", "tip position", "p", "mm", key="tip_position_mm", column="tip_{axis}_mm",
           per=("axis",), after="total_angle", in_world=True)  # fmt: skip
 def tip_position(state: SolvedState) -> Array:
     """Position of the tip (the end of the last uncut section) in the world."""
@@ -105,20 +105,20 @@ def tip_position(state: SolvedState) -> Array:
     return last.point(jnp.array([0.0, 0.0, 1.0]) * state.chain.body_length[-1])
 
 
-@quantity("derived", "tip rotation", "R", key="tip_rotation", per=("row", "axis"),
+@Quantity("derived", "tip rotation", "R", key="tip_rotation", per=("row", "axis"),
           after="tip_position")  # fmt: skip
 def tip_rotation(state: SolvedState) -> Array:
     """Rotation matrix of the tip in the world."""
     return state.quantity("body_rotation")[..., -1, :, :]
 
 
-@quantity("solve", kind=bool)
+@Quantity("solve", kind=bool)
 def friction_holds(state: SolvedState) -> Array:
     """Whether no tendon turns so sharply at an edge that its friction would hold any pull."""
     return jnp.all(state.chain.friction.valid(*state.turning))
 
 
-@quantity("state", "span tension", "T", "N", key="span_tension_N", column="tendon{tendon}_{span}_N",
+@Quantity("state", "span tension", "T", "N", key="span_tension_N", column="tendon{tendon}_{span}_N",
           per=("tendon", "span"))  # fmt: skip
 def span_tension(state: SolvedState) -> Array:
     """Tension along a tendon: proximal, gap 1, body 1, gap 2, ... to its last gap.
@@ -129,35 +129,35 @@ def span_tension(state: SolvedState) -> Array:
     return jnp.concatenate([state.solved.point.base_tension[:, None], spans], axis=1)
 
 
-@quantity("state", "notch moment", "M_j", "N mm", key="notch_moment_Nmm",
+@Quantity("state", "notch moment", "M_j", "N mm", key="notch_moment_Nmm",
           column="notch_{notch}_moment_Nmm", per=("notch",))  # fmt: skip
 def notch_moment(state: SolvedState) -> Array:
     """Bending moment carried by what the cut of a notch leaves, the largest along it."""
     return largest_moment(state.at.flexure)
 
 
-@quantity("state", "outer strain", r"\varepsilon_j", key="outer_strain",
+@Quantity("state", "outer strain", r"\varepsilon_j", key="outer_strain",
           column="notch_{notch}_outer_strain", per=("notch",))  # fmt: skip
 def outer_strain(state: SolvedState) -> Array:
     """Bending strain of the outer fibre of the spine (Pacheco 2021, eq. 16)."""
     return jnp.max(state.curvature * state.chain.rods.section.edge_spine, axis=-1)
 
 
-@quantity("state", "peak strain", r"\varepsilon_\mathrm{max}", key="peak_strain",
+@Quantity("state", "peak strain", r"\varepsilon_\mathrm{max}", key="peak_strain",
           column="notch_{notch}_peak_strain", per=("notch",))  # fmt: skip
 def peak_strain(state: SolvedState) -> Array:
     """Largest bending strain of a notch, in the fibre farthest from its neutral axis."""
     return jnp.max(state.fibre_strain, axis=-1)
 
 
-@quantity("state", "notch gap", "g_j", "mm", key="gap_mm", column="notch_{notch}_gap_mm",
+@Quantity("state", "notch gap", "g_j", "mm", key="gap_mm", column="notch_{notch}_gap_mm",
           per=("notch",))  # fmt: skip
 def gap(state: SolvedState) -> Array:
     """What is left of the opening of a notch between its lips, where it is narrowest."""
     return state.lips[1]
 
 
-@quantity("derived", "closed", key="closed", column="notch_{notch}_closed", per=("notch",),
+@Quantity("derived", "closed", key="closed", column="notch_{notch}_closed", per=("notch",),
           kind=bool)  # fmt: skip
 def closed(state: SolvedState) -> Array:
     """True where the lips of a notch touch."""
@@ -166,14 +166,14 @@ def closed(state: SolvedState) -> Array:
     return force > gap * state.chain.lip_stiffness
 
 
-@quantity("state", "contact force", "N_j", "N", key="contact_force_N",
+@Quantity("state", "contact force", "N_j", "N", key="contact_force_N",
           column="notch_{notch}_contact_N", per=("notch",))  # fmt: skip
 def contact_force(state: SolvedState) -> Array:
     """Force between the touching lips of a closed notch."""
     return state.lips[0]
 
 
-@quantity("state", "tension ratio over a contact", "x_i", key="contacts.log_ratio",
+@Quantity("state", "tension ratio over a contact", "x_i", key="contacts.log_ratio",
           per=("tendon", "contact"))  # fmt: skip
 def contact_log_ratio(state: SolvedState) -> Array:
     """ln(tension on the base side / tension on the tip side) of a friction contact."""
@@ -181,7 +181,7 @@ def contact_log_ratio(state: SolvedState) -> Array:
     return along_contacts(state.chain, *paired(state.chain, pairs))
 
 
-@quantity("state", "slid length", "s_i", "mm", key="contacts.slid_mm", per=("tendon", "contact"))
+@Quantity("state", "slid length", "s_i", "mm", key="contacts.slid_mm", per=("tendon", "contact"))
 def contact_slid(state: SolvedState) -> Array:
     """Tendon length that has slid over a friction contact toward the base."""
     chain, spans = state.chain, state.at.spans
@@ -192,28 +192,28 @@ def contact_slid(state: SolvedState) -> Array:
     return along_contacts(chain, behind + stretch_behind * state.compliance, at_entry)
 
 
-@quantity("state", "turning at a contact", r"\beta_i", "deg", key="contacts.turning_deg",
+@Quantity("state", "turning at a contact", r"\beta_i", "deg", key="contacts.turning_deg",
           per=("tendon", "contact"))  # fmt: skip
 def contact_turning(state: SolvedState) -> Array:
     """Angle by which a tendon turns at a friction contact."""
     return along_contacts(state.chain, *state.turning)
 
 
-@quantity("state", "state of a contact", key="contacts.state", per=("tendon", "contact"), kind=int,
+@Quantity("state", "state of a contact", key="contacts.state", per=("tendon", "contact"), kind=int,
           note="0 sticks, +1 slips toward the base, -1 slips toward the tip.")  # fmt: skip
 def contact_state(state: SolvedState) -> Array:
     """What a friction contact does: "stick", "slip toward base" or "slip toward tip"."""
     return at_bound(state.quantity("contact_log_ratio"), state.quantity("contact_bound"))
 
 
-@quantity("state", "largest tension ratio over a contact", "b_i", per=("tendon", "contact"))
+@Quantity("state", "largest tension ratio over a contact", "b_i", per=("tendon", "contact"))
 def contact_bound(state: SolvedState) -> Array:
     """Largest magnitude that the friction law allows the tension ratio over a contact."""
     pairs = [(s.bound[..., 0], s.bound[..., 1]) for s in state.at.spans]
     return along_contacts(state.chain, *paired(state.chain, pairs))
 
 
-@quantity("state", "base force", "F", "N", key="base_force_N", column="base_force_{axis}_N",
+@Quantity("state", "base force", "F", "N", key="base_force_N", column="base_force_{axis}_N",
           per=("axis",), in_world=True)  # fmt: skip
 def base_force(state: SolvedState) -> Array:
     """Force of the holder on the base, in the world.
@@ -223,14 +223,14 @@ def base_force(state: SolvedState) -> Array:
     return state.base[3:]
 
 
-@quantity("state", "base moment", "M", "N mm", key="base_moment_Nmm",
+@Quantity("state", "base moment", "M", "N mm", key="base_moment_Nmm",
           column="base_moment_{axis}_Nmm", per=("axis",), in_world=True)  # fmt: skip
 def base_moment(state: SolvedState) -> Array:
     """Moment of the holder on the base about its proximal end, in the world."""
     return state.base[:3]
 
 
-@quantity("solve", "moment error", "e", key="moment_error", column="moment_error")
+@Quantity("solve", "moment error", "e", key="moment_error", column="moment_error")
 def moment_error(state: SolvedState) -> Array:
     """Largest error of the moment of the strain modes, over the largest moment.
 
@@ -239,7 +239,7 @@ def moment_error(state: SolvedState) -> Array:
     return error_of_modes(state.chain, state.solved.point.unknowns, state.at)
 
 
-@quantity("solve", kind=bool)
+@Quantity("solve", kind=bool)
 def bend_possible(state: SolvedState) -> Array:
     """Whether every flexure is bent as it can be, and as its pose can be computed.
 
@@ -252,7 +252,7 @@ def bend_possible(state: SolvedState) -> Array:
     return jnp.all(turn & known) & jnp.all(state.fibre_strain < 1.0)
 
 
-@quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",
+@Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",
           column="stored_energy_Nmm")  # fmt: skip
 def stored_energy(state: SolvedState) -> Array:
     """Elastic energy held by flexures and stretched tendons."""
