@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 
+import lanewise
 import notchflex
 
 DOCS = Path(__file__).parents[1] / "docs"
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 MODULES = sorted(
     module.name
-    for module in pkgutil.walk_packages(notchflex.__path__, "notchflex.")
+    for package in (notchflex, lanewise)
+    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
     if not module.name.endswith("__main__")
 )
 

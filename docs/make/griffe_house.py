@@ -12,7 +12,7 @@ from typing import Any
 
 import griffe
 
-from notchflex.results.quantities import QUANTITIES
+from notchflex.results.quantities.registry import QUANTITIES
 
 _DATACLASS = griffe.ExprName("dataclasses.dataclass", None)
 
@@ -21,13 +21,14 @@ class House(griffe.Extension):
     """Take `@part` as a dataclass, `Annotated` as its plain type, `Example:` as code."""
 
     def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
-        """Let `notchflex.solve` be the function of `statics/solve.py`, not that module."""
+        """Let `notchflex.solve` be the function in `analysis/solve.py`, not that module."""
         for name, member in list(pkg.members.items()):
             if not isinstance(member, griffe.Alias) or not member.target_path.startswith(pkg.path):
                 continue
             folder = pkg[member.target_path.split(".")[1:-1]]
-            function = f"{member.target_path}.{name}"
-            if folder.imports.get(name) == function and folder.members[name].is_module:
+            function = folder.imports.get(name, "")
+            inside = function.startswith(f"{member.target_path}.")
+            if inside and folder.members[name].is_module:
                 pkg.set_member(name, griffe.Alias(name, function, parent=pkg))
 
     def on_class_instance(self, *, cls: griffe.Class, **_: Any) -> None:

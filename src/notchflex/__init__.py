@@ -7,7 +7,7 @@ not import JAX.  The first use of a computing name imports JAX and switches it t
 
 __version__ = "0.1.0"
 
-# Public name -> the package that exports it. `__init__.pyi` lists the same names for type checkers.
+# Public name -> where it is exported. `__init__.pyi` lists the same names for type checkers.
 _HOME = {
     **dict.fromkeys(
         ("ConvergenceError", "ErrorCode", "Failure", "InputError", "RobotFileError"),
@@ -33,41 +33,67 @@ _HOME = {
         ),
         "notchflex.robot",
     ),
-    **dict.fromkeys(("read_path", "read_table", "save_path"), "notchflex.results"),
     "plot": "notchflex._plot",
-    **dict.fromkeys(("Section", "annular_sector", "annular_segment"), "notchflex.section"),
-    **dict.fromkeys(("Elastica", "elastica", "modulus_from_single_notch"), "notchflex.flexure"),
+    **dict.fromkeys(
+        (
+            "Section",
+            "annular_sector",
+            "annular_segment",
+        ),
+        "notchflex.mechanics.section",
+    ),
+    **dict.fromkeys(
+        (
+            "Elastica",
+            "elastica",
+            "modulus_from_single_notch",
+        ),
+        "notchflex.mechanics.flexure",
+    ),
+    **dict.fromkeys(
+        (
+            "BodyForce",
+            "Load",
+            "LoadPath",
+            "pull",
+            "stroke_path",
+        ),
+        "notchflex.loads",
+    ),
+    "Settings": "notchflex.solver.newton",
+    **dict.fromkeys(
+        (
+            "Equilibrium",
+            "EquilibriumPath",
+            "State",
+            "read_path",
+            "read_table",
+            "save_path",
+        ),
+        "notchflex.results",
+    ),
     **dict.fromkeys(
         (
             "Batch",
-            "BodyForce",
             "Closing",
             "ClosingStatus",
             "Differentiable",
-            "Equilibrium",
             "Kink",
-            "EquilibriumPath",
-            "Load",
-            "LoadPath",
-            "Settings",
             "SharedStroke",
-            "State",
             "TipResponse",
             "bodies_from_angles",
             "closing",
             "differentiable",
             "equal_stroke",
-            "pull",
             "simulate",
             "simulate_batch",
             "solve",
             "solve_batch",
             "solve_each",
-            "stroke_path",
             "tip_from_angles",
             "tip_response",
         ),
-        "notchflex.statics",
+        "notchflex.analysis",
     ),
     **dict.fromkeys(
         (
@@ -80,20 +106,26 @@ _HOME = {
             "SumOfDistances",
             "SumOfRobotErrors",
             "calibrate",
+            "diagnose",
             "friction_rig",
             "leave_out",
             "next_measurement",
-            "sample_posterior",
             "read_friction_rig",
             "read_measurements",
+            "sample_posterior",
             "simulate_measurements",
-            "diagnose",
             "write_fitted",
             "write_measurements",
         ),
         "notchflex.fit",
     ),
-    **dict.fromkeys(("Comparison", "compare"), "notchflex.comparison"),
+    **dict.fromkeys(
+        (
+            "Comparison",
+            "compare",
+        ),
+        "notchflex.comparison",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

@@ -163,7 +163,7 @@ def test_arguments(refused, arguments, words):
 def test_outputs_are_checked_before_anything_is_computed(
     refused, monkeypatch, option, target, words
 ):
-    monkeypatch.setitem(sys.modules, "notchflex.statics", None)  # importing it would fail
+    monkeypatch.setitem(sys.modules, "notchflex.analysis", None)  # importing it would fail
     assert words in refused("simulate", "mine.toml", "--tension", "2", option, target)
 
 
@@ -173,7 +173,7 @@ def test_two_documents_on_standard_output_are_refused(refused):
 
 def test_missing_matplotlib_is_told_before_computing(refused, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    monkeypatch.setitem(sys.modules, "notchflex.statics", None)
+    monkeypatch.setitem(sys.modules, "notchflex.analysis", None)
     said = refused(*SIMULATE[:4], "--plot", "out.png")
     assert "pip install 'notchflex[plot]'" in said
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from notchflex import _canary, _store
+from notchflex import _canary
 from notchflex.cli import run
-from notchflex.cli.doctor import requirements
+from notchflex.cli.verbs.doctor import requirements
+from notchflex.solver.programs import store
 
 
 @pytest.fixture
@@ -69,13 +70,13 @@ def test_requirements_of_this_wheel():
 
 
 def test_kept_programs_are_counted_and_cleared(call, tmp_path, monkeypatch):
-    monkeypatch.setenv(_store.VARIABLE, str(tmp_path))
-    _store.write("one", b"123")
+    monkeypatch.setenv(store.VARIABLE, str(tmp_path))
+    store.write("one", b"123")
     code, out, err = call("doctor", "--clear-cache", "--json", "-")
     assert code == 0
     assert "removed 1 programs" in err
     assert json.loads(out)["compile_cache"]["programs"] == 0
-    assert _store.read("one") is None
+    assert store.read("one") is None
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -16,7 +16,7 @@ from cyclopts import App, CycloptsError
 from notchflex import __version__
 from notchflex.cli import terminal
 from notchflex.errors import InputError
-from notchflex.results.streams import let_go
+from notchflex.results.files.streams import let_go
 
 DONE = 0
 NOT_CONVERGED = 1
@@ -133,7 +133,7 @@ def build() -> App:
         name = verb.replace("-", "_")
         plural = "s" if examples.count("notchflex ") > 1 else ""
         app.command(
-            f"notchflex.cli.{name}:{name}",
+            f"notchflex.cli.verbs.{name}:{name}",
             name=verb,
             help=text,
             sort_key=order,

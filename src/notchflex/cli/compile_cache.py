@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import os
 
-from notchflex import _store
+from notchflex.solver.programs import store
 
 
 def use_compile_cache() -> None:
     """Let JAX keep its compiled programs beside those of the library.
 
-    The library keeps its own programs in every process (`_store.py`). JAX's settings belong to the
-    whole process, so that they are changed on the command line only.
+    The library keeps its own programs in every process (`solver/programs/store.py`). JAX's settings
+    belong to the whole process, so that they are changed on the command line only.
     """
-    folder = _store.program_folder()
-    if folder is None or _store.VARIABLE in os.environ:
+    folder = store.program_folder()
+    if folder is None or store.VARIABLE in os.environ:
         return
     from notchflex._jax import jax
 

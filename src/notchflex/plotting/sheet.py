@@ -1,23 +1,18 @@
 """What a picture shows, told once: panels of lines, areas and arrows, with their axes.
 
-matplotlib draws it for paper (`with_matplotlib.py`), plotly for a browser (`with_plotly.py`). What
-a result has to show is described in terms of this file and of nothing else, so that both show the
-same curves under the same names.
+matplotlib draws it for paper (`renderers/with_matplotlib.py`), plotly for a browser
+(`renderers/with_plotly.py`). What a result has to show is described in terms of this file and of
+nothing else, so that both show the same curves under the same names.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from pathlib import Path as FilePath
-
-    from matplotlib.figure import Figure
 
 Colour = str | tuple[float, ...]
 Points = NDArray[np.float64]
@@ -29,9 +24,6 @@ FINE, MIXED = (3.0, 2.0), (5.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 
 MARKERS = "osD^vP*X"
 """Marks that a line can have at its points."""
-
-SCREEN_DOTS = 72
-"""Dots per inch of a picture in a notebook."""
 
 INSIDE, BESIDE, BELOW = "inside", "beside", "below"
 """Where the legend of a panel stands."""
@@ -261,8 +253,8 @@ class Cell:
     columns: tuple[int, int]
 
 
-@dataclass(frozen=True, repr=False)
-class Picture:
+@dataclass(frozen=True)
+class Sheet:
     """Panels on a grid, under a heading.
 
     Attributes:
@@ -283,57 +275,3 @@ class Picture:
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the grid."""
         return max(one.rows[1] for one in self.cells), max(one.columns[1] for one in self.cells)
-
-    def figure(self) -> Figure:
-        """Return it as a figure of matplotlib."""
-        from notchflex.plotting.with_matplotlib import figure_of
-
-        return figure_of(self)
-
-    def __repr__(self) -> str:
-        """What it shows, and how to write it."""
-        count = len(self.cells)
-        return f"Picture {self.title!r} of {count} panel{'s' * (count != 1)}; .save(file) writes it"
-
-    def _repr_png_(self) -> bytes:
-        """Return it as a notebook shows it."""
-        from io import BytesIO
-
-        written = BytesIO()
-        self.figure().savefig(written, format="png", dpi=SCREEN_DOTS)
-        return written.getvalue()
-
-    def interactive(self) -> Any:
-        """Return it as a figure of plotly.
-
-        Raises:
-            InputError: plotly is not installed.
-        """
-        from notchflex.plotting.with_plotly import interactive_of
-
-        return interactive_of(self)
-
-    def save(self, target: str | FilePath) -> None:
-        """Write it as PNG, SVG, PDF or HTML, by the suffix; the file is whole or not there.
-
-        An HTML file holds all it needs and asks no other host for anything.
-
-        Args:
-            target: Path that ends in .png, .svg, .pdf or .html.
-
-        Raises:
-            InputError: Another suffix, a library that is not installed, or it cannot be written.
-        """
-        from pathlib import Path as FilePath
-
-        from notchflex.results.files import check_picture
-
-        check_picture(str(target), "the picture")
-        if FilePath(target).suffix.lower() == ".html":
-            from notchflex.plotting.with_plotly import save_html
-
-            save_html(self, target)
-        else:
-            from notchflex.plotting.style import save
-
-            save(self.figure(), target)

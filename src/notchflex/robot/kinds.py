@@ -1,23 +1,22 @@
 """Parts that come in several kinds, and how a new kind is found.
 
-A kind is one class in one file of this folder, named after what it is a kind of: `notch_arc.py`,
-`material_linear.py`, `friction_capstan.py`.  The folder is scanned, so that a new file is all that
-a new kind needs: reading, writing, the JSON Schema and `--set` pick it up.
+A kind is one class in one file of `notches/`, `materials/` or `friction/`, named after the kind.
+The folders are scanned, so that a new file is all that a new kind needs: reading, writing, the
+JSON Schema and `--set` pick it up.
 """
 
 import dataclasses
 import functools
-import pkgutil
 from collections.abc import Iterator, Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Union
 
 from pydantic import Field
 
-from notchflex.robot._explain import kind_of
-from notchflex.robot._part import Float, Int, part, quantity
-from notchflex.robot.opening import Opening
+from notchflex._packages import import_all
+from notchflex.robot.error_messages import kind_of
+from notchflex.robot.notches.opening import Opening
+from notchflex.robot.part import Float, Int, part, quantity
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
@@ -137,16 +136,17 @@ class Friction:
     kind: str
 
 
+_FOLDERS = {Notch: "notches", Material: "materials", Friction: "friction"}
+
+
 @functools.cache  # asked for each value that is set by its name
-def _import_all(prefix: str) -> None:
-    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
-        if module.name.startswith(prefix):
-            import_module(f"notchflex.robot.{module.name}")
+def _import_all(folder: str) -> None:
+    import_all(f"notchflex.robot.{folder}", [str(Path(__file__).parent / folder)])
 
 
 def kinds_of(base: type) -> dict[str, type]:
     """Find every kind of notch, material or friction, by the word that names it."""
-    _import_all(f"{base.__name__.lower()}_")
+    _import_all(_FOLDERS[base])
     return {kind_of(cls): cls for cls in sorted(base.__subclasses__(), key=kind_of)}
 
 

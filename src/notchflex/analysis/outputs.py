@@ -1,0 +1,94 @@
+"""What can be asked of a path inside a compiled program, by name, and following one for that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from jaxtyping import Array
+
+from notchflex._jax import jax, jnp
+from notchflex._quantity import REGISTERED
+from notchflex.errors import InputError
+from notchflex.loads.validation import shown
+from notchflex.mechanics.chain import Chain
+from notchflex.solver.continuation import Advance, Solved
+from notchflex.solver.derived.quantities import believable
+from notchflex.solver.derived.solved_state import SolvedState
+from notchflex.solver.newton import Settings
+
+_OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
+DEFAULT_OUTPUTS = ("total_angle", "tip_position", "tip_rotation", "converged")
+OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *_OF_STATE]),)
+"""What can be asked of a batch or of a function that can be differentiated."""
+
+
+def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
+    """The names of outputs, checked.
+
+    Raises:
+        InputError: There is no such output, or none is asked.
+    """
+    names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+    wrong = [name for name in names if name not in OUTPUTS]
+    if wrong or not names:
+        said = f"there is no output {shown(wrong[0])}" if wrong else "no output is asked"
+        raise InputError.UNKNOWN_NAME(f"{said}; there are {', '.join(OUTPUTS)}")
+    return names
+
+
+def followed(
+    chain: Chain,
+    commands: Any,
+    start: Solved,
+    settings: Settings,
+    outputs: tuple[str, ...],
+    stepping: Callable[[Chain, Any, Solved, Settings], Advance],
+) -> dict[str, Array]:
+    """Follow a path of loads, and tell of every state what is asked.
+
+    Beside `run` this is a second loop over a path, and stays one: `run` goes on or starts anew,
+    skips what comes after a failure (a branch that rows side by side would both take), and packs
+    all that a path may be asked for later; here nothing is kept but what is asked for.
+
+    Args:
+        chain: The chain.
+        commands: The loads, as leading axis; for `answered` with what came of them.
+        start: The state before the first.
+        settings: How hard to try.
+        outputs: Names of what is asked.
+        stepping: `advance`, or `answered` for derivatives of what is solved already.
+
+    Returns:
+        By name, loads as leading axis; after a load that failed the last good state.
+    """
+
+    def step(state: tuple[Solved, Array], command: Any) -> tuple[Any, dict[str, Array]]:
+        last, alive = state
+        came = stepping(chain, command, last, settings)
+        solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), came.solved, last)
+        reached = alive & came.converged
+        told = _told(chain, solved, outputs)
+        converged = reached & told.pop("_holds")
+        own = {"residual": came.residual, "iterations": came.iterations, "converged": converged}
+        told |= {name: value for name, value in own.items() if name in outputs}
+        return (solved, reached), told
+
+    return jax.lax.scan(step, (start, jnp.array(True)), commands)[1]
+
+
+def _told(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
+    """What is asked of a state, and whether it may be believed."""
+    state = SolvedState(chain, solved)
+    told = {name: state.quantity(name) for name in outputs if name in _OF_STATE}
+    return told | {"_holds": believable(state.quantity)}
+
+
+def reported(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
+    """Return quantities of a solved state by name, in the frame of the base."""
+    told = _told(chain, solved, outputs)
+    del told["_holds"]
+    return told
+
+
+__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "followed", "known_outputs", "reported"]

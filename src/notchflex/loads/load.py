@@ -1,0 +1,60 @@
+"""One load on a robot: its tendons pulled or drawn, external loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+from notchflex.loads.external import ExternalLoad
+
+BASE_TURN = ("base_rotation", "rotation vector, rad")
+"""Name and form of the rotation of the base, for messages."""
+
+NO_TURN = (0.0, 0.0, 0.0)
+"""Rotation vector of a base that is not turned."""
+
+
+@dataclass(frozen=True, repr=False)
+class Load(ExternalLoad):
+    """One load on a robot.
+
+    Args:
+        tension: Tension at the base of every tendon, N. A single number pulls the first tendon;
+            a sequence has one entry per tendon, None where its tension is not commanded.
+        stroke: Tendon drawn out at the base since the free robot, mm; in the same form.
+        base_rotation: Rotation vector of the base in the world, rad.
+        tip_force: Force at the tip, N; in the world, or in the tip's frame if `following`.
+        tip_moment: Moment at the tip, N mm; in the same frame.
+        tip_point: Where the tip force acts and the tip mass hangs, from the tip (the end of the
+            last uncut length, on the tube axis), in the tip's frame, mm.
+        following: Whether tip force and tip moment turn with the tip.
+        body_forces: Forces and moments on single bodies, each a `BodyForce`.
+        tip_mass: Mass that hangs at the tip point, g.
+        gravity: Acceleration of gravity in the world, m/s^2. Given, the robot's own weight counts
+            where its material has a density. Not given, a tip mass hangs along (0, 0, -9.81).
+
+    A tendon of which neither tension nor stroke is commanded hangs slack (0 N).
+
+    Raises:
+        InputError: A load from outside is not of its form; tensions and strokes are checked when
+            the robot is known.
+
+    Example:
+        >>> Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
+        Load(tension=2.0, tip_force=(0.0, 0.1, 0.0))
+    """
+
+    tension: float | Sequence[float | None] | None = None
+    stroke: float | Sequence[float | None] | None = None
+    base_rotation: Sequence[float] = NO_TURN
+
+    def __repr__(self) -> str:
+        """What is given, and nothing of what is not; tendons first."""
+        ordered = sorted(fields(self), key=lambda one: bool(one.kw_only))
+        values = {one.name: getattr(self, one.name) for one in ordered}
+        unlike = {one.name for one in ordered if repr(values[one.name]) != repr(one.default)}
+        given = (f"{name}={value!r}" for name, value in values.items() if name in unlike)
+        return f"Load({', '.join(given)})"
+
+
+__all__ = ["BASE_TURN", "NO_TURN", "Load"]

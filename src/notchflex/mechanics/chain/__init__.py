@@ -1,0 +1,16 @@
+"""The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
+
+from notchflex.mechanics.chain.chain import Chain, assemble, flexure_states
+from notchflex.mechanics.chain.pad import padded
+from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
+from notchflex.mechanics.chain.structure import structural
+
+__all__ = [
+    "Chain",
+    "assemble",
+    "bending_normal",
+    "flexure_states",
+    "padded",
+    "structural",
+    "tendons_in_plane",
+]

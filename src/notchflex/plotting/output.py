@@ -1,0 +1,75 @@
+"""A picture that can be shown and saved; each library is imported when it draws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from notchflex.plotting.sheet import Sheet
+
+if TYPE_CHECKING:
+    from pathlib import Path as FilePath
+
+    from matplotlib.figure import Figure
+
+SCREEN_DOTS = 72
+"""Dots per inch of a picture in a notebook."""
+
+
+@dataclass(frozen=True, repr=False)
+class Picture(Sheet):
+    """Panels on a grid, under a heading, for matplotlib, plotly and notebooks."""
+
+    def figure(self) -> Figure:
+        """Return it as a figure of matplotlib."""
+        from notchflex.plotting.renderers.with_matplotlib import figure_of
+
+        return figure_of(self)
+
+    def __repr__(self) -> str:
+        """What it shows, and how to write it."""
+        count = len(self.cells)
+        return f"Picture {self.title!r} of {count} panel{'s' * (count != 1)}; .save(file) writes it"
+
+    def _repr_png_(self) -> bytes:
+        """Return it as a notebook shows it."""
+        from io import BytesIO
+
+        written = BytesIO()
+        self.figure().savefig(written, format="png", dpi=SCREEN_DOTS)
+        return written.getvalue()
+
+    def interactive(self) -> Any:
+        """Return it as a figure of plotly.
+
+        Raises:
+            InputError: plotly is not installed.
+        """
+        from notchflex.plotting.renderers.with_plotly import interactive_of
+
+        return interactive_of(self)
+
+    def save(self, target: str | FilePath) -> None:
+        """Write it as PNG, SVG, PDF or HTML, by the suffix; the file is whole or not there.
+
+        An HTML file holds all it needs and asks no other host for anything.
+
+        Args:
+            target: Path that ends in .png, .svg, .pdf or .html.
+
+        Raises:
+            InputError: Another suffix, a library that is not installed, or it cannot be written.
+        """
+        from pathlib import Path as FilePath
+
+        from notchflex.results.files.writing import check_picture
+
+        check_picture(str(target), "the picture")
+        if FilePath(target).suffix.lower() == ".html":
+            from notchflex.plotting.renderers.with_plotly import save_html
+
+            save_html(self, target)
+        else:
+            from notchflex.plotting.style import save
+
+            save(self.figure(), target)

@@ -1,0 +1,135 @@
+"""Quantities of a path that follow from what the solver returned, each beside its formula."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from notchflex._quantity import Quantity
+from notchflex.solver.derived.quantities import believable
+
+if TYPE_CHECKING:  # for the type only: a path evaluates these
+    from notchflex.results.path import EquilibriumPath
+
+
+@Quantity("path", "commanded tension", "T", "N", key="load.tension_N", per=("tendon",), after="")
+def commanded_tension(path: EquilibriumPath) -> np.ndarray:
+    """Tension commanded at the base of a tendon; empty (NaN) where it is not commanded."""
+    return path.load.tension
+
+
+@Quantity("path", "commanded stroke", "u", "mm", key="load.stroke_mm", per=("tendon",),
+          after="commanded_tension")  # fmt: skip
+def commanded_stroke(path: EquilibriumPath) -> np.ndarray:
+    """Tendon length commanded to be drawn out at the base; empty (NaN) where not commanded."""
+    return path.load.stroke
+
+
+@Quantity("path", "total chord angle", r"\psi", "deg", key="total_chord_angle_deg",
+          column="total_chord_deg", after="chord_angle", optional=True)  # fmt: skip
+def total_chord_angle(path: EquilibriumPath) -> np.ndarray:
+    """Sum of the chord angles, where every flexure has one."""
+    return path.chord_angle.sum(axis=-1)
+
+
+@Quantity("path", "dissipation", "D_i", "N mm", per=("tendon", "contact"), after="contact_bound",
+          note="Integrated by the trapezoid rule from step to step, as is the tendon work, so the "
+          "two balance with the stored energy as the steps get small. A few coarse steps across a "
+          "reversal give a rough value, which may even decrease.")  # fmt: skip
+def dissipation(path: EquilibriumPath) -> np.ndarray:
+    """Work that a friction contact has turned to heat since the start of the path."""
+    # The tension drop at every contact over the slid length.
+    return _accumulated(path, "span_tension", "contact_slid")
+
+
+@Quantity("path", "friction front", "m", key="front.m", column="tendon{tendon}_front_m",
+          per=("tendon",), after="dissipation", kind=int)  # fmt: skip
+def front_contact(path: EquilibriumPath) -> np.ndarray:
+    """Contact up to which the friction of a tendon has turned from loading to unloading.
+
+    Contacts are counted from 1 at the base (Gao 2017, eq. 26); one more than there are where all
+    have turned.
+    """
+    return path.front[0]
+
+
+@Quantity("path", "friction at the front", r"\eta", key="front.eta",
+          column="tendon{tendon}_front_eta", per=("tendon",), after="front_contact")  # fmt: skip
+def front_eta(path: EquilibriumPath) -> np.ndarray:
+    """Friction of that contact over its largest, from 1 (loading) to -1 (unloading)."""
+    return path.front[1]
+
+
+@Quantity("path", "tendon work", "W", "N mm", key="tendon_work_Nmm",
+          column="tendon{tendon}_work_Nmm", per=("tendon",))  # fmt: skip
+def tendon_work(path: EquilibriumPath) -> np.ndarray:
+    """Work done on a tendon at the base since the start of the path."""
+    return _accumulated(path, "tension", "stroke")
+
+
+@Quantity("path", "converged", key="converged", column="converged", kind=bool,
+          note="A solved state beyond the limits of the friction law or of the strain modes "
+          "counts as not converged.")  # fmt: skip
+def converged(path: EquilibriumPath) -> np.ndarray:
+    """True where the equilibrium was found."""
+    return np.asarray(path.run.converged) & believable(path.solver_quantity)
+
+
+@Quantity("path", "reason", key="reason", column="reason", kind=str)
+def reason(path: EquilibriumPath) -> list[str]:
+    """Why the equilibrium was not found; empty where it was."""
+    return [text for _, text in path.failures]
+
+
+@Quantity("path", "code of the reason", key="reason_code", kind=str)
+def reason_code(path: EquilibriumPath) -> list[str]:
+    """Name of the `Failure` that stopped the solver; empty where the equilibrium was found."""
+    return [failure.name if failure else "" for failure, _ in path.failures]
+
+
+@Quantity("path", "stable", key="stable", column="stable", kind=bool)
+def stable(path: EquilibriumPath) -> np.ndarray:
+    """True where the equilibrium is stable with its sticking contacts held."""
+    return path.run.stable(path.commands)
+
+
+@Quantity("path", "smallest eigenvalue", r"\lambda_\mathrm{min}", "N mm",
+          key="smallest_eigenvalue_Nmm")  # fmt: skip
+def smallest_eigenvalue(path: EquilibriumPath) -> np.ndarray:
+    """Smallest real part of an eigenvalue of the stiffness, sticking contacts held."""
+    return path.stability[0]
+
+
+@Quantity("path", "sign of the determinant")
+def determinant_sign(path: EquilibriumPath) -> np.ndarray:
+    """Sign of the determinant of that stiffness; +1 at every stable state."""
+    return path.stability[1]
+
+
+@Quantity("path", "residual", "r", key="residual", column="residual")
+def residual(path: EquilibriumPath) -> np.ndarray:
+    """Largest scaled residual of the equations at the end of the iteration."""
+    return np.asarray(path.run.residual)
+
+
+@Quantity("path", "iterations", key="iterations", column="iterations", kind=int)
+def iterations(path: EquilibriumPath) -> np.ndarray:
+    """Number of Newton iterations."""
+    return np.asarray(path.run.iterations)
+
+
+def _accumulated(path: EquilibriumPath, force: str, length: str) -> np.ndarray:
+    """Integrate a force over a length by the trapezoid rule, from the state before the path on."""
+    pairs: list[tuple[np.ndarray, ...]] = []
+    for name in (force, length):
+        after, first = path.solver_quantity(name), path.run.before(name)[None]
+        earlier = np.broadcast_to(first, after.shape)
+        if not path.each_from_rest:
+            earlier = np.concatenate([first, after[:-1]])
+        pairs.append((earlier, after))
+    if force == "span_tension":  # what a contact takes is the drop from span to span
+        pairs[0] = tuple(value[..., :-1] - value[..., 1:] for value in pairs[0])
+    (force_before, force_after), (length_before, length_after) = pairs
+    work = 0.5 * (force_before + force_after) * (length_after - length_before)
+    return work if path.each_from_rest else np.cumsum(work, axis=0)

@@ -1,0 +1,162 @@
+"""Typed properties for every quantity of a path and of an equilibrium.
+
+Their documentation and their values come from the registry (`notchflex._quantity`).
+"""
+
+from __future__ import annotations
+
+from typing import Any, Generic, NoReturn, Self, TypeVar, overload
+
+import numpy as np
+
+from notchflex._quantity import REGISTERED
+from notchflex.results.quantities import (
+    path_formulas as path_formulas,  # registers the last quantities
+)
+
+QUANTITIES = {name: one for name, one in REGISTERED.items() if one.title}
+"""Every quantity of a solved state, by the attribute that holds it."""
+
+_Many = TypeVar("_Many")
+_One = TypeVar("_One")
+
+
+class _Property(Generic[_Many, _One]):
+    """A quantity as property: values of every step of a path, or the value of one equilibrium."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        one = QUANTITIES[name]
+        self._name, self.__doc__ = name, f"{one.summary}\n\n{one.text}"
+
+    @overload
+    def __get__(self, thing: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, thing: PathQuantities, owner: type) -> _Many: ...
+    @overload
+    def __get__(self, thing: EquilibriumQuantities, owner: type) -> _One: ...
+    def __get__(self, thing: _Quantities | None, owner: type) -> Any:
+        return self if thing is None else thing.quantity(self._name)
+
+    def __set__(self, thing: _Quantities, value: object) -> NoReturn:
+        raise AttributeError(f"{self._name} is a result and cannot be set")
+
+
+class Number(_Property[np.ndarray, float]):
+    """One number a step."""
+
+
+class Flag(_Property[np.ndarray, bool]):
+    """True or false at every step."""
+
+
+class Count(_Property[np.ndarray, int]):
+    """A whole number a step."""
+
+
+class Text(_Property[list[str], str]):
+    """A text a step."""
+
+
+class Table(_Property[np.ndarray, np.ndarray]):
+    """An array a step."""
+
+
+class _Quantities:
+    """Axes are those of one state; those of a path have the steps before them."""
+
+    def quantity(self, name: str) -> Any:
+        """Return a quantity by its name."""
+        raise NotImplementedError
+
+    # Written by docs/make/quantity_properties.py:
+    commanded_tension = Table()
+    """Commanded tension, N, shape (t)."""
+    commanded_stroke = Table()
+    """Commanded stroke, mm, shape (t)."""
+    tension = Table()
+    """Tendon tension, N, shape (t)."""
+    stroke = Table()
+    """Tendon stroke, mm, shape (t)."""
+    notch_angle = Table()
+    """Notch angle, rad, shape (n)."""
+    chord_angle = Table()
+    """Chord angle, rad, shape (n)."""
+    total_chord_angle = Number()
+    """Total chord angle, rad."""
+    total_angle = Number()
+    """Total bending angle, rad."""
+    tip_position = Table()
+    """Tip position, mm, shape (3)."""
+    tip_rotation = Table()
+    """Tip rotation, shape (3, 3)."""
+    body_position = Table()
+    """Body position, mm, shape (bodies, 3)."""
+    body_rotation = Table()
+    """Body rotation, shape (bodies, 3, 3)."""
+    span_tension = Table()
+    """Span tension, N, shape (t, spans)."""
+    notch_moment = Table()
+    """Notch moment, N mm, shape (n)."""
+    outer_strain = Table()
+    """Outer strain, shape (n)."""
+    peak_strain = Table()
+    """Peak strain, shape (n)."""
+    gap = Table()
+    """Notch gap, mm, shape (n)."""
+    closed = Table()
+    """Closed, shape (n)."""
+    contact_force = Table()
+    """Contact force, N, shape (n)."""
+    contact_log_ratio = Table()
+    """Tension ratio over a contact, shape (t, contacts)."""
+    contact_slid = Table()
+    """Slid length, mm, shape (t, contacts)."""
+    contact_turning = Table()
+    """Turning at a contact, rad, shape (t, contacts)."""
+    contact_state = Table()
+    """State of a contact, shape (t, contacts)."""
+    contact_bound = Table()
+    """Largest tension ratio over a contact, shape (t, contacts)."""
+    dissipation = Table()
+    """Dissipation, N mm, shape (t, contacts)."""
+    front_contact = Table()
+    """Friction front, shape (t)."""
+    front_eta = Table()
+    """Friction at the front, shape (t)."""
+    base_force = Table()
+    """Base force, N, shape (3)."""
+    base_moment = Table()
+    """Base moment, N mm, shape (3)."""
+    moment_error = Number()
+    """Moment error."""
+    stored_energy = Number()
+    """Stored energy, N mm."""
+    tendon_work = Table()
+    """Tendon work, N mm, shape (t)."""
+    converged = Flag()
+    """Converged."""
+    reason = Text()
+    """Reason."""
+    reason_code = Text()
+    """Code of the reason."""
+    stable = Flag()
+    """Stable."""
+    smallest_eigenvalue = Number()
+    """Smallest eigenvalue, N mm."""
+    determinant_sign = Number()
+    """Sign of the determinant."""
+    residual = Number()
+    """Residual."""
+    iterations = Count()
+    """Iterations."""
+
+
+class PathQuantities(_Quantities):
+    """Quantities of every step, as leading axis: n notches, t tendons, n + 1 bodies."""
+
+
+class EquilibriumQuantities(_Quantities):
+    """Quantities of one equilibrium: n notches, t tendons, n + 1 bodies."""
+
+
+__all__ = ["QUANTITIES", "EquilibriumQuantities", "PathQuantities"]

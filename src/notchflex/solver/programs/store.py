@@ -1,0 +1,272 @@
+"""The folder of compiled programs: private to its user, verified, and bounded in size.
+
+What lies there is machine code and is run. So it is taken only from a folder and from files that
+belong to the user and that nobody else can write to; links are not followed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import stat
+import sys
+import warnings
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, suppress
+from functools import cache, lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+PACKAGE = Path(__file__).parents[2]
+"""Folder of notchflex."""
+
+VARIABLE = "JAX_COMPILATION_CACHE_DIR"
+"""Environment variable: the folder to keep programs in; empty for none."""
+
+MOST_BYTES = 256 * 2**20
+"""Programs that were not used for longest are removed beyond this."""
+
+_DIGEST = 32  # bytes
+_PREFIX = "program-"
+# Folders of notchflex whose code no program is made from. All of `lanewise` makes programs.
+_NOT_COMPILED = {"bench", "cli", "plotting", "viewer"}
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_POSIX = hasattr(os, "geteuid") and os.open in os.supports_dir_fd
+
+
+class Usage(NamedTuple):
+    """What a folder of programs holds."""
+
+    programs: int
+    size: int
+
+
+def chosen_folder() -> Path | None:
+    """Return where compiled code of the user is kept; None where it is not kept.
+
+    `JAX_COMPILATION_CACHE_DIR` chooses another folder than the user's cache folder. Its value may
+    be the address of a store that JAX can write to and this library cannot.
+    """
+    if VARIABLE in os.environ:
+        chosen = os.environ[VARIABLE]
+        return Path(chosen) if chosen and "://" not in chosen else None
+    try:
+        return _user_cache() / "notchflex"
+    except RuntimeError:  # there is no home folder
+        return None
+
+
+def program_folder() -> Path | None:
+    """Return the folder of programs for this kind of processor, made if need be and checked."""
+    root = chosen_folder()
+    return None if root is None else _checked(root / f"programs-{_machine()}")
+
+
+def read(key: str) -> bytes | None:
+    """Return what is kept under a key; None where there is nothing that is whole and private."""
+    folder = program_folder()
+    if folder is None:
+        return None
+    try:
+        with _opened(folder) as at, os.fdopen(_open(folder, at, _name(key)), "rb") as file:
+            if not _private(os.fstat(file.fileno()), stat.S_ISREG):
+                return None
+            content = file.read()
+            with suppress(OSError):  # the time of the last use
+                os.utime(file.fileno() if _POSIX else folder / _name(key))
+    except OSError:
+        return None
+    digest, content = content[:_DIGEST], content[_DIGEST:]
+    return content if hashlib.sha256(content).digest() == digest else None
+
+
+def write(key: str, content: bytes) -> None:
+    """Keep content under a key, whole or not at all; nothing happens where it cannot be kept."""
+    folder = program_folder()
+    if folder is None:
+        return
+    temporary = f".{_name(key)}.{os.getpid()}"
+    with suppress(OSError), _opened(folder) as at:
+        try:
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+            with os.fdopen(_open(folder, at, temporary, flags), "wb") as file:
+                file.write(hashlib.sha256(content).digest() + content)
+            _replace(folder, at, temporary, _name(key))
+        finally:
+            with suppress(OSError):
+                _remove(folder, at, temporary)
+        _shrink(folder)
+
+
+def usage() -> Usage:
+    """Return how many programs are kept for this processor, and their size in bytes."""
+    folder = program_folder()
+    files = [] if folder is None else _files(folder)
+    return Usage(len(files), sum(size for _, size, _ in files))
+
+
+def clear() -> Usage:
+    """Remove all kept programs of this processor; return what was there."""
+    before, folder = usage(), program_folder()
+    for _, _, name in [] if folder is None else _files(folder):
+        with suppress(OSError):
+            os.unlink(os.path.join(os.fspath(folder or ""), name))
+    return before
+
+
+@cache
+def code_digest() -> str:
+    """Return a digest of the code that programs are made from."""
+    compiler = find_spec("lanewise")
+    assert compiler is not None
+    assert compiler.submodule_search_locations is not None
+    code = hashlib.sha256()
+    for root in (os.fspath(PACKAGE), compiler.submodule_search_locations[0]):
+        for folder, inner, files in os.walk(root):  # every process does this; pathlib takes longer
+            inner[:] = sorted(one for one in inner if folder != root or one not in _NOT_COMPILED)
+            for name in sorted(one for one in files if one.endswith(".py")):
+                path = os.path.join(folder, name)
+                with open(path, "rb", buffering=0) as file:
+                    code.update(os.path.relpath(path, root).encode() + b"\0" + file.read() + b"\0")
+    return code.hexdigest()
+
+
+@cache
+def made_from() -> str:
+    """Return a digest of what programs are made from beside their arguments: code and versions."""
+    from importlib.metadata import version
+
+    versions = [version(name) for name in ("jax", "jaxlib", "llvmlite")]
+    settings = [os.environ.get("XLA_FLAGS", ""), os.cpu_count()]
+    return hashlib.sha256(repr((code_digest(), versions, settings)).encode()).hexdigest()
+
+
+def _name(key: str) -> str:
+    return _PREFIX + hashlib.sha256(f"{made_from()} {key}".encode()).hexdigest()[:32]
+
+
+@lru_cache(maxsize=16)
+def _checked(folder: Path) -> Path | None:
+    """Return a folder if it may be trusted; checked again whenever it is opened."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
+        with _opened(folder):
+            return folder
+    except PermissionError as error:
+        if "others" in str(error):
+            warnings.warn(str(error), stacklevel=2)
+        return None
+    except OSError:  # programs are compiled in every process
+        return None
+
+
+@contextmanager
+def _opened(folder: Path) -> Generator[int | None]:
+    """Open the folder, so that the one that was checked is the one that is used."""
+    if not _POSIX:
+        yield None
+        return
+    at = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        if not _private(os.fstat(at), stat.S_ISDIR):
+            raise PermissionError(
+                f"compiled programs are not kept in {folder}: it belongs to others or others can "
+                f"write to it; make it private (chmod go-w) or choose another with {VARIABLE}"
+            )
+        yield at
+    finally:
+        os.close(at)
+
+
+def _private(found: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
+    """Whether a file or folder is the user's own and nobody else can write to it."""
+    own = not _POSIX or (found.st_uid == os.geteuid() and not found.st_mode & _OTHERS_WRITE)
+    return is_kind(found.st_mode) and own
+
+
+def _open(folder: Path, at: int | None, name: str, flags: int = os.O_RDONLY) -> int:
+    flags |= getattr(os, "O_BINARY", 0)
+    if at is None:
+        return os.open(folder / name, flags, 0o600)
+    return os.open(name, flags | os.O_NOFOLLOW, 0o600, dir_fd=at)
+
+
+def _replace(folder: Path, at: int | None, old: str, new: str) -> None:
+    if at is None:
+        os.replace(folder / old, folder / new)
+    else:
+        os.replace(old, new, src_dir_fd=at, dst_dir_fd=at)
+
+
+def _remove(folder: Path, at: int | None, name: str) -> None:
+    if at is None:
+        os.unlink(folder / name)
+    else:
+        os.unlink(name, dir_fd=at)
+
+
+def _files(folder: Path) -> list[tuple[float, int, str]]:
+    """Time of the last use, size and name of every program."""
+    found: list[tuple[float, int, str]] = []
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_file(follow_symlinks=False):  # those of JAX too
+                about = entry.stat(follow_symlinks=False)
+                found.append((about.st_mtime, about.st_size, entry.name))
+    return found
+
+
+def _shrink(folder: Path) -> None:
+    """Remove what was not used for longest until the rest is small enough."""
+    files = sorted(_files(folder))
+    left = sum(size for _, size, _ in files)
+    for _, size, name in files:
+        if left <= MOST_BYTES:
+            return
+        with suppress(OSError):
+            (folder / name).unlink()
+            left -= size
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    chosen = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return chosen if chosen.is_absolute() else Path.home() / ".cache"  # relative ones are ignored
+
+
+@cache
+def _machine() -> str:
+    """Return a short name of the kind of processor, its instruction sets included.
+
+    A home folder may be shared by machines that are not alike.
+    """
+    facts = [platform.machine(), platform.processor()]
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        lines = text.splitlines()
+        facts += [line for line in lines if line.startswith(("flags", "model name"))][:2]
+    except OSError:
+        pass
+    return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:12]
+
+
+__all__ = [
+    "MOST_BYTES",
+    "PACKAGE",
+    "VARIABLE",
+    "Usage",
+    "chosen_folder",
+    "clear",
+    "code_digest",
+    "made_from",
+    "program_folder",
+    "read",
+    "usage",
+    "write",
+]

@@ -1,0 +1,156 @@
+"""The import graph of the sources: one way through the folders, and without cycles.
+
+Imports inside functions and for types only count like any other.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import notchflex
+
+SOURCE = Path(notchflex.__file__).parents[1]
+
+ORDER = (
+    "lanewise",
+    "",  # files beside the folders
+    "robot",
+    "mechanics",
+    "loads",
+    "solver",
+    "results",
+    "analysis",
+    "fit",
+    "comparison",
+    "plotting",
+    "viewer",
+    "bench",
+    "cli",
+)
+"""Folders from the first to the last: a file imports from its own folder and from those before."""
+
+MOST_FILES = 15
+
+_PICTURE = "pictures need matplotlib or plotly: they are imported when one is asked for"
+_SHOWN = "an object shows itself: what writes its summary is imported when it is shown"
+_FILES = "a path is returned as a table by a method; the table is made elsewhere"
+_TYPE = "for the type only: a path calls this file and hands itself over"
+
+EXCEPTIONS: dict[tuple[str, str], str] = {
+    ("__main__", "cli"): "`python -m notchflex` is the command line",
+    ("_plot", "plotting"): _PICTURE,
+    ("_plot", "plotting.axes_of_quantities"): _PICTURE,
+    ("_plot", "plotting.picture"): _PICTURE,
+    ("robot.notches.arc", "mechanics.section"): (
+        "whether lips touch at rest depends on the centroid of the section; seldom asked for"
+    ),
+    ("robot.robot", "robot.value_names"): "`Robot.with_values`; setting a value makes a robot",
+    ("robot.robot", "robot.summary"): _SHOWN,
+    ("loads.load_path", "loads.summary"): _SHOWN,
+    ("results.equilibrium", "results.summary"): _SHOWN,
+    ("results.path", "results.summary"): _SHOWN,
+    ("results.state", "results.summary"): _SHOWN,
+    ("results.equilibrium", "results.files.json"): _FILES,
+    ("results.path", "results.files.dataframe"): _FILES,
+    ("results.path", "results.files.dataset"): _FILES,
+    ("results.equilibrium", "results.path"): _TYPE,
+    ("results.reason", "results.path"): _TYPE,
+    ("results.quantities.path_formulas", "results.path"): _TYPE,
+    ("fit.estimation.calibration", "fit.summary"): _SHOWN,
+    ("comparison.comparison", "comparison.tables"): _SHOWN,
+    ("viewer.viewer", "viewer.page.page"): "the viewer makes its page; the page acts on the viewer",
+}
+"""Importer and imported, without `notchflex.`, and why the one may import the other."""
+
+
+def _name(file: Path) -> str:
+    parts = file.relative_to(SOURCE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+FILES = {
+    _name(file): file
+    for name in ("notchflex", "lanewise")
+    for file in (SOURCE / name).rglob("*.py")
+}
+
+
+def _imported(file: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in FILES)
+        elif isinstance(node, ast.ImportFrom):
+            module = str(node.module)
+            assert node.level == 0, f"{file}: relative import"
+            if module.partition(".")[0] not in ("notchflex", "lanewise"):
+                continue
+            assert module in FILES, f"{file}: there is no {module}"
+            for alias in node.names:
+                inside = f"{module}.{alias.name}"
+                yield inside if inside in FILES else module
+
+
+def _short(module: str) -> str:
+    return module.removeprefix("notchflex.")
+
+
+GRAPH = {
+    _short(module): {_short(other) for other in _imported(file)} for module, file in FILES.items()
+}
+ALLOWED = {
+    module: {other for other in others if (module, other) not in EXCEPTIONS}
+    for module, others in GRAPH.items()
+}
+
+
+def _place(module: str) -> int:
+    folder = module.partition(".")[0]
+    return ORDER.index(folder if folder in ORDER else "")
+
+
+def test_imports_go_one_way():
+    upward = [
+        f"{module} -> {other}"
+        for module, others in ALLOWED.items()
+        for other in others
+        if _place(other) > _place(module)
+    ]
+    assert not upward, "\n".join(sorted(upward))
+
+
+def test_no_cycles():
+    cycles: list[str] = []
+    done: set[str] = set()
+
+    def follow(module: str, way: list[str]) -> None:
+        if module in way:
+            cycles.append(" -> ".join([*way[way.index(module) :], module]))
+        elif module not in done:
+            for other in sorted(ALLOWED[module]):
+                follow(other, [*way, module])
+            done.add(module)
+
+    for module in sorted(ALLOWED):
+        follow(module, [])
+    assert not cycles, "\n".join(cycles)
+
+
+def test_every_exception_is_still_needed():
+    for module, other in EXCEPTIONS:
+        assert other in GRAPH[module], f"{module} no longer imports {other}"
+
+
+def test_the_compiler_knows_nothing_of_robots():
+    for module, others in GRAPH.items():
+        if module.partition(".")[0] == "lanewise":
+            assert all(other.partition(".")[0] == "lanewise" for other in others), module
+
+
+def test_folders_are_small():
+    for folder in {file.parent for file in FILES.values()}:
+        assert len(list(folder.glob("*.py"))) <= MOST_FILES, folder
+
+
+def test_every_folder_has_its_place():
+    folders = {path.parent.name for path in (SOURCE / "notchflex").glob("*/__init__.py")}
+    assert folders == set(ORDER) - {"lanewise", ""}
