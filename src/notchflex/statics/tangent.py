@@ -46,13 +46,14 @@ class PathTangents:
 
     def along(
         self,
-        loads: Float[np.ndarray, "s command"],
+        loads: Float[np.ndarray, "s command"] | None,
         chain: Float[np.ndarray, " chain"] | None = None,
     ) -> dict[str, np.ndarray]:
         """Differentiate along one direction.
 
         Args:
-            loads: Change of the loads, packed for the long chain, steps as leading axis.
+            loads: Change of the loads, packed for the long chain, steps as leading axis; None for
+                none.
             chain: Change of the long chain, packed whole; None for none.
 
         Returns:
@@ -63,12 +64,12 @@ class PathTangents:
         form = long.known_form
         varies = chain is not None
         change = form.pack(chain) if varies else np.zeros(1)
-        remembers = np.array([1.0 if self.remembers else 0.0])
-        rows = (False, False, False, False, *(True,) * 6)
-        before, states, between, how = self._states
+        rows = (False, False, False, *(True,) * 7)
         packed, command_form = self._packed
-        given = (np.zeros(long.state.size), long.known_vector, change, remembers)
-        steps = (before, states, packed, loads, between, how)
+        given = (np.zeros(long.state.size), long.known_vector, change)
+        remembers, before, states, between, how = self._states
+        moved = np.zeros_like(packed) if loads is None else loads
+        steps = (remembers, before, states, packed, moved, between, how)
         others = (form, command_form, long.state, self.outputs, varies)
         found = _tangent.along(rows, *given, *steps, *others)
         return {name: self._own(name, values) for name, values in found.items()}
@@ -80,13 +81,13 @@ class PathTangents:
 
     @cached_property
     def _states(self) -> tuple[np.ndarray, ...]:
-        """States before, at and between the loads, for the long chain, and how they were found."""
+        """What the program takes for each load: which changes pass on, three states, how found."""
         ready, came = self.path.prepared, self.path.run
         assert isinstance(came, Run)
-        before = np.concatenate([came.first[None], came.states[:-1]])
-        every = (before, came.states, came.between)
+        every = (came.states_before, came.states, came.between)
         how = np.stack([came.part_before, came.parts, self.path.converged], axis=1)
-        return (*(lengthen(one, ready.state, ready.long.state) for one in every), how)
+        remembers = (self.remembers & ~came.from_start)[:, None].astype(float)
+        return remembers, *(lengthen(one, ready.state, ready.long.state) for one in every), how
 
     def _own(self, name: str, values: np.ndarray) -> np.ndarray:
         own = of_own(self.path.chain, name, values)
