@@ -80,8 +80,8 @@ def misfit(name: str, measured: Measurements, predicted: Predicted) -> Misfit:
         last = np.isfinite(values[0]).sum(axis=-1) - 1
         tendons = np.arange(len(last))
         values, slopes = values[:, tendons, last], slopes[:, :, tendons, last]
-    rows = len(seen)
-    return Misfit((values - seen).reshape(rows, -1), slopes.reshape(len(slopes), rows, -1))
+    values = (values - seen).reshape(len(seen), -1)
+    return Misfit(values, slopes.reshape(len(slopes), *values.shape))
 
 
 def _turned(

@@ -107,14 +107,16 @@ class Rows:
             names = tuple(dict.fromkeys((*names, *_BODIES)))
         values = {name: np.asarray(path.quantity(name)) for name in names}
         slopes: dict[str, np.ndarray] = {}
-        if path.converged.all():
+        if self.names and path.converged.all():
             changes = [self._change(path, load, name) for name in self.names]
             slopes = self.model.derivatives(path, changes, names)
         if self.places is not None:
             places, bodies = self.places, [values[name] for name in _BODIES]
-            moves = zip(*(slopes[name] for name in _BODIES), strict=True) if slopes else ()
-            slopes["axis_points"] = np.array([_points_slope(places, bodies, one) for one in moves])
             values["axis_points"] = points_on_axis(places, *bodies)
+            if slopes:
+                moves = zip(*(slopes[name] for name in _BODIES), strict=True)
+                every = [_points_slope(places, bodies, move) for move in moves]
+                slopes["axis_points"] = np.stack(every)
         back = np.argsort(self._order)
         return Predicted(
             {name: values[name][back] for name in self.outputs},

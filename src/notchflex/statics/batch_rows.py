@@ -9,7 +9,7 @@ from notchflex.statics.known import KnownForm
 from notchflex.statics.newton import Settings
 from notchflex.statics.outputs import followed
 from notchflex.statics.packing import Form, lane_sizes
-from notchflex.statics.stepping import advance, at_rest
+from notchflex.statics.stepping import at_rest
 
 
 @native(3, lane_sizes)
@@ -36,7 +36,7 @@ def followed_row(
     """
     robot, loads = chain_form.unpack(chain), command_form.unpack(commands)
     start, settings = at_rest(robot), Settings.of(numbers)
-    return followed(robot, loads, start, settings, outputs, advance)
+    return followed(robot, loads, start, settings, outputs)
 
 
 __all__ = ["followed_row"]

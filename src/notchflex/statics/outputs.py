@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from jaxtyping import Array
@@ -13,7 +13,7 @@ from notchflex.errors import InputError
 from notchflex.statics.given import shown
 from notchflex.statics.newton import Settings
 from notchflex.statics.quantities import Quantities, Shape, believable, quantities, shape
-from notchflex.statics.stepping import Advance, Solved
+from notchflex.statics.stepping import Solved, advance
 
 DEFAULT_OUTPUTS = ("total_angle", "tip_position", "tip_rotation", "converged")
 OUTPUTS = (
@@ -50,7 +50,6 @@ def followed(
     start: Solved,
     settings: Settings,
     outputs: tuple[str, ...],
-    stepping: Callable[[Chain, Any, Solved, Settings], Advance],
 ) -> dict[str, Array]:
     """Follow a path of loads, and tell of every state what is asked.
 
@@ -60,11 +59,10 @@ def followed(
 
     Args:
         chain: The chain.
-        commands: The loads, as leading axis; for `answered` with what came of them.
+        commands: The loads, as leading axis.
         start: The state before the first.
         settings: How hard to try.
         outputs: Names of what is asked.
-        stepping: `advance`, or `answered` for derivatives of what is solved already.
 
     Returns:
         By name, loads as leading axis; after a load that failed the last good state.
@@ -72,7 +70,7 @@ def followed(
 
     def step(state: tuple[Solved, Array], command: Any) -> tuple[Any, dict[str, Array]]:
         last, alive = state
-        came = stepping(chain, command, last, settings)
+        came = advance(chain, command, last, settings)
         solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), came.solved, last)
         reached = alive & came.converged
         told = _told(chain, solved, outputs)
