@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -27,19 +26,7 @@ from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import Prepared, flat, prepared
 from notchflex.statics.run import run
 from notchflex.statics.solve import prepared_for
-from notchflex.statics.tangent import PathTangents
-
-
-class Change(NamedTuple):
-    """Change of what a path is computed from, per unit of a number.
-
-    Attributes:
-        loads: Of the loads, packed for the long chain, steps as leading axis; None for none.
-        chain: Of the long chain, packed whole; None for none.
-    """
-
-    loads: Float[np.ndarray, "s command"] | None
-    chain: Float[np.ndarray, " chain"] | None
+from notchflex.statics.tangent import Change, PathTangents
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,8 +98,15 @@ class KnownForm:
 
     def pack(self, numbers: Float[np.ndarray, "*k chain"]) -> Float[np.ndarray, "*k unknown"]:
         """Vectors of chains that are packed whole."""
+        xp = array_module(numbers)
         behind = np.zeros((*numbers.shape[:-1], _BEHIND))
-        return np.concatenate([numbers[..., self._taken], behind], axis=-1)
+        return xp.concatenate([numbers[..., self._taken], behind], axis=-1)
+
+    def spread(self, vector: Float[np.ndarray, " unknown"]) -> Float[np.ndarray, " chain"]:
+        """Numbers of a vector where they stand in the whole chain, 0 for what is known."""
+        whole = np.zeros(self.form.size)
+        whole[self._taken] = vector[: len(self._taken)]
+        return whole
 
     def unpack(self, vector: Any) -> Any:
         """The chain of a vector."""

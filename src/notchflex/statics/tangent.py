@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import jax
+from notchflex._jax import jax, jnp
 from notchflex._native import native
-from notchflex.statics.actuation import Command
 from notchflex.statics.capacity import lengthen
 from notchflex.statics.known import KnownForm
 from notchflex.statics.outputs import reported
@@ -25,8 +25,20 @@ from notchflex.statics.quantities import of_own
 from notchflex.statics.run import Run
 from notchflex.statics.sensitivity import Way, answering
 
-_VECTORS = ("tip_position", "body_position", "base_force", "base_moment")
-_ROTATIONS = ("tip_rotation", "body_rotation")
+VECTORS = ("tip_position", "body_position", "base_force", "base_moment")
+ROTATIONS = ("tip_rotation", "body_rotation")
+
+
+class Change(NamedTuple):
+    """Change of what a path is computed from, per unit of a number.
+
+    Attributes:
+        loads: Of the loads, packed for the long chain, steps as leading axis; None for none.
+        chain: Of the long chain, packed whole; None for none.
+    """
+
+    loads: Float[np.ndarray, "s command"] | None
+    chain: Float[np.ndarray, " chain"] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,37 +76,38 @@ class PathTangents:
         form = long.known_form
         varies = chain is not None
         change = form.pack(chain) if varies else np.zeros(1)
-        rows = (False, False, False, *(True,) * 7)
-        packed, command_form = self._packed
-        given = (np.zeros(long.state.size), long.known_vector, change)
-        remembers, before, states, between, how = self._states
+        packed, command_form, states = self.steps
         moved = np.zeros_like(packed) if loads is None else loads
-        steps = (remembers, before, states, packed, moved, between, how)
+        given = (np.zeros(long.state.size), long.known_vector, change)
+        steps = (*states, packed, moved)
+        rows = (*(False,) * len(given), *(True,) * len(steps))
         others = (form, command_form, long.state, self.outputs, varies)
         found = _tangent.along(rows, *given, *steps, *others)
         return {name: self._own(name, values) for name, values in found.items()}
 
     @cached_property
-    def _packed(self) -> tuple[np.ndarray, Form]:
-        """The loads packed for the long chain, and the form of one of them."""
-        return self.path.prepared.long_commands(self.path.commands)
+    def steps(self) -> tuple[np.ndarray, Form, tuple[np.ndarray, ...]]:
+        """What programs take of every load, for the long chain.
 
-    @cached_property
-    def _states(self) -> tuple[np.ndarray, ...]:
-        """What the program takes for each load: which changes pass on, three states, how found."""
+        Returns:
+            The loads, the form of one of them; and whether a change of the state before passes on,
+            the states before and at the load and between, and how it was found.
+        """
         ready, came = self.path.prepared, self.path.run
         assert isinstance(came, Run)
-        every = (came.states_before, came.states, came.between)
+        packed, form = ready.long_commands(self.path.commands)
+        own = (came.states_before, came.states, came.between)
+        every = (lengthen(one, ready.state, ready.long.state) for one in own)
         how = np.stack([came.part_before, came.parts, self.path.converged], axis=1)
         remembers = (self.remembers & ~came.from_start)[:, None].astype(float)
-        return remembers, *(lengthen(one, ready.state, ready.long.state) for one in every), how
+        return packed, form, (remembers, *every, how)
 
     def _own(self, name: str, values: np.ndarray) -> np.ndarray:
         own = of_own(self.path.chain, name, values)
         turn = self.path.base_to_world
-        if turn is None or name not in (*_VECTORS, *_ROTATIONS):
+        if turn is None or name not in (*VECTORS, *ROTATIONS):
             return own
-        return own @ turn.T if name in _VECTORS else turn @ own
+        return own @ turn.T if name in VECTORS else turn @ own
 
 
 @native(10, lane_sizes)
@@ -105,10 +118,10 @@ def _tangent(
     remembers: Float[Array, " 1"],
     before: Float[Array, " state"],
     state: Float[Array, " state"],
-    load: Float[Array, " command"],
-    load_change: Float[Array, " command"],
     between: Float[Array, " state"],
     how: Float[Array, " 3"],
+    load: Float[Array, " command"],
+    load_change: Float[Array, " command"],
     chain_form: KnownForm,
     command_form: Form,
     state_form: Form,
@@ -124,14 +137,20 @@ def _tangent(
 
     def told(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
         own, last = chain_form.unpack(varied), state_form.unpack(before)
-        command: Command = command_form.unpack(load)
+        command = command_form.unpack(load)
         found = answering(own, command, last, solved, way)
         return state_form.pack(found), reported(own, found, outputs)
 
-    at, changes = (load, before), (load_change, remembers[0] * last_change)
+    at, changes = (
+        (load, before),
+        (
+            load_change,
+            jnp.where(remembers[0] > 0.0, last_change, 0.0),
+        ),
+    )
     if varies:
         at, changes = (*at, chain), (*changes, chain_change)
     return jax.jvp(told, at, changes)[1]
 
 
-__all__ = ["PathTangents"]
+__all__ = ["ROTATIONS", "VECTORS", "Change", "PathTangents"]
