@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple, cast
 
@@ -257,7 +256,7 @@ def _shaped(
 ) -> Shaped:
     # Notches that are alike are worked out once.
     unlike = {notch: _flexure(notch, tube, level, refinement) for notch in dict.fromkeys(notches)}
-    own_rods = list(unlike.values())
+    own_rods, free_poses = zip(*unlike.values(), strict=True)
     alike = stack(own_rods)
     number = {notch: index for index, notch in enumerate(unlike)}
     which = [number[notch] for notch in notches]
@@ -265,7 +264,7 @@ def _shaped(
     body_length = constant(body_lengths(tube, notches))
     lead = body_length[:-1, None] * _UP
     rods = dataclasses.replace(rods, start_offset=rods.start_offset + lead)
-    free = jax.tree.map(lambda leaf: leaf[which], _free_poses(own_rods))
+    free = jax.tree.map(lambda *leaves: np.stack(leaves)[which], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
     ground = Ground(notches, rods, free, body_length, turns_with_chord=turns_with_chord)
     directions = {notch.direction_deg: np.empty(0) for notch in notches}
@@ -285,8 +284,10 @@ def _shaped(
 
 
 @lru_cache(maxsize=512)
-def _flexure(notch: Notch, tube: Tube, level: str, refinement: int) -> Rod:
-    return with_level(rod(notch, tube, refinement), level)
+def _flexure(notch: Notch, tube: Tube, level: str, refinement: int) -> tuple[Rod, Motion]:
+    """A flexure and its pose in the free robot."""
+    made = with_level(rod(notch, tube, refinement), level)
+    return made, free_pose(made)
 
 
 def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
@@ -312,10 +313,6 @@ def flexure_states(
     """State of all flexures at once."""
     state = partial(flexure_state, with_pose=with_pose)
     return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, chain.memory, modes)
-
-
-def _free_poses(rods: Sequence[Rod]) -> Motion:
-    return jax.tree.map(lambda *leaves: np.stack(leaves), *(free_pose(rod) for rod in rods))
 
 
 def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:

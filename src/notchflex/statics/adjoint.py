@@ -7,6 +7,7 @@ not depend on how many numbers the gradient is taken by.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -23,7 +24,32 @@ from notchflex.statics.sensitivity import Way, answering
 from notchflex.statics.tangent import ROTATIONS, VECTORS, Change, PathTangents
 
 
-def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Change:
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Derivatives of a number by all that a path is computed from.
+
+    Attributes:
+        loads: By the loads, packed for the long chain, steps as leading axis.
+        chain: By the long chain, packed for programs.
+        form: How it is packed.
+    """
+
+    loads: Float[np.ndarray, "s command"]
+    chain: Float[np.ndarray, " unknown"]
+    form: KnownForm
+
+    def along(self, change: Change) -> float:
+        """Return the derivative of the number along a change."""
+        places, sizes = change.entries(self.form)
+        by_chain = float(self.chain[places] @ sizes)
+        return (
+            by_chain
+            if change.loads is None
+            else by_chain + float(self.loads.ravel() @ change.loads.ravel())
+        )
+
+
+def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradient:
     """Differentiate a weighted sum of quantities by all loads and by all numbers of the chain.
 
     Args:
@@ -32,24 +58,23 @@ def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Change
             number of a quantity counts, steps as leading axis.
 
     Returns:
-        Derivatives by the loads and by the long chain, packed. NaN if a step of any weight, or one
-        before it, did not converge, or was so hard that its derivatives are not known.
+        Its derivatives. NaN if a step of any weight, or one before it, did not converge, or was so
+        hard that its derivatives are not known.
     """
     long = path.prepared.long
     outputs = tuple(weights)
     packed, command_form, states = PathTangents(path, outputs).steps
     form = (long.known_form, command_form, long.state)
-    counted = np.any([np.any(one, axis=tuple(range(1, one.ndim))) for one in weights.values()], 0)
-    # No step beyond the last that counts: one that failed there must not matter.
-    backwards = slice(int(np.flatnonzero(counted).max(initial=0)), None, -1)
     seeds = _packed(path, weights, _shapes(*form, outputs))
+    # No step beyond the last that counts: one that failed there must not matter.
+    backwards = slice(int(np.flatnonzero(seeds.any(axis=1)).max(initial=0)), None, -1)
     given = [one[backwards] for one in (*states, packed, seeds)]
     rows = (False, False, *(True,) * len(given))
     start = (np.zeros(long.state.size), long.known_vector)
     came = _adjoint.along(rows, *start, *given, *form, outputs)
     loads = np.zeros_like(packed)
     loads[backwards] = came["load"]
-    return Change(loads, long.known_form.spread(came["chain"].sum(axis=0)))
+    return Gradient(loads, came["chain"].sum(axis=0), long.known_form)
 
 
 def _packed(
@@ -126,4 +151,4 @@ def _adjoint(
     return jnp.where(remembers[0] > 0.0, by_before, 0.0), {"load": by_load, "chain": by_chain}
 
 
-__all__ = ["gradient"]
+__all__ = ["Gradient", "gradient"]

@@ -7,9 +7,10 @@ makes them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -18,6 +19,7 @@ from notchflex.chain import Shaped, laws, shape_of
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.robot.paths import number_at
+from notchflex.statics.adjoint import gradient
 from notchflex.statics.command import command
 from notchflex.statics.load import LoadPath
 from notchflex.statics.newton import DEFAULT, Settings
@@ -27,6 +29,9 @@ from notchflex.statics.prepare import Prepared, flat, prepared
 from notchflex.statics.run import run
 from notchflex.statics.solve import prepared_for
 from notchflex.statics.tangent import Change, PathTangents
+
+# One gradient of a number takes about as long as derivatives along so many directions.
+_ADJOINT = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,25 +120,41 @@ class ForwardModel:
 
         Args:
             path: As `solve` returns it.
-            changes: Directions.
+            changes: Directions, one or more.
             outputs: Quantities that the solver reports as floats.
 
         Returns:
             By name, directions and then steps as leading axes, in the world. NaN from a step on
             that did not converge, or was so hard that its derivatives are not known.
         """
-        tangents = PathTangents(path, outputs)
-        columns = [tangents.along(*change) for change in changes]
-        return {name: np.stack([one[name] for one in columns]) for name in outputs}
+        directions = tuple(changes)
+        shapes = {name: np.shape(path.quantity(name)) for name in outputs}
+        if _ADJOINT * sum(map(math.prod, shapes.values())) > len(directions):
+            tangents = PathTangents(path, outputs)
+            columns = [tangents.along(one) for one in directions]
+            return {name: np.stack([one[name] for one in columns]) for name in outputs}
+        found = {name: np.empty((len(directions), *shape)) for name, shape in shapes.items()}
+        for name, shape in shapes.items():
+            for place in np.ndindex(shape):
+                weight = np.zeros(shape)
+                weight[place] = 1.0
+                by = gradient(path, {name: weight})
+                found[name][:, *place] = [by.along(one) for one in directions]
+        return found
 
     def _assembled(self, robot: Robot) -> Prepared:
         if self.any_load:
             return prepared(robot, "space", loaded=True, refinement=self.refinement, flat=False)
         return prepared_for(robot, self.load, None, self.refinement)
 
-    def _prepared(self, robot: Robot) -> Prepared:
-        """The arrays of the robot with some other numbers; shape and laws are kept apart."""
+    @cached_property
+    def _prepared(self) -> Callable[[Robot], Prepared]:
+        """Arrays of the robot with some other numbers; a control loop asks for the same again."""
+        return lru_cache(maxsize=4)(self._varied)
+
+    def _varied(self, robot: Robot) -> Prepared:
         own, shape = self.robot, self._shape(robot)
+        # A search for constants of the material and friction varies a few numbers of the chain.
         if shape is self._shape(own) and robot.material.density == own.material.density:
             fields = laws(robot.material, shape) | laws(robot.friction, shape)
             return self.ready.with_fields(fields)

@@ -102,11 +102,9 @@ class KnownForm:
         behind = np.zeros((*numbers.shape[:-1], _BEHIND))
         return xp.concatenate([numbers[..., self._taken], behind], axis=-1)
 
-    def spread(self, vector: Float[np.ndarray, " unknown"]) -> Float[np.ndarray, " chain"]:
-        """Numbers of a vector where they stand in the whole chain, 0 for what is known."""
-        whole = np.zeros(self.form.size)
-        whole[self._taken] = vector[: len(self._taken)]
-        return whole
+    def places_of(self, places: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Where a vector holds numbers of the whole chain; its last place, a 0, if known."""
+        return np.where(self._known[places], self.size - 1, self._place[places])
 
     def unpack(self, vector: Any) -> Any:
         """The chain of a vector."""

@@ -42,7 +42,9 @@ def slope(
             found = np.stack([vector_of(float(value + width * point)) for point in points])
         except InputError:  # beyond what the number may be
             continue
-        return np.tensordot(weights, np.where(np.isfinite(found), found, 0.0), 1) / width
+        found = np.where(np.isfinite(found), found, 0.0)
+        # What does not change is 0, not a rounding error.
+        return np.tensordot(weights, found - found[0], 1) / width
     raise InputError(f"the number cannot be varied around {value:g}")
 
 

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex._native import native
@@ -29,7 +28,8 @@ VECTORS = ("tip_position", "body_position", "base_force", "base_moment")
 ROTATIONS = ("tip_rotation", "body_rotation")
 
 
-class Change(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Change:
     """Change of what a path is computed from, per unit of a number.
 
     Attributes:
@@ -39,6 +39,18 @@ class Change(NamedTuple):
 
     loads: Float[np.ndarray, "s command"] | None
     chain: Float[np.ndarray, " chain"] | None
+
+    def entries(self, form: KnownForm) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """Return where the chain changes, as packed for programs, and by how much."""
+        if form not in self._entries:
+            chain = np.zeros(0) if self.chain is None else self.chain
+            places = np.flatnonzero(chain)
+            self._entries[form] = form.places_of(places), chain[places]
+        return self._entries[form]
+
+    @cached_property
+    def _entries(self) -> dict[KnownForm, tuple[np.ndarray, np.ndarray]]:
+        return {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,22 +68,14 @@ class PathTangents:
     outputs: tuple[str, ...]
     remembers: bool = True
 
-    def along(
-        self,
-        loads: Float[np.ndarray, "s command"] | None,
-        chain: Float[np.ndarray, " chain"] | None = None,
-    ) -> dict[str, np.ndarray]:
+    def along(self, direction: Change) -> dict[str, np.ndarray]:
         """Differentiate along one direction.
-
-        Args:
-            loads: Change of the loads, packed for the long chain, steps as leading axis; None for
-                none.
-            chain: Change of the long chain, packed whole; None for none.
 
         Returns:
             Change of every output by name, in the world, steps as leading axis. NaN from a step on
             that did not converge, or was so hard that its derivatives are not known.
         """
+        loads, chain = direction.loads, direction.chain
         long = self.path.prepared.long
         form = long.known_form
         varies = chain is not None

@@ -22,7 +22,7 @@ from notchflex.statics.path import EquilibriumPath
 from notchflex.statics.prepare import prepared
 from notchflex.statics.run import run
 from notchflex.statics.solve import check_refinement
-from notchflex.statics.tangent import PathTangents
+from notchflex.statics.tangent import Change, PathTangents
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,9 @@ def tip_response(
     found = EquilibriumPath(robot, path, ready, came)
     # Each state is varied alone: what the contacts remember of the state before stays.
     tangents = PathTangents(found, ("tip_rotation", "tip_position"), remembers=False)
-    columns = [_pose_change(found, tangents.along(loads)) for loads in _unit_loads(found)]
+    columns = [
+        _pose_change(found, tangents.along(Change(loads, None))) for loads in _unit_loads(found)
+    ]
     slopes = np.stack(columns, axis=-1)
     turn = np.eye(6)
     if found.base_to_world is not None:
