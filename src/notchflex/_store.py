@@ -27,7 +27,7 @@ MOST_BYTES = 256 * 2**20
 _DIGEST = 32  # bytes
 _PREFIX = "program-"
 # Folders of the package whose code no program is made from.
-_NOT_COMPILED = {"bench", "cli", "comparison", "plotting", "results", "viewer"}
+_NOT_COMPILED = {"bench", "cli", "comparison", "fit", "plotting", "results", "viewer"}
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _POSIX = hasattr(os, "geteuid") and os.open in os.supports_dir_fd
 

@@ -1,8 +1,9 @@
-"""The forward model: gradients by the adjoint against tangents, natively; arrays of a varied robot."""
+"""The forward model: its derivatives, natively, and the arrays of a varied robot."""
 
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def test_adjoint_is_the_transpose_of_the_tangents(name, load, outputs, margin):
 
 
 def test_gradient_in_the_world_of_a_turned_base(margin):
-    load = nf.pull(0.5, 1.0, steps=2).turned((0.3, 0.2, -0.1))
+    load = replace(nf.pull(0.5, 1.0, steps=2), base_rotation=np.array([0.3, 0.2, -0.1]))
     path = nf.simulate(nf.load_robot("pacheco2021-a"), load)
     weights = {"tip_position": np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])}
     change = changes(path)

@@ -8,7 +8,7 @@ value, gradient and curvature. A trial value at which the model has no solution 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -121,12 +121,12 @@ def minimise(
     found = least_squares(
         residuals,
         np.zeros(len(first)),
-        jacobian,
+        cast("Any", jacobian),  # SciPy's annotations forget functions, and that it may be None
         (least, most),
         method="dogbox",
         ftol=tolerance,
         xtol=1e-10,
-        gtol=None,
+        gtol=cast("Any", None),
         max_nfev=_EVALUATIONS,
     )
     at, cost = values(found.x), cost_at(found.x)

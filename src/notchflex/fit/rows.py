@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
+from notchflex._jax import constant
 from notchflex.fit.measurements import rows_of
 from notchflex.robot import Robot
 from notchflex.statics.axis_points import AxisPlaces, points_on_axis
@@ -81,7 +82,7 @@ class Rows:
         load = rows_of(self.load, self._order)
         return ForwardModel(self.robot, load, self.settings, from_rest=from_rest)
 
-    def robot_with(self, numbers: Sequence[float]) -> Robot:
+    def robot_with(self, numbers: Sequence[float] | np.ndarray) -> Robot:
         """The robot with other numbers, in the order of `names`.
 
         Raises:
@@ -112,7 +113,7 @@ class Rows:
             slopes = self.model.derivatives(path, changes, names)
         if self.places is not None:
             places, bodies = self.places, [values[name] for name in _BODIES]
-            values["axis_points"] = points_on_axis(places, *bodies)
+            values["axis_points"] = _points(places, bodies)
             if slopes:
                 moves = zip(*(slopes[name] for name in _BODIES), strict=True)
                 every = [_points_slope(places, bodies, move) for move in moves]
@@ -155,6 +156,11 @@ class Rows:
         return Change(-self.model.load_change(path, more), None)
 
 
+def _points(places: AxisPlaces, bodies: Sequence[np.ndarray]) -> Float[np.ndarray, "p m 3"]:
+    position, rotation = map(constant, bodies)
+    return np.asarray(points_on_axis(places, position, rotation))
+
+
 def _points_slope(
     places: AxisPlaces, bodies: Sequence[np.ndarray], move: Sequence[np.ndarray]
 ) -> Float[np.ndarray, "p m 3"]:
@@ -162,9 +168,8 @@ def _points_slope(
     size = max(float(np.max(np.abs(one))) for one in move) or 1.0
 
     def points(part: float) -> np.ndarray:
-        return points_on_axis(
-            places, *(at + part / size * by for at, by in zip(bodies, move, strict=True))
-        )
+        moved = [at + part / size * by for at, by in zip(bodies, move, strict=True)]
+        return _points(places, moved)
 
     return size * slope(points, 0.0)
 

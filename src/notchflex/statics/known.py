@@ -96,8 +96,8 @@ class KnownForm:
     def _fits(self, numbers: Float[np.ndarray, "k chain"]) -> bool:
         return bool((numbers[:, self._known] == self._numbers[self._known]).all())
 
-    def pack(self, numbers: Float[np.ndarray, "*k chain"]) -> Float[np.ndarray, "*k unknown"]:
-        """Vectors of chains that are packed whole."""
+    def pack(self, numbers: Any) -> Any:
+        """Vectors of chains that are packed whole (NumPy's or JAX's), with leading axes."""
         xp = array_module(numbers)
         behind = np.zeros((*numbers.shape[:-1], _BEHIND))
         return xp.concatenate([numbers[..., self._taken], behind], axis=-1)
