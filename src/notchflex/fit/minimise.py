@@ -11,10 +11,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy.optimize import least_squares
-
-from notchflex.fit.curvature import unit_free
 
 _EVALUATIONS = 200
 # What a full step may still promise where the search ends, of the objective: at a kink, such as
@@ -131,7 +129,11 @@ def minimise(
     )
     at, cost = values(found.x), cost_at(found.x)
     assert cost is not None
-    settled = _promised(cost, at, lower, upper) <= _KINK * (1.0 + abs(cost.value))
+    # How much lower a full step of the values that are not at a limit should be.
+    residual, slopes = _squares(cost, scale)
+    free = slopes[:, found.active_mask == 0]
+    promised = 0.5 * np.sum((free @ np.linalg.lstsq(free, residual)[0]) ** 2)
+    settled = promised <= _KINK * (1.0 + cost.value)
     reason = "" if settled else "no step lowers the objective (a kink, or rounding)"
     if found.status == 0:
         reason = f"not settled after {_EVALUATIONS} evaluations"
@@ -157,24 +159,4 @@ def _squares(
     return np.append(along, rest), np.vstack([slopes, np.zeros(len(scale))])
 
 
-def free_of_limits(
-    gradient: Float[np.ndarray, " k"],
-    at: Float[np.ndarray, " k"],
-    lower: Float[np.ndarray, " k"],
-    upper: Float[np.ndarray, " k"],
-) -> Bool[np.ndarray, " k"]:
-    """Which values may move: not those at a limit that the slope pushes against."""
-    return ~(((at <= lower) & (gradient > 0.0)) | ((at >= upper) & (gradient < 0.0)))
-
-
-def _promised(cost: Cost, at: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
-    """By how much a full step would lower the objective, were it as simple as its curvature."""
-    free = free_of_limits(cost.gradient, at, lower, upper)
-    plain = unit_free(cost.curvature[np.ix_(free, free)])
-    values, vectors = np.linalg.eigh(plain.curvature)
-    along = vectors.T @ (cost.gradient[free] / plain.size)
-    known = values > 1e-12
-    return 0.5 * float(np.sum(along[known] ** 2 / values[known]))
-
-
-__all__ = ["Cost", "Minimum", "Objective", "free_of_limits", "minimise"]
+__all__ = ["Cost", "Minimum", "Objective", "minimise"]
