@@ -114,7 +114,12 @@ class ForwardModel:
         return there - here
 
     def derivatives(
-        self, path: EquilibriumPath, changes: Iterable[Change], outputs: tuple[str, ...]
+        self,
+        path: EquilibriumPath,
+        changes: Iterable[Change],
+        outputs: tuple[str, ...],
+        *,
+        remembers: bool = True,
     ) -> dict[str, np.ndarray]:
         """Differentiate a solved path.
 
@@ -122,6 +127,7 @@ class ForwardModel:
             path: As `solve` returns it.
             changes: Directions, one or more.
             outputs: Quantities that the solver reports as floats.
+            remembers: Whether changes pass from state to state through the memory of the contacts.
 
         Returns:
             By name, directions and then steps as leading axes, in the world. NaN from a step on
@@ -129,8 +135,8 @@ class ForwardModel:
         """
         directions = tuple(changes)
         shapes = {name: np.shape(path.quantity(name)) for name in outputs}
-        if _ADJOINT * sum(map(math.prod, shapes.values())) > len(directions):
-            tangents = PathTangents(path, outputs)
+        if not remembers or _ADJOINT * sum(map(math.prod, shapes.values())) > len(directions):
+            tangents = PathTangents(path, outputs, remembers)
             columns = [tangents.along(one) for one in directions]
             return {name: np.stack([one[name] for one in columns]) for name in outputs}
         found = {name: np.empty((len(directions), *shape)) for name, shape in shapes.items()}
@@ -154,6 +160,8 @@ class ForwardModel:
 
     def _varied(self, robot: Robot) -> Prepared:
         own, shape = self.robot, self._shape(robot)
+        if robot is own:
+            return self.ready
         # A search for constants of the material and friction varies a few numbers of the chain.
         if shape is self._shape(own) and robot.material.density == own.material.density:
             fields = laws(robot.material, shape) | laws(robot.friction, shape)
