@@ -16,9 +16,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from notchflex import _store
+from notchflex import _shipped, _store
 from notchflex._jax import jax, jit, jnp
-from notchflex.native import Program, UnknownHereError, processor, program
+from notchflex.native import Program, UnknownHereError, machine_code, processor, source
 
 # Rows that XLA's programs are made for; more are cut up, fewer filled up.
 _PIECES = (64, 256, 1024)
@@ -33,13 +33,15 @@ class CompiledFunction:
     """A program, and the form of what it returns.
 
     Args:
-        program: The program.
-        form: The returned tree with a shape and a kind of numbers for every array; see `_form`.
+        content: What `_content` returned, with machine code; plain data, nothing that is run when
+            it is read.
     """
 
-    def __init__(self, program: Program, form: Any) -> None:
-        """Take both."""
-        self.program, self.form = program, form
+    def __init__(self, content: bytes) -> None:
+        """Read it."""
+        head, code = _parts(content)
+        *own, self.form = head
+        self.program = Program(code, *own)
 
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
         """Return what the function returns, in NumPy's arrays."""
@@ -47,19 +49,16 @@ class CompiledFunction:
         rows = () if self.program.by_row is None else flat[0].shape[:1]
         return _filled(self.form, iter(flat), rows)
 
-    def to_bytes(self) -> bytes:
-        """Return it as bytes; plain data and machine code, nothing that is run when it is read."""
-        own = self.program
-        head = json.dumps([own.sizes, own.room, own.by_row, self.form])
-        return head.encode() + b"\n" + own.code
 
-    @classmethod
-    def from_bytes(cls, content: bytes) -> CompiledFunction:
-        """Read what `to_bytes` wrote."""
-        head, _, code = content.partition(b"\n")
-        sizes, room, by_row, form = json.loads(head)
-        rows = None if by_row is None else tuple(by_row)
-        return cls(Program(code, tuple(sizes), room, rows), form)
+def _content(head: Sequence[Any], body: bytes) -> bytes:
+    """A program as bytes: what it takes and returns, and its text or machine code."""
+    return json.dumps(head).encode() + b"\n" + body
+
+
+def _parts(content: bytes) -> tuple[list[Any], bytes]:
+    """The head and the body of what `_content` returned."""
+    head, _, body = content.partition(b"\n")
+    return json.loads(head), body
 
 
 def _form(tree: Any) -> Any:
@@ -96,6 +95,8 @@ class Native:
     made: ClassVar[OrderedDict[Any, CompiledFunction | None]] = OrderedDict()
     compiled: ClassVar[int] = 0
     """How many programs this process has compiled, not read from disk."""
+    traced: ClassVar[int] = 0
+    """How many of them it has traced, not found in the package."""
 
     def __init__(
         self, function: Callable[..., Any], vectors: int, long: Callable[..., Sequence[int]]
@@ -184,14 +185,35 @@ class Native:
         others: tuple[Any, ...],
     ) -> CompiledFunction | None:
         """The program, from disk or made and put there; None where XLA must make it."""
-        key = repr((self._name, how, by_row, shapes, others, processor()))
-        content = _store.read(key)
+        key = repr((self._name, how, by_row, shapes, others))
+        own = f"{key} {processor()}"
+        content = _store.read(own)
+        if content is None:
+            written = self._source(key, how, by_row, shapes, others)
+            if written is None:
+                return None
+            Native.compiled += 1
+            head, text = _parts(written)
+            content = _content(head, machine_code(text.decode()))
+            _store.write(own, content)
+        return CompiledFunction(content)
+
+    def _source(
+        self,
+        key: str,
+        how: str,
+        by_row: tuple[bool, ...] | None,
+        shapes: Sequence[Any],
+        others: tuple[Any, ...],
+    ) -> bytes | None:
+        """The program as text: shipped, or written now; None where XLA must make it."""
+        content = _shipped.read(key)
         if content is not None:
-            return CompiledFunction.from_bytes(content)
+            return content
         given = [np.zeros(shape) for shape in shapes]
         function = partial(self._with, others)
         try:
-            made, tree = program(
+            made, tree = source(
                 function, given, self._long(*others), by_row, carries=how == "along"
             )
         except UnknownHereError as error:
@@ -201,12 +223,12 @@ class Native:
                 stacklevel=2,
             )
             return None
-        Native.compiled += 1
-        if Native.compiled % _TRACES == 0:
+        Native.traced += 1
+        if Native.traced % _TRACES == 0:
             jax.clear_caches()
-        found = CompiledFunction(made, _form(tree))
-        _store.write(key, found.to_bytes())
-        return found
+        content = _content([made.sizes, made.room, by_row, _form(tree)], made.text.encode())
+        _shipped.record(key, content)
+        return content
 
     def _with(self, others: tuple[Any, ...], *vectors: Any) -> Any:
         return self._function(*vectors, *others)

@@ -113,19 +113,27 @@ def clear() -> Usage:
 
 
 @cache
+def code_digest() -> str:
+    """Return a digest of the code that programs are made from."""
+    root = os.path.dirname(__file__)
+    code = hashlib.sha256()
+    for folder, inner, files in os.walk(root):  # every process does this; pathlib takes longer
+        inner[:] = sorted(one for one in inner if folder != root or one not in _NOT_COMPILED)
+        for name in sorted(one for one in files if one.endswith(".py")):
+            path = os.path.join(folder, name)
+            with open(path, "rb", buffering=0) as file:
+                code.update(os.path.relpath(path, root).encode() + b"\0" + file.read() + b"\0")
+    return code.hexdigest()
+
+
+@cache
 def made_from() -> str:
     """Return a digest of what programs are made from beside their arguments: code and versions."""
     from importlib.metadata import version
 
-    root = Path(__file__).parent
-    code = hashlib.sha256()
-    for file in sorted(root.rglob("*.py")):
-        inside = file.relative_to(root)
-        if inside.parts[0] not in _NOT_COMPILED:
-            code.update(str(inside).encode() + b"\0" + file.read_bytes() + b"\0")
     versions = [version(name) for name in ("jax", "jaxlib", "llvmlite")]
     settings = [os.environ.get("XLA_FLAGS", ""), os.cpu_count()]
-    return hashlib.sha256(repr((code.hexdigest(), versions, settings)).encode()).hexdigest()
+    return hashlib.sha256(repr((code_digest(), versions, settings)).encode()).hexdigest()
 
 
 def _name(key: str) -> str:
@@ -247,6 +255,7 @@ __all__ = [
     "Usage",
     "chosen_folder",
     "clear",
+    "code_digest",
     "made_from",
     "program_folder",
     "read",

@@ -1,12 +1,10 @@
 """Programs of the small compiler against what JAX makes of the same functions."""
 
-import pickle
-
 import numpy as np
 import pytest
 
 from notchflex._jax import jax, jnp
-from notchflex.native import UnknownHereError, program
+from notchflex.native import Program, UnknownHereError, machine_code, source
 
 # Fewer than a vector's lanes, as many, more, and several vectors.
 SIZES = (1, 2, 3, 8, 13, 27, 40)
@@ -15,6 +13,12 @@ ROUNDING = 1e-13
 
 def given(size):
     return np.random.default_rng(size).normal(size=6 * size + 4)
+
+
+def program(function, given, long, by_row=None):
+    written, tree = source(function, given, long, by_row)
+    code = machine_code(written.text)
+    return Program(code, written.sizes, written.room, by_row), tree
 
 
 def single(function, *arrays, long):
@@ -191,12 +195,6 @@ def test_rows_of_their_own_and_what_all_share():
     np.testing.assert_allclose(found, np.asarray(wanted).reshape(19, -1), rtol=ROUNDING)
     (none,) = made([shared, own[:0]])
     assert none.shape == (0, 10)
-
-
-def test_a_program_is_pickled_and_runs_again():
-    made, _ = program(lambda values: jnp.cumsum(values) * 2.0, [np.ones(4)], (4,))
-    again = pickle.loads(pickle.dumps(made))
-    np.testing.assert_array_equal(again([np.ones(4)])[0], [2.0, 4.0, 6.0, 8.0])
 
 
 def test_what_is_not_known_is_said():

@@ -64,7 +64,7 @@ def doctor(*, clear_cache: ClearCache = False, json: JsonFile = None, quiet: Qui
 
 def examination() -> dict[str, Any]:
     """Return what `doctor` has found out, as plain values."""
-    from notchflex import _store
+    from notchflex import _shipped, _store
     from notchflex.cli.compile_cache import use_compile_cache
 
     use_compile_cache()
@@ -93,6 +93,7 @@ def examination() -> dict[str, Any]:
             "programs": kept.programs,
             "bytes": kept.size,
             "most_bytes": _store.MOST_BYTES,
+            "shipped": _shipped.count(),
         },
     }
 
@@ -189,6 +190,7 @@ def _print(found: dict[str, Any]) -> None:
             )
             if cache["folder"]
             else ("programs", "compiled in every process, not kept"),
+            ("shipped", f"{cache['shipped']} programs of typical calls; only a wheel carries them"),
         ],
     )
     section("\nExtras", [(name, _extra_words(extra)) for name, extra in found["extras"].items()])

@@ -2,7 +2,15 @@
 
 from notchflex.native.graph import UnknownHereError
 from notchflex.native.items import WIDTH
-from notchflex.native.machine import processor
-from notchflex.native.program import Program, program
+from notchflex.native.machine import machine_code, processor
+from notchflex.native.program import Program, Source, source
 
-__all__ = ["WIDTH", "Program", "UnknownHereError", "processor", "program"]
+__all__ = [
+    "WIDTH",
+    "Program",
+    "Source",
+    "UnknownHereError",
+    "machine_code",
+    "processor",
+    "source",
+]

@@ -16,7 +16,7 @@ from notchflex.native import WIDTH
 from notchflex.statics.packing import Form
 
 # From so many bodies on (left) numbers of bodies are multiples of so many (right).
-_STEPS = ((0, WIDTH), (2 * WIDTH, 2 * WIDTH), (8 * WIDTH, 4 * WIDTH), (16 * WIDTH, 8 * WIDTH))
+_STEPS = ((0, WIDTH), (2 * WIDTH, 2 * WIDTH), (16 * WIDTH, 4 * WIDTH), (32 * WIDTH, 8 * WIDTH))
 
 
 def capacity(flexures: int) -> int:
@@ -27,7 +27,7 @@ def capacity(flexures: int) -> int:
 
     Example:
         >>> [capacity(flexures) for flexures in (1, 5, 8, 27, 40, 100)]
-        [7, 7, 15, 31, 47, 127]
+        [7, 7, 15, 31, 47, 111]
     """
     bodies = flexures + 1
     step = max(own for least, own in _STEPS if bodies > least)

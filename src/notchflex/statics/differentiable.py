@@ -12,7 +12,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from notchflex._jax import jnp
+from notchflex._jax import jax, jnp
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.robot.paths import number_at
@@ -135,9 +135,10 @@ class Differentiable:
                 cannot be.
         """
         taken = self._taken(values)
-        if not any(isinstance(value, Tracer) for value in taken.values()):
-            self._check(taken)
-        return self._function(jnp.concatenate([taken[name].ravel() for name in self.start]))
+        if any(isinstance(value, Tracer) for value in taken.values()):
+            return self._traced(taken)
+        self._check(taken)
+        return self._function(self._flat(taken))
 
     def kinks(self, values: Mapping[str, Any] | None = None, *, within: float = 1e-6) -> list[Kink]:
         """List the contacts and notches at a switch, where derivatives are those of one side.
@@ -241,6 +242,8 @@ class Differentiable:
 
     def _value(self, name: str, value: Any) -> Array:
         wanted = self.start[name].shape
+        if isinstance(value, Tracer) and (value.shape, value.dtype) == (wanted, float):
+            return value  # JAX would compile even a conversion that changes nothing
         try:
             return jnp.broadcast_to(jnp.asarray(value, float), wanted)
         except (TypeError, ValueError):
@@ -262,6 +265,14 @@ class Differentiable:
         """The forward model of the robot and its loads."""
         free = bool(self._tip)
         return ForwardModel(self.robot, self.load, self.settings, self.refinement, any_load=free)
+
+    @cached_property
+    def _traced(self) -> Callable[[dict[str, Array]], dict[str, Array]]:
+        """The function of named values for JAX, as one program: JAX compiles each step else."""
+        return jax.jit(lambda taken: self._function(self._flat(taken)))
+
+    def _flat(self, taken: dict[str, Array]) -> Array:
+        return jnp.concatenate([taken[name].ravel() for name in self.start])
 
     @cached_property
     def _function(self) -> Callable[[Array], dict[str, Array]]:
