@@ -41,7 +41,7 @@ class Gao(NamedTuple):
 
 def gao_arrays(robot: Any) -> Gao:
     """Read the numbers of the robot off the library's chain."""
-    from notchflex.chain import assemble
+    from notchflex.mechanics.chain import assemble
 
     chain = assemble(robot, "tendons")
     rods, tendon, own = chain.rods, chain.groups[0], chain.elastic[0]

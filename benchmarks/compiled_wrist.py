@@ -33,7 +33,7 @@ class Wrist(NamedTuple):
 
 def wrist_arrays(robot: Any) -> Wrist:
     """Read the numbers of the wrist off the library's chain."""
-    from notchflex.chain import assemble
+    from notchflex.mechanics.chain import assemble
 
     chain, law = assemble(robot, "tendons"), robot.material
     rods, section = chain.rods, chain.rods.section

@@ -21,8 +21,8 @@ import numpy as np
 
 import notchflex as nf
 from notchflex.fit import calibrate, simulate_measurements
-from notchflex.robot.paths import number_at
-from notchflex.statics import LoadPath
+from notchflex.loads import LoadPath
+from notchflex.robot.value_names import number_at
 
 SEED = 0
 

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
+from notchflex.analysis import axis_points
 from notchflex.fit import Measurements, SumOfDistances, calibrate, simulate_measurements
-from notchflex.statics import axis_points
 
 NOISE = 0.1  # mm
 POINTS = np.linspace(1.0, 34.9, 30)  # mm along the straight axis

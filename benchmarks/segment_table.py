@@ -1,10 +1,10 @@
-"""Make src/notchflex/section/segment_table.csv with sectionproperties (half an hour, 2 cores).
+"""Make src/notchflex/mechanics/section/segment_table.csv with sectionproperties (half an hour, 2 cores).
 
     python benchmarks/segment_table.py --raw FILE     # writes the table
     python benchmarks/segment_table.py 0.864 0.7      # prints one section: r_i, depth over r_o
 
 Torsion constant and (Trefftz) shear centre of the annular segment of outer radius 1 at Chebyshev
-nodes of the coordinates that `notchflex.section.segment_torsion` interpolates over, by warping
+nodes of the coordinates that `notchflex.mechanics.section.segment_torsion` interpolates over, by warping
 analysis with quadratic triangles, three across the wall and smaller where it tapers. Divided by
 the estimates of `segment_estimates` and fitted by least squares. FILE keeps the values of the
 analysis: a second run only fits, or goes on where the mesher crashed.
@@ -20,7 +20,7 @@ from sectionproperties.analysis import Section
 from sectionproperties.pre import Geometry
 from shapely import Polygon, affinity
 
-TABLE = Path(__file__).parents[1] / "src/notchflex/section/segment_table.csv"
+TABLE = Path(__file__).parents[1] / "src/notchflex/mechanics/section/segment_table.csv"
 LAYERS = 3  # elements across the wall
 COARSEST = 0.1  # size of an element over the outer radius
 NODES = {"closed": (9, 16), "open": (9, 20), "solid": (1, 12)}  # ratios, chord angles
@@ -85,7 +85,7 @@ def analyse(ratio, depth):
 
 def places(shape):
     """Ratios and chord angles of the nodes, and the depths that they stand for."""
-    from notchflex.section.segment_torsion import CHORD_RANGE, RATIO_RANGE
+    from notchflex.mechanics.section.segment_torsion import CHORD_RANGE, RATIO_RANGE
 
     def nodes(count, low, high):
         x = np.cos(np.pi * (np.arange(count) + 0.5) / count)
@@ -124,8 +124,8 @@ def analyse_all(raw):
 def fit(shape, values):
     """Fit the factors: coefficients and largest relative residual of J and e."""
     from notchflex._jax import jnp
-    from notchflex.section import annular_segment, segment_estimates
-    from notchflex.section.segment_torsion import CHORD_RANGE, RATIO_RANGE
+    from notchflex.mechanics.section import annular_segment, segment_estimates
+    from notchflex.mechanics.section.segment_torsion import CHORD_RANGE, RATIO_RANGE
 
     ratio, angle, depth = places(shape)
     one = jnp.ones(len(ratio))

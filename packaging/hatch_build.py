@@ -1,4 +1,4 @@
-"""Records the programs of typical calls when a wheel is built; see `_shipped.py`."""
+"""Records the programs of typical calls when a wheel is built; see `solver/programs/shipped.py`."""
 
 import os
 import subprocess

@@ -25,7 +25,7 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["JAX_NUMPY_RANK_PROMOTION"] = "raise"
     # Most of the time goes into compiling programs that are run a few times. Unoptimised code is
     # compiled in a third of the time; that the optimised code of users finds the same numbers is
-    # a test of its own (tests/statics/test_as_users_run_it.py).
+    # a test of its own (tests/solver/test_as_users_run_it.py).
     flags = os.environ.get("XLA_FLAGS", "")
     options = ["--xla_backend_optimization_level=0"]
     # The library's own programs go without these emitters (_jax.py); functions that users
@@ -58,4 +58,4 @@ def room_for_compiled_code() -> Iterator[None]:
     with maps.open() as lines:
         if sum(1 for _ in lines) > _PIECES:
             jax.clear_caches()
-            sys.modules["notchflex._native"].Native.made.clear()
+            sys.modules["notchflex.solver.programs.compiled"].Native.made.clear()

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from notchflex import load_robot
-from notchflex.chain import assemble
-from notchflex.statics.external import NOTHING
+from notchflex.loads.external import NOTHING
+from notchflex.mechanics.chain import assemble
 
 CENTROID = 0.6865  # mm, of the section of wrist A
 CLOSING = np.radians(30.63)

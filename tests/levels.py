@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import notchflex as nf
-from notchflex.statics.command import command
-from notchflex.statics.load import load_path
-from notchflex.statics.newton import Settings
-from notchflex.statics.path import EquilibriumPath
-from notchflex.statics.prepare import prepared
-from notchflex.statics.run import run
+from notchflex.loads.command import command
+from notchflex.loads.conversion import load_path
+from notchflex.results.path import EquilibriumPath
+from notchflex.solver.newton import Settings
+from notchflex.solver.programs.prepare import prepared
+from notchflex.solver.programs.run import run
 
 
 def simulate_at(robot: nf.Robot, loads, level: str, *, loaded: bool = False) -> EquilibriumPath:

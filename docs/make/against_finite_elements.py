@@ -9,7 +9,7 @@ import numpy as np
 from page import table
 
 import notchflex as nf
-from notchflex.friction import friction_law
+from notchflex.mechanics.friction import friction_law
 from notchflex.plotting.style import BLUE, VERMILLION, house_style, new_figure, save
 from reference_data import FOLDER
 

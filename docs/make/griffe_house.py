@@ -19,7 +19,7 @@ class House(griffe.Extension):
     """Take `@part` as a dataclass, `Annotated` as its plain type, `Example:` as code."""
 
     def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
-        """Let `notchflex.solve` be the function of `statics/solve.py`, not that module."""
+        """Let `notchflex.solve` be the function of `analysis/solve.py`, not that module."""
         for name, member in list(pkg.members.items()):
             if not isinstance(member, griffe.Alias) or not member.target_path.startswith(pkg.path):
                 continue

@@ -1,4 +1,4 @@
-"""Writes src/notchflex/statics/quantity_properties.py from the one table of quantities.
+"""Writes src/notchflex/results/quantities/properties.py from the one table of quantities.
 
 `python docs/make/quantity_properties.py`; a test compares the file with `module()`. Type checkers,
 editors and Tab completion read written properties, so they are written out, and only by this.
@@ -9,15 +9,15 @@ from __future__ import annotations
 import textwrap
 from pathlib import Path
 
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.quantity import Quantity
+from notchflex.results.quantities.quantity import Quantity
+from notchflex.results.quantities.registry import QUANTITIES
 
-FILE = Path(__file__).resolve().parents[2] / "src/notchflex/statics/quantity_properties.py"
+FILE = Path(__file__).resolve().parents[2] / "src/notchflex/results/quantities/properties.py"
 WIDTH = 100
 HEAD = '''\
 """Typed properties for every quantity of a path and of an equilibrium.
 
-Written by `docs/make/quantity_properties.py` from `results/quantities.py`: change it there.
+Written by `docs/make/quantity_properties.py` from `results/quantities/registry.py`: change it there.
 """
 
 from __future__ import annotations

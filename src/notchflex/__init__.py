@@ -32,8 +32,12 @@ _HOME = {
     ),
     **dict.fromkeys(("read_path", "read_table", "save_path"), "notchflex.results"),
     "plot": "notchflex._plot",
-    **dict.fromkeys(("Section", "annular_sector", "annular_segment"), "notchflex.section"),
-    **dict.fromkeys(("Elastica", "elastica", "modulus_from_single_notch"), "notchflex.flexure"),
+    **dict.fromkeys(
+        ("Section", "annular_sector", "annular_segment"), "notchflex.mechanics.section"
+    ),
+    **dict.fromkeys(
+        ("Elastica", "elastica", "modulus_from_single_notch"), "notchflex.mechanics.flexure"
+    ),
     **dict.fromkeys(
         (
             "Batch",

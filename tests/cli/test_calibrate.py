@@ -11,8 +11,9 @@ import pytest
 import notchflex as nf
 import notchflex.fit as fitting
 from fitted import NAMES, OBSERVED, ROBOT, fitted, measured
-from notchflex.cli import calibrate_tables, run
-from notchflex.cli.calibrate_words import parse_fit, parse_pairs, robots_of
+from notchflex.cli import run
+from notchflex.cli.arguments.calibrate_words import parse_fit, parse_pairs, robots_of
+from notchflex.cli.tables import calibrate_tables
 from notchflex.fit import Fold, LeftOut, Posterior
 
 FIT = ("--fit", ",".join(NAMES), "--starts", "1")

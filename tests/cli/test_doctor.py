@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from notchflex import _canary, _store
+from notchflex import _canary
 from notchflex.cli import run
-from notchflex.cli.doctor import requirements
+from notchflex.cli.verbs.doctor import requirements
+from notchflex.solver.programs import store as _store
 
 
 @pytest.fixture

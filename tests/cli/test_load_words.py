@@ -1,7 +1,7 @@
 """External loads in the head of the table."""
 
-from notchflex.cli.load_words import in_words, load_sentences
-from notchflex.statics.external import NOTHING, BodyForce, ExternalLoad
+from notchflex.cli.tables.load_words import in_words, load_sentences
+from notchflex.loads.external import NOTHING, BodyForce, ExternalLoad
 
 PUSH = ExternalLoad(tip_force=(0.0, 0.0, -0.2), tip_point=(0.0, 0.0, 1.5))
 

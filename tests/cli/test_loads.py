@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.cli.loads import parse_body_force, parse_loads, put_on
+from notchflex.cli.arguments.loads import parse_body_force, parse_loads, put_on
 from notchflex.errors import InputError
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from notchflex import load_robot
 from notchflex.cli import run
-from notchflex.cli.readings import choice, reading, readings, whole
+from notchflex.cli.interview.readings import choice, reading, readings, whole
 from notchflex.errors import InputError
 
 OPTIONS = {

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fake_path import fake_path
-from notchflex.cli.path_columns import MEANINGS, parse_columns, usual_groups
-from notchflex.cli.path_rows import MOST_ROWS, all_rows, reversals_of, rows_note, shown_rows
-from notchflex.cli.path_table import print_path
+from notchflex.cli.tables.path_columns import MEANINGS, parse_columns, usual_groups
+from notchflex.cli.tables.path_rows import MOST_ROWS, all_rows, reversals_of, rows_note, shown_rows
+from notchflex.cli.tables.path_table import print_path
 from notchflex.errors import InputError
-from notchflex.results.quantities import QUANTITIES
+from notchflex.results.quantities.registry import QUANTITIES
 
 
 def commanded(*tension):

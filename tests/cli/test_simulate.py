@@ -88,9 +88,9 @@ def test_named_columns(call, monkeypatch):
 def test_quiet_computes_only_what_it_warns_of(call, monkeypatch):
     made, asked = [], []
     monkeypatch.setattr(
-        "notchflex.cli.path_table.print_path", lambda *_, **__: made.append("table")
+        "notchflex.cli.tables.path_table.print_path", lambda *_, **__: made.append("table")
     )
-    monkeypatch.setattr("notchflex.results.carry.whole_document", lambda _: made.append("json"))
+    monkeypatch.setattr("notchflex.results.files.io.whole_document", lambda _: made.append("json"))
     for name in ("reason", "dissipation", "tendon_work", "front"):
 
         def spy(path, name=name):

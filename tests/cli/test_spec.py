@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from notchflex.cli.spec import load_columns, parse_spec, parse_vector
+from notchflex.cli.arguments.spec import load_columns, parse_spec, parse_vector
 from notchflex.errors import InputError
 
 NUMBERS = st.floats(0.0, 100.0, allow_nan=False)

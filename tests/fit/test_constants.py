@@ -6,7 +6,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.fit import Constant
-from notchflex.fit.constants import unknowns
+from notchflex.fit.model.constants import unknowns
 
 TWO = {"A": nf.load_robot("pacheco2021-a"), "B": nf.load_robot("pacheco2021-b")}
 

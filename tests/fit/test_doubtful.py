@@ -5,7 +5,7 @@ import pytest
 
 import notchflex as nf
 from fitted import DEVIATION, NAMES, OBSERVED, ROBOT, fitted, measured
-from notchflex.cli.calibrate_tables import print_calibration
+from notchflex.cli.tables.calibrate_tables import print_calibration
 from notchflex.fit import (
     Constant,
     LeastSquares,
@@ -20,9 +20,9 @@ from notchflex.fit import (
     write_fitted,
 )
 from notchflex.fit.documents import calibration_document
-from notchflex.fit.problem import Problem
-from notchflex.fit.samples import Samples
-from notchflex.plotting.calibration_rows import Part, data_panel, residual_panel
+from notchflex.fit.estimation.problem import Problem
+from notchflex.fit.model.samples import Samples
+from notchflex.plotting.fits.calibration_rows import Part, data_panel, residual_panel
 from notchflex.plotting.sheet import Line
 
 WRIST = nf.load_robot(ROBOT)

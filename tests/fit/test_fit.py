@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex._native import Native
 from notchflex.fit import (
     Constant,
     LeastSquares,
@@ -18,10 +17,11 @@ from notchflex.fit import (
     read_measurements,
     simulate_measurements,
 )
-from notchflex.fit.constants import unknowns
-from notchflex.fit.problem import Problem
-from notchflex.fit.samples import Samples
-from notchflex.robot.paths import number_at
+from notchflex.fit.estimation.problem import Problem
+from notchflex.fit.model.constants import unknowns
+from notchflex.fit.model.samples import Samples
+from notchflex.robot.value_names import number_at
+from notchflex.solver.programs.compiled import Native
 from shared_data import measured_path
 
 WRIST = nf.load_robot("pacheco2021-a")

@@ -6,12 +6,13 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.chain import Chain
-from notchflex.statics.actuation import Command, command_residual
-from notchflex.statics.element import Memory, at_bound
-from notchflex.statics.newton import Point
-from notchflex.statics.stepping import Solved
-from notchflex.statics.walk import evaluate
+from notchflex.loads.command import Command
+from notchflex.mechanics.chain import Chain
+from notchflex.solver.actuation import command_residual
+from notchflex.solver.continuation import Solved
+from notchflex.solver.element import Memory, at_bound
+from notchflex.solver.newton import Point
+from notchflex.solver.residual import evaluate
 
 # Closed lips and tendons drawn by stroke are held by springs this much stiffer than the notches:
 # they only stiffen; without it their forces would be multipliers and the stiffness not defined.

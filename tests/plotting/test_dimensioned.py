@@ -9,10 +9,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import notchflex as nf
 from notchflex.errors import InputError
-from notchflex.plotting.bent import bent_by_angles
-from notchflex.plotting.dimensioned import MOST, dimensioned_figure, save_dimensioned
-from notchflex.plotting.notch_views import notch_view
-from notchflex.plotting.outline import outline
+from notchflex.plotting.drawings.dimensioned import MOST, dimensioned_figure, save_dimensioned
+from notchflex.plotting.drawings.notch_views import notch_view
+from notchflex.plotting.shapes.bent import bent_by_angles
+from notchflex.plotting.shapes.outline import outline
 from notchflex.robot.kinds import Notch
 
 ROBOTS = ["pacheco2021-a", "pacheco2021-c", "york2015", "liu2022", "gao2017", "two-axis-wrist"]

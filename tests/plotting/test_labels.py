@@ -16,6 +16,7 @@ from fitted import DEVIATION, NAMES, OBSERVED
 from notchflex.cli import run
 from notchflex.fit import calibrate, simulate_measurements
 from notchflex.plotting import (
+    Picture,
     beside_picture,
     calibration_picture,
     comparison_picture,
@@ -23,8 +24,7 @@ from notchflex.plotting import (
     path_picture,
     save_animation,
 )
-from notchflex.plotting.labels import SYMBOLS, for_browser, for_paper, heading_lines
-from notchflex.plotting.sheet import Picture
+from notchflex.plotting.renderers.labels import SYMBOLS, for_browser, for_paper, heading_lines
 
 NASTY = r"$x_1$ \frac{a} $5 100 % & <b>bold</b> %{x} a_b \$ </script>"
 WRIST = "pacheco2021-a"

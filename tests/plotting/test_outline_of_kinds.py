@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.bent import bent_by_angles
-from notchflex.plotting.outline import outline
-from notchflex.plotting.space import _walls
+from notchflex.plotting.shapes.bent import bent_by_angles
+from notchflex.plotting.shapes.outline import outline
+from notchflex.plotting.shapes.space import _walls
 
 
 def shape_of(name, angle=0.0):

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from fake_path import CLOSING, fake_path
-from notchflex.chain import assemble
 from notchflex.errors import InputError
+from notchflex.loads.external import BodyForce, ExternalLoad
+from notchflex.mechanics.chain import assemble
 from notchflex.plotting import path_figure, path_picture, save
-from notchflex.plotting.bent import bent, bent_at
 from notchflex.plotting.drive import abscissa, branches, way_of
-from notchflex.plotting.outline import bending_plane, outline
+from notchflex.plotting.shapes.bent import bent, bent_at
+from notchflex.plotting.shapes.outline import bending_plane, outline
+from notchflex.plotting.shapes.wrist import load_label, telling_steps
 from notchflex.plotting.sheet import Area, Level
-from notchflex.plotting.wrist import load_label, telling_steps
 from notchflex.robot import Linear
-from notchflex.statics.external import BodyForce, ExternalLoad
 
 
 def outline_at(path, step):

@@ -8,10 +8,13 @@ import pytest
 
 import notchflex as nf
 from fake_path import fake_path
+from notchflex.analysis import Batch
 from notchflex.comparison import compare
 from notchflex.errors import InputError
 from notchflex.fit import weight_held
+from notchflex.loads import ExternalLoad
 from notchflex.plotting import (
+    Picture,
     batch_picture,
     beside_picture,
     comparison_picture,
@@ -22,10 +25,9 @@ from notchflex.plotting import (
     state_picture,
 )
 from notchflex.plotting.animation import MOST_FRAMES, frames_of
-from notchflex.plotting.labels import for_browser as html
-from notchflex.plotting.sheet import Area, Bars, Cell, Line, Panel, Picture
-from notchflex.results.quantities import QUANTITIES
-from notchflex.statics import Batch, ExternalLoad
+from notchflex.plotting.renderers.labels import for_browser as html
+from notchflex.plotting.sheet import Area, Bars, Cell, Line, Panel
+from notchflex.results.quantities.registry import QUANTITIES
 
 SUFFIXES = (".png", ".svg", ".pdf", ".html")
 

@@ -6,9 +6,9 @@ import pytest
 
 import notchflex as nf
 from fake_path import fake_path
-from notchflex.chain import assemble
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.spans import holds, spans_of
+from notchflex.mechanics.chain import assemble
+from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities.spans import holds, spans_of
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from notchflex import Capstan
-from notchflex.friction import friction_law
+from notchflex.mechanics.friction import friction_law
 from reference_data import FOLDER
 
 COEFFICIENT = 0.13

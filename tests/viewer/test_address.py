@@ -22,7 +22,7 @@ def test_this_machine_only_by_default_and_a_warning_otherwise():
 def test_the_default_of_the_viewer_is_this_machine():
     import inspect
 
-    from notchflex.cli.view import view
+    from notchflex.cli.verbs.view import view
 
     viewer = pytest.importorskip("notchflex.viewer.viewer")
     assert inspect.signature(viewer.Viewer.__init__).parameters["host"].default == HOST
@@ -79,7 +79,7 @@ def test_a_bad_port_is_told(port):
 
 def test_importing_the_package_of_the_viewer_needs_nothing_of_it():
     code = (
-        "import sys, notchflex.viewer, notchflex.cli.view\n"
+        "import sys, notchflex.viewer, notchflex.cli.verbs.view\n"
         "print({'viser', 'jax', 'matplotlib', 'trimesh'} & set(sys.modules))"
     )
     done = subprocess.run(

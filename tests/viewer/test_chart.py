@@ -9,7 +9,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.viewer import Session
-from notchflex.viewer.chart import Line, chart, ticks
+from notchflex.viewer.page.chart import Line, chart, ticks
 from robots import ready
 
 pytest.importorskip("matplotlib")
@@ -51,7 +51,7 @@ def test_many_points_are_thinned_but_not_their_ends():
 
 
 def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
-    from notchflex.viewer.charts import loop_chart, tendon_chart
+    from notchflex.viewer.page.charts import loop_chart, tendon_chart
 
     session = Session(ready("A"))
     for tension in (1.0, 2.0, 1.0):
@@ -68,7 +68,7 @@ def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
 
 def test_colours_of_contacts_and_strains():
     from notchflex.plotting.style import BLUE, GREEN, GREY, VERMILLION
-    from notchflex.viewer.colours import BEYOND, METAL, of_contacts, of_strain
+    from notchflex.viewer.scene.colours import BEYOND, METAL, of_contacts, of_strain
 
     robot = ready("A").with_value("friction.wrap", "geometric")
     session = Session(robot)
@@ -94,7 +94,7 @@ def cells(text):
 
 
 def test_the_table_tells_units_strain_and_closed_notches():
-    from notchflex.viewer.readout import readout
+    from notchflex.viewer.page.readout import readout
 
     session = Session(ready("A"))
     session.go(session.controls.with_tendon(0, "tension", 0.5))
@@ -113,8 +113,8 @@ def test_the_table_tells_units_strain_and_closed_notches():
 
 
 def test_a_strain_without_a_limit_says_so():
-    from notchflex.viewer.legend import legend_html
-    from notchflex.viewer.readout import readout
+    from notchflex.viewer.page.legend import legend_html
+    from notchflex.viewer.page.readout import readout
 
     robot = ready("A")
     robot = robot.replace(material=replace(robot.material, allowed_strain=None))
@@ -126,7 +126,7 @@ def test_a_strain_without_a_limit_says_so():
 
 @pytest.mark.parametrize("name", ["A", "gao2017"])
 def test_no_sign_before_a_zero(name):
-    from notchflex.viewer.readout import readout
+    from notchflex.viewer.page.readout import readout
 
     robot = ready(name) if name == "A" else nf.load_robot(name)
     found = cells(readout(Session(robot)))
@@ -136,7 +136,7 @@ def test_no_sign_before_a_zero(name):
 
 def test_every_colour_means_one_thing():
     from notchflex.plotting.curves import COLOUR
-    from notchflex.viewer.legend import BALL, entries
+    from notchflex.viewer.page.legend import BALL, entries
 
     told = entries(ready("A"))
     balls = [one.colour for one in told if one.mark == BALL]
@@ -147,7 +147,7 @@ def test_every_colour_means_one_thing():
 
 
 def test_by_stroke_the_loop_is_drawn_against_stroke():
-    from notchflex.viewer.charts import loop, loop_chart
+    from notchflex.viewer.page.charts import loop, loop_chart
 
     session = Session(ready("A"))
     for stroke in (0.0, 1.0, 2.0, 1.5):

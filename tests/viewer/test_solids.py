@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.bent import bent_at
-from notchflex.viewer.skins import PIECES, at_rest, skins
-from notchflex.viewer.solids import ROUND, body_solids
+from notchflex.plotting.shapes.bent import bent_at
+from notchflex.viewer.scene.skins import PIECES, at_rest, skins
+from notchflex.viewer.scene.solids import ROUND, body_solids
 from robots import ready
 
 trimesh = pytest.importorskip("trimesh", reason="the extra `viewer` is not installed")

@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from notchflex._store import VARIABLE
 from notchflex.errors import InputError
+from notchflex.solver.programs.store import VARIABLE
 
 _FIRST = """
 import time

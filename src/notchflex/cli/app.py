@@ -16,7 +16,7 @@ from cyclopts import App, CycloptsError
 from notchflex import __version__
 from notchflex.cli import terminal
 from notchflex.errors import InputError
-from notchflex.results.streams import let_go
+from notchflex.results.files.streams import let_go
 
 DONE = 0
 NOT_CONVERGED = 1

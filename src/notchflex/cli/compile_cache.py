@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 
-from notchflex import _store
+from notchflex.solver.programs import store as _store
 
 
 def use_compile_cache() -> None:
     """Let JAX keep its compiled programs beside those of the library.
 
-    The library keeps its own programs in every process (`_store.py`). JAX's settings belong to the
+    The library keeps its own programs in every process (`solver/programs/store.py`). JAX's settings belong to the
     whole process, so that they are changed on the command line only.
     """
     folder = _store.program_folder()

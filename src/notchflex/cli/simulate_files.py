@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from notchflex._extras import need
 from notchflex.cli import terminal
 from notchflex.errors import InputError
-from notchflex.results.files import (
+from notchflex.results.files.writing import (
     BROWSER,
     MOVING,
     PAPER,
@@ -21,7 +21,7 @@ from notchflex.results.files import (
 )
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 Outputs = Mapping[str, str | None]
 """Option, such as `--json`, to the file that it names; None where it was not given."""
@@ -55,7 +55,7 @@ def check_files(outputs: Outputs, inputs: Sequence[FilePath], *, steps: int, sev
             raise InputError(f"{option} - : this is no text; name a file.")
         check_output(target, option, inputs=inputs)
         if option == "--nc":
-            from notchflex.results.carry import need_netcdf
+            from notchflex.results.files.io import need_netcdf
 
             need_netcdf(option)
         if option == "--parquet":
@@ -75,8 +75,8 @@ def write_files(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: s
     """
     path, *others = paths.values()
     if target := outputs["--json"]:
-        from notchflex.results.carry import whole_document
-        from notchflex.results.json import write_json
+        from notchflex.results.files.io import whole_document
+        from notchflex.results.files.json import write_json
 
         document = whole_document(path)
         if others:
@@ -84,15 +84,15 @@ def write_files(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: s
             document["beside"] = {label: whole_document(other) for label, other in rest}
         write_json(target, document)
     if target := outputs["--csv"]:
-        from notchflex.results.csv import write_path_csv
+        from notchflex.results.files.csv import write_path_csv
 
         write_path_csv(target, path)
     if target := outputs["--nc"]:
-        from notchflex.results.carry import write_netcdf
+        from notchflex.results.files.io import write_netcdf
 
         write_netcdf(target, path)
     if target := outputs["--parquet"]:
-        from notchflex.results.parquet import write_parquet
+        from notchflex.results.files.parquet import write_parquet
 
         write_parquet(target, path)
     if target := outputs["--plot"]:

@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, TextIO
 
-from notchflex.results.streams import let_go
+from notchflex.results.files.streams import let_go
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -11,18 +11,18 @@ from jaxtyping import Bool, Float
 from numpy.typing import NDArray
 
 from notchflex._jax import constant
+from notchflex.analysis import axis_points, equal_stroke, tip_from_angles
 from notchflex.errors import InputError
-from notchflex.fit.branch_residuals import branch_difference, branch_words
-from notchflex.fit.measurements import Measurements
-from notchflex.fit.residuals import misfit, outputs_for
-from notchflex.fit.rows import Predicted
-from notchflex.fit.solved_rows import solved_rows
-from notchflex.motion import rotation_about
+from notchflex.fit.measurements.measurements import Measurements
+from notchflex.fit.model.branch_residuals import branch_difference, branch_words
+from notchflex.fit.model.residuals import misfit, outputs_for
+from notchflex.fit.model.rows import Predicted
+from notchflex.fit.model.solved_rows import solved_rows
+from notchflex.mechanics.motion import rotation_about
 from notchflex.robot import Robot
-from notchflex.statics import axis_points, equal_stroke, tip_from_angles
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 _COLUMNS = ("tension", "stroke", "notch_angle", "total_angle", "tip_position", "converged")
 # What has no column of its own in a comparison: only its error is told.

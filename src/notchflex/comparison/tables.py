@@ -9,13 +9,13 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.comparison.comparison import Comparison
-from notchflex.fit.errors_of_parts import edge
-from notchflex.results.json import document_head
-from notchflex.results.quantities import AXES, DEGREES, QUANTITIES
+from notchflex.fit.assessment.errors_of_parts import edge
+from notchflex.results.files.json import document_head
+from notchflex.results.quantities.registry import AXES, DEGREES, QUANTITIES
 
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
-    """Return a comparison as a document for `notchflex.results.json.write_json`.
+    """Return a comparison as a document for `notchflex.results.files.json.write_json`.
 
     Args:
         comparison: The comparison.

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from notchflex import __version__
-from notchflex.fit.calibration import Calibration
-from notchflex.fit.diagnosis import diagnose
-from notchflex.fit.errors_of_parts import edge, errors_of_parts
-from notchflex.fit.folds import LeftOut
-from notchflex.fit.measurements import OBSERVED
-from notchflex.fit.next_measurement import NextMeasurement
-from notchflex.fit.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
-from notchflex.fit.posterior import Posterior
-from notchflex.results.json import plain
-from notchflex.results.quantities import QUANTITIES
+from notchflex.fit.assessment.diagnosis import diagnose
+from notchflex.fit.assessment.errors_of_parts import edge, errors_of_parts
+from notchflex.fit.assessment.folds import LeftOut
+from notchflex.fit.assessment.next_measurement import NextMeasurement
+from notchflex.fit.assessment.posterior import Posterior
+from notchflex.fit.estimation.calibration import Calibration
+from notchflex.fit.estimation.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
+from notchflex.fit.measurements.measurements import OBSERVED
+from notchflex.results.files.json import plain
+from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot.robot import to_table
 
 # An objective's value is a sum of these; half a chi squared has no unit.
@@ -25,7 +25,7 @@ _UNIT_OF_COST: dict[type, str] = {SumOfRobotErrors: "deg", SumOfDistances: "mm"}
 
 
 def calibration_document(found: Calibration) -> dict[str, Any]:
-    """Return a fit as a document for `notchflex.results.json.write_json`.
+    """Return a fit as a document for `notchflex.results.files.json.write_json`.
 
     Args:
         found: The fit.

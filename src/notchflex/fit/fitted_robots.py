@@ -8,11 +8,11 @@ from math import isfinite
 from pathlib import Path
 
 from notchflex.errors import InputError
-from notchflex.fit.calibration import Calibration
-from notchflex.fit.constants import Unknown
 from notchflex.fit.documents import data_of
-from notchflex.fit.rows import SENSOR
-from notchflex.results.files import check_folder, write_text
+from notchflex.fit.estimation.calibration import Calibration
+from notchflex.fit.model.constants import Unknown
+from notchflex.fit.model.rows import SENSOR
+from notchflex.results.files.writing import check_folder, write_text
 from notchflex.robot import robot_text
 from notchflex.robot.robot import source_of
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from notchflex.fit.diagnosis import NO_PROBLEMS, diagnose, with_unit
-from notchflex.fit.errors_of_parts import edge
-from notchflex.fit.folds import root_mean_squares
-from notchflex.fit.intervals import Interval
+from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
+from notchflex.fit.assessment.errors_of_parts import edge
+from notchflex.fit.assessment.folds import root_mean_squares
+from notchflex.fit.estimation.intervals import Interval
 
 if TYPE_CHECKING:
-    from notchflex.fit.calibration import Calibration
+    from notchflex.fit.estimation.calibration import Calibration
 
 
 def summary(found: Calibration) -> str:

@@ -11,11 +11,11 @@ from notchflex.plotting.curves import COLOUR, LINE
 from notchflex.plotting.drive import LOADING, UNLOADING, abscissa, branches, drive, way_of
 from notchflex.plotting.sheet import BESIDE, Item, Line, Panel
 from notchflex.plotting.style import sequence_colours
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.spans import spans_of
+from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities.spans import spans_of
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 MOST_STEPS = 6
 MOST_TENDONS = 8

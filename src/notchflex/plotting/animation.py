@@ -13,16 +13,17 @@ import numpy as np
 from notchflex.errors import InputError
 from notchflex.plotting.curves import notches_panel, total_panel
 from notchflex.plotting.drive import abscissa
+from notchflex.plotting.output import Picture
 from notchflex.plotting.path import plane_of, shape_panel
-from notchflex.plotting.sheet import Area, Cell, Faces, Panel, Picture
+from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
+from notchflex.plotting.shapes.wrist import telling_steps
+from notchflex.plotting.sheet import Area, Cell, Faces, Panel
 from notchflex.plotting.style import BLACK, BLUE, house_style
-from notchflex.plotting.with_matplotlib import draw_panel, figure_of
-from notchflex.plotting.wrist import telling_steps
-from notchflex.results.files import MOVING, check_picture, replacing
-from notchflex.results.quantities import QUANTITIES
+from notchflex.results.files.writing import MOVING, check_picture, replacing
+from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 MOST_FRAMES = 48
 """Steps of a long path that are shown."""

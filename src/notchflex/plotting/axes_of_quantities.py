@@ -15,16 +15,16 @@ from notchflex.errors import InputError
 from notchflex.plotting.curves import COLOUR, LINE, failures, solved_only
 from notchflex.plotting.drive import LOADING, UNLOADING, branches, drive
 from notchflex.plotting.equilibrium import robot_shape, state_shape
+from notchflex.plotting.renderers.with_matplotlib import draw_panel
 from notchflex.plotting.sheet import BESIDE, INSIDE, Item, Line, Panel
 from notchflex.plotting.style import house_style, sequence_colours
-from notchflex.plotting.with_matplotlib import draw_panel
-from notchflex.results.csv import Entry, entries_of, is_listed
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.quantity import Quantity
+from notchflex.results.files.csv import Entry, entries_of, is_listed
+from notchflex.results.quantities.quantity import Quantity
+from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 STEP = "step"
 """What stands for the number of the step, from 1."""
@@ -61,7 +61,7 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
     Raises:
         InputError: It can't be drawn on one pair of axes, or there is no such quantity.
     """
-    from notchflex.statics import Equilibrium, EquilibriumPath
+    from notchflex.results import Equilibrium, EquilibriumPath
 
     if isinstance(thing, EquilibriumPath):
         if x is None or y is None:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
-from notchflex.plotting.sheet import BESIDE, Cell, Item, Line, Panel, Picture
+from notchflex.plotting.output import Picture
+from notchflex.plotting.sheet import BESIDE, Cell, Item, Line, Panel
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities import QUANTITIES
+from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.statics import Batch
+    from notchflex.analysis import Batch
 
 MOST_COLUMNS = 12
 """Entries of a quantity, such as its notches, that are drawn; of more, some spread evenly."""

@@ -9,18 +9,19 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.plotting.along import SLACK
-from notchflex.plotting.comparison import MODEL_COLOURS
 from notchflex.plotting.curves import LINE, failures, solved_only
 from notchflex.plotting.drive import LOADING, UNLOADING, abscissa, branches, drive, way_of
+from notchflex.plotting.fits.comparison import MODEL_COLOURS
+from notchflex.plotting.output import Picture
 from notchflex.plotting.path import plane_of, shape_panel
-from notchflex.plotting.sheet import BELOW, Cell, Colour, Item, Line, Note, Panel, Picture
+from notchflex.plotting.shapes.wrist import telling_steps
+from notchflex.plotting.sheet import BELOW, Cell, Colour, Item, Line, Note, Panel
 from notchflex.plotting.style import GREY, rgb
-from notchflex.plotting.wrist import telling_steps
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.spans import spans_of
+from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities.spans import spans_of
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 MOST = len(MODEL_COLOURS)
 """More robots than this cannot be told apart by colour."""

@@ -22,10 +22,10 @@ from notchflex.plotting.sheet import (
     Upright,
 )
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities import QUANTITIES
+from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 COLOUR = {LOADING: BLUE, UNLOADING: VERMILLION}
 LINE = {LOADING: SOLID, UNLOADING: DASHED}

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex.plotting.along import MOST_TENDONS, SLACK
+from notchflex.plotting.output import Picture
 from notchflex.plotting.path import plane_of, shape_panel
-from notchflex.plotting.sheet import BESIDE, SOLID, Cell, Item, Line, Note, Panel, Picture
+from notchflex.plotting.sheet import BESIDE, SOLID, Cell, Item, Line, Note, Panel
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.spans import spans_of
+from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.results.quantities.spans import spans_of
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 
 def state_picture(path: EquilibriumPath, step: int, *, title: str | None = None) -> Picture:
@@ -55,7 +56,8 @@ def robot_picture(robot: Robot, *, title: str | None = None) -> Picture:
 
 def robot_shape(robot: Robot) -> Panel:
     """Return the shape of a robot without loads."""
-    from notchflex.statics import Load, solve
+    from notchflex.analysis import solve
+    from notchflex.loads import Load
 
     free = solve(robot, Load())
     return replace(state_shape(free.path, free.step), legend="")

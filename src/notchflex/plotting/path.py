@@ -5,25 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from notchflex.plotting.acting import out_of_plane
 from notchflex.plotting.along import (
     front_panel,
     profile_panel,
     pulled_tendons,
     reverses_step_by_step,
 )
-from notchflex.plotting.bent import bent_at
 from notchflex.plotting.curves import notches_panel, strain_panel, stroke_panel, total_panel
 from notchflex.plotting.drive import LOADING, UNLOADING, driven_by_stroke, way_of
-from notchflex.plotting.outline import bending_plane
-from notchflex.plotting.sheet import BESIDE, Cell, Colour, Panel, Picture
-from notchflex.plotting.space import space_panel
-from notchflex.plotting.wrist import telling_steps, wrist_panel
+from notchflex.plotting.output import Picture
+from notchflex.plotting.shapes.acting import out_of_plane
+from notchflex.plotting.shapes.bent import bent_at
+from notchflex.plotting.shapes.outline import bending_plane
+from notchflex.plotting.shapes.space import space_panel
+from notchflex.plotting.shapes.wrist import telling_steps, wrist_panel
+from notchflex.plotting.sheet import BESIDE, Cell, Colour, Panel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 MOST_PROFILES = 2
 """Tendons whose tension is drawn over the stroke, and from span to span."""

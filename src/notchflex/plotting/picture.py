@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from notchflex.errors import InputError
-from notchflex.plotting.sheet import Picture
+from notchflex.plotting.output import Picture
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results import EquilibriumPath
 
 
 def picture(result: Any, *, title: str | None = None) -> Picture:
@@ -42,16 +42,17 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
 
 def _picture(result: Any) -> Picture:
+    from notchflex.analysis import Batch
     from notchflex.comparison import Comparison
     from notchflex.plotting.batch import batch_picture
     from notchflex.plotting.beside import beside_picture
-    from notchflex.plotting.calibration import calibration_picture
-    from notchflex.plotting.comparison import comparison_picture
     from notchflex.plotting.equilibrium import robot_picture, state_picture
-    from notchflex.plotting.friction import friction_picture
+    from notchflex.plotting.fits.calibration import calibration_picture
+    from notchflex.plotting.fits.comparison import comparison_picture
+    from notchflex.plotting.fits.friction import friction_picture
     from notchflex.plotting.path import path_picture
+    from notchflex.results import Equilibrium, EquilibriumPath
     from notchflex.robot import Robot
-    from notchflex.statics import Batch, Equilibrium, EquilibriumPath
 
     if isinstance(result, Robot):
         return robot_picture(result)

@@ -1,6 +1,6 @@
 """What a picture shows, told once: panels of lines, areas and arrows, with their axes.
 
-matplotlib draws it for paper (`with_matplotlib.py`), plotly for a browser (`with_plotly.py`). What
+matplotlib draws it for paper (`plotting/renderers/with_matplotlib.py`), plotly for a browser (`plotting/renderers/with_plotly.py`). What
 a result has to show is described in terms of this file and of nothing else, so that both show the
 same curves under the same names.
 """
@@ -286,7 +286,7 @@ class Picture:
 
     def figure(self) -> Figure:
         """Return it as a figure of matplotlib."""
-        from notchflex.plotting.with_matplotlib import figure_of
+        from notchflex.plotting.renderers.with_matplotlib import figure_of
 
         return figure_of(self)
 
@@ -309,7 +309,7 @@ class Picture:
         Raises:
             InputError: plotly is not installed.
         """
-        from notchflex.plotting.with_plotly import interactive_of
+        from notchflex.plotting.renderers.with_plotly import interactive_of
 
         return interactive_of(self)
 
@@ -326,11 +326,11 @@ class Picture:
         """
         from pathlib import Path as FilePath
 
-        from notchflex.results.files import check_picture
+        from notchflex.results.files.writing import check_picture
 
         check_picture(str(target), "the picture")
         if FilePath(target).suffix.lower() == ".html":
-            from notchflex.plotting.with_plotly import save_html
+            from notchflex.plotting.renderers.with_plotly import save_html
 
             save_html(self, target)
         else:

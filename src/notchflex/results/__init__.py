@@ -6,12 +6,12 @@ Reading and writing need NumPy and are loaded on first use: `notchflex --help` p
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from notchflex.results.quantities import QUANTITIES
-from notchflex.results.quantity import Quantity
+from notchflex.results.quantities.quantity import Quantity
+from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.results.carry import read_path, save_path
-    from notchflex.results.table import read_table
+    from notchflex.results.files.io import read_path, save_path
+    from notchflex.results.files.table import read_table
 
 __all__ = ["QUANTITIES", "Quantity", "read_path", "read_table", "save_path"]
 

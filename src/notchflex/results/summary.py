@@ -11,19 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from notchflex._summary import Summary, course, short, vector
-from notchflex.results.quantities import QUANTITIES
+from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
-    from notchflex.statics import (
-        Batch,
-        Closing,
-        Equilibrium,
-        EquilibriumPath,
-        ExternalLoad,
-        Load,
-        LoadPath,
-        State,
-    )
+    from notchflex.analysis import Batch, Closing
+    from notchflex.loads import ExternalLoad, Load, LoadPath
+    from notchflex.results.equilibrium import Equilibrium
+    from notchflex.results.path import EquilibriumPath
+    from notchflex.results.state import State
 
 MOST = 4
 """Tendons, notches or outputs that have a line each; of more, the first."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from notchflex.statics import EquilibriumPath
+    from notchflex.results.path import EquilibriumPath
 
 MOMENT_ERROR = 0.01
 """A larger part of the bending moment than this that the strain modes miss is warned of."""
@@ -94,7 +94,7 @@ def _coarse(path: EquilibriumPath) -> Iterator[str]:
         return
     step = int(np.argmax(error))
     # Not at the head of the file: what only reads this table needs no solver.
-    from notchflex.statics.solve import MOST_REFINEMENT
+    from notchflex.mechanics.flexure import MOST_REFINEMENT
 
     refinement = path.chain.refinement
     remedy = (

@@ -1,7 +1,7 @@
 """Parts that come in several kinds, and how a new kind is found.
 
-A kind is one class in one file of this folder, named after what it is a kind of: `notch_arc.py`,
-`material_linear.py`, `friction_capstan.py`.  The folder is scanned, so that a new file is all that
+A kind is one class in one file of this folder, named after what it is a kind of: `robot/notches/arc.py`,
+`robot/materials/linear.py`, `robot/friction/capstan.py`.  The folder is scanned, so that a new file is all that
 a new kind needs: reading, writing, the JSON Schema and `--set` pick it up.
 """
 
@@ -15,9 +15,9 @@ from typing import Annotated, Any, Union
 
 from pydantic import Field
 
-from notchflex.robot._explain import kind_of
-from notchflex.robot._part import Float, Int, part, quantity
-from notchflex.robot.opening import Opening
+from notchflex.robot.error_messages import kind_of
+from notchflex.robot.notches.opening import Opening
+from notchflex.robot.part import Float, Int, part, quantity
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 

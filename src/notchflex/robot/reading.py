@@ -8,7 +8,7 @@ from typing import Any
 
 from notchflex._ready import READY, ready_names
 from notchflex.errors import InputError, RobotFileError
-from notchflex.robot._explain import nearest
+from notchflex.robot.error_messages import nearest
 from notchflex.robot.robot import Robot, from_table, remember_source
 
 

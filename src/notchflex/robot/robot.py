@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, overload
 from pydantic import Field, ValidationError, model_validator
 
 from notchflex.errors import InputError
-from notchflex.robot._explain import fields_of, sentences
-from notchflex.robot._part import ProblemError, part
+from notchflex.robot.error_messages import fields_of, sentences
 from notchflex.robot.kinds import Friction, Material, Notch, one_of
-from notchflex.robot.opening import openings_along
+from notchflex.robot.openings import openings_along
+from notchflex.robot.part import ProblemError, part
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
@@ -225,7 +225,9 @@ class Robot:
         Raises:
             InputError: There is no such value, or a new one is not allowed.
         """
-        from notchflex.robot.paths import set_values  # it makes robots, and so imports this file
+        from notchflex.robot.value_names import (
+            set_values,  # it makes robots, and so imports this file
+        )
 
         return set_values(self, values).robot
 

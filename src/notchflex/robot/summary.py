@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from notchflex._summary import Summary, short
-from notchflex.robot._explain import fields_of
+from notchflex.robot.error_messages import fields_of
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot

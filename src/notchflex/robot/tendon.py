@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from notchflex.robot._part import Float, FloatOrInf, Int, part, quantity
+from notchflex.robot.part import Float, FloatOrInf, Int, part, quantity
 
 
 @part

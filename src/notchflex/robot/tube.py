@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import model_validator
 
-from notchflex.robot._part import Float, ProblemError, part, quantity
+from notchflex.robot.part import Float, ProblemError, part, quantity
 
 
 @part

@@ -12,10 +12,10 @@ import tomlkit
 from tomlkit.exceptions import ParseError
 
 from notchflex.errors import InputError, RobotFileError
-from notchflex.robot._explain import fields_of
-from notchflex.robot.paths import defaults_of
+from notchflex.robot.error_messages import fields_of
 from notchflex.robot.reading import robot_from_text
 from notchflex.robot.robot import Robot, source_of, to_table
+from notchflex.robot.value_names import defaults_of
 
 _HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
 _CHANGED = re.compile(r"\s*\(changed from (.*)\)$")

@@ -14,14 +14,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex._native import native
-from notchflex.statics.known import KnownForm
-from notchflex.statics.outputs import reported
-from notchflex.statics.packing import Form, lane_sizes
-from notchflex.statics.path import EquilibriumPath
-from notchflex.statics.quantities import of_own
-from notchflex.statics.sensitivity import Way, answering
-from notchflex.statics.tangent import ROTATIONS, VECTORS, Change, PathTangents
+from notchflex.analysis.derivatives.tangent import ROTATIONS, VECTORS, Change, PathTangents
+from notchflex.analysis.outputs import reported
+from notchflex.results.path import EquilibriumPath
+from notchflex.solver.derived.quantities import of_own
+from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.pytree_layout import Form, lane_sizes
+from notchflex.solver.programs.static_structure import KnownForm
+from notchflex.solver.sensitivity import Way, answering
 
 
 @dataclass(frozen=True, eq=False)

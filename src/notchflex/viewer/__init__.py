@@ -6,13 +6,13 @@ the libraries of the extra; `Viewer` needs them.
 
 from typing import TYPE_CHECKING, Any
 
-from notchflex.viewer.address import HOST, PORT, check_host, check_installed, exposed
+from notchflex.viewer.server.address import HOST, PORT, check_host, check_installed, exposed
 
 if TYPE_CHECKING:
     from notchflex.viewer.controls import Controls
     from notchflex.viewer.session import Session
+    from notchflex.viewer.target_queue import Way
     from notchflex.viewer.viewer import Viewer
-    from notchflex.viewer.way import Way
 
 __all__ = [
     "HOST",

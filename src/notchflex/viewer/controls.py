@@ -8,8 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from notchflex.loads import Load
 from notchflex.robot import Robot
-from notchflex.statics import Load
 
 T = TypeVar("T")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from notchflex.statics import Equilibrium
+from notchflex.results import Equilibrium
 from notchflex.viewer.controls import TENSION, Controls
 
 

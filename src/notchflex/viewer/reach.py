@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from notchflex.analysis import solve
+from notchflex.loads import Load
 from notchflex.robot import Robot
-from notchflex.statics import Load, solve
 from notchflex.viewer.controls import STROKE, TENSION
 
 # Tensions from 1/64 N on are tried, each twice the one before, until the robot is well bent; a

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
+from notchflex.analysis import simulate
+from notchflex.results import Equilibrium, EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.statics import Equilibrium, EquilibriumPath, simulate
 from notchflex.viewer.controls import STROKE, Controls
 from notchflex.viewer.history import History
 

@@ -11,18 +11,19 @@ from threading import Event
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.viewer import parts
-from notchflex.viewer.address import HOST, PORT, check_host, check_installed
 from notchflex.viewer.controls import Controls
-from notchflex.viewer.notes import beyond, kept_between
-from notchflex.viewer.origin import bracketed
-from notchflex.viewer.page import Page
+from notchflex.viewer.page.notes import beyond, kept_between
+from notchflex.viewer.page.page import Page
 from notchflex.viewer.reach import STRETCH, Reach, reach_of
-from notchflex.viewer.scene import Scene, Shown
-from notchflex.viewer.serving import serve
+from notchflex.viewer.scene.scene import Scene
+from notchflex.viewer.scene.scene.shown import Shown
+from notchflex.viewer.server.address import HOST, PORT, check_host, check_installed
+from notchflex.viewer.server.origin import bracketed
+from notchflex.viewer.server.serving import serve
 from notchflex.viewer.session import Session, Step
+from notchflex.viewer.target_queue import Way
 from notchflex.viewer.tasks import Tasks
 from notchflex.viewer.watch import Watched
-from notchflex.viewer.way import Way
 
 # What a browser draws: more steps a second than this are not seen.
 MOST_STEPS = 60.0

@@ -1,0 +1,1 @@
+"""The intermediate representation: statements, loops and branches."""

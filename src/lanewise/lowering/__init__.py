@@ -1,0 +1,1 @@
+"""From JAX's trace to the graph of statements."""

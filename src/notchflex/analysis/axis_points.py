@@ -1,0 +1,158 @@
+"""Points on the tube axis, told by how far from the base they lie when the robot is straight.
+
+A point on a rigid piece moves with it. Across a notch the axis is drawn as a cubic from one face to
+the next, at right angles to both. Its tangents are as long as those that follow an arc best, so
+that where the two faces lie on one arc the cubic keeps to it within 5e-6 of its radius up to 45
+degrees. It takes nothing but the poses of the bodies, and so can be differentiated by them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float, Int
+from numpy.typing import ArrayLike, NDArray
+
+from notchflex._jax import array_module, constant
+from notchflex.analysis.kinematics import bodies_from_angles
+from notchflex.errors import InputError
+from notchflex.mechanics.chain.mass import body_lengths
+from notchflex.robot import Robot
+
+if TYPE_CHECKING:
+    from notchflex.results.path import EquilibriumPath
+
+# A place may stick out of the robot by this part of its length: a tip that was rounded.
+_BEYOND = 1e-6
+
+
+class AxisPlaces(NamedTuple):
+    """Where m points lie on a straight robot of n notches.
+
+    Attributes:
+        body: The body that each point is on, or the one before its notch, (m,).
+        along: Its distance from that body's proximal face along the axis, mm, (m,).
+        after: The body beyond its notch, or any other where it is on a body, (m,).
+        length: Length of the body before, mm, (m,).
+        fraction: How far across its notch it is, 0 to 1; -1 where it is on a body, (m,).
+    """
+
+    body: Int[np.ndarray, " m"]
+    along: Float[np.ndarray, " m"]
+    after: Int[np.ndarray, " m"]
+    length: Float[np.ndarray, " m"]
+    fraction: Float[np.ndarray, " m"]
+
+
+def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
+    """Find where points on the axis lie on the straight robot.
+
+    Args:
+        robot: The robot.
+        axis_at: Distances from the base when the robot is straight, mm, (m,).
+
+    Returns:
+        The places, for `points_on_axis`.
+
+    Raises:
+        InputError: A distance is not finite, negative or beyond the tip.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> axis_places(load_robot("pacheco2021-a"), [0.4, 1.3]).fraction.round(9).tolist()
+        [0.5, -1.0]
+    """
+    at = np.atleast_1d(np.asarray(axis_at, float))
+    straight, _ = bodies_from_angles(robot, np.zeros((1, robot.number_of_notches)))
+    start, length = straight[0, :, 2], body_lengths(robot.tube, robot.notches)
+    tip = float(start[-1] + length[-1])
+    wrong = at[~((at >= -_BEYOND * tip) & (at <= (1.0 + _BEYOND) * tip))]
+    if len(wrong):
+        raise InputError(
+            f"there is no point on the axis {wrong[0]:g} mm from the base: {robot.name} is "
+            f"{tip:.6g} mm long; give 0 to {tip:.6g} mm"
+        )
+    # A point on a face belongs to the body; rounding must not lay it into the notch.
+    body = np.searchsorted(start - _BEYOND * tip, at, side="right") - 1
+    body = np.maximum(body, 0)
+    along = at - start[body]
+    after = np.minimum(body + 1, len(start) - 1)
+    gap = start[after] - start[body] - length[body]
+    across = along - length[body]
+    inside = (after > body) & (across > _BEYOND * tip) & (gap > 0.0)
+    fraction = np.where(inside, across / np.where(gap > 0.0, gap, 1.0), -1.0)
+    return AxisPlaces(body, along, after, length[body], fraction)
+
+
+def points_on_axis(
+    places: AxisPlaces,
+    body_position: Float[Array, "*s bodies 3"],
+    body_rotation: Float[Array, "*s bodies 3 3"],
+) -> Float[Array, "*s m 3"]:
+    """Points on the axis of a bent robot.
+
+    Args:
+        places: Where they lie on the straight robot.
+        body_position: Origins of the bodies, base first, mm; plain or traced numbers.
+        body_rotation: Their rotations.
+
+    Returns:
+        The points, mm, in the frame in which the bodies are given.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> robot = load_robot("pacheco2021-a")
+        >>> bodies = bodies_from_angles(robot, np.zeros((1, 5)))
+        >>> points_on_axis(axis_places(robot, [0.4, 9.0]), *bodies)[0, :, 2].round(9).tolist()
+        [0.4, 9.0]
+    """
+    xp = array_module(body_position, body_rotation)
+    axis = body_rotation[..., :, 2]
+    first, last = axis[..., places.body, :], axis[..., places.after, :]
+    origin = body_position[..., places.body, :]
+    on_body = origin + places.along[:, None] * first
+    near = origin + places.length[:, None] * first
+    far = body_position[..., places.after, :]
+    inside = places.fraction >= 0.0
+    # Length of the tangents: 2 c / (1 + cos(turn / 2)) with the chord c, which makes the cubic meet
+    # an arc in the middle too. Where a point is on a body there may be no chord.
+    chord = xp.where(inside[:, None], far - near, np.ones(3))
+    between = xp.where(inside, xp.sum(first * last, axis=-1), 1.0)
+    half = xp.sqrt(0.5 * (1.0 + between))
+    reach = (2.0 * xp.sqrt(xp.sum(chord**2, axis=-1)) / (1.0 + half))[..., None]
+    u = xp.where(inside, places.fraction, 0.0)[:, None]
+    across = (
+        (1.0 + 2.0 * u) * (1.0 - u) ** 2 * near
+        + u**2 * (3.0 - 2.0 * u) * far
+        + reach * (u * (1.0 - u) ** 2 * first - u**2 * (1.0 - u) * last)
+    )
+    return xp.where(inside[:, None], across, on_body)
+
+
+def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64]:
+    """Points on the tube axis of every state of a path, in the world.
+
+    Args:
+        path: The states, s steps.
+        axis_at: How far from the base the points lie when the robot is straight, mm, (m,).
+
+    Returns:
+        The points, mm, (s, m, 3).
+
+    Raises:
+        InputError: The robot is not that long.
+
+    Example:
+        >>> from notchflex import load_robot, pull, simulate
+        >>> path = simulate(load_robot("pacheco2021-a"), pull(1.0, 1.0, steps=1))
+        >>> bool(np.allclose(axis_points(path, [10.0])[0, 0], path.tip_position[0]))
+        True
+    """
+    places = axis_places(path.robot, axis_at)
+    return np.asarray(
+        points_on_axis(places, constant(path.body_position), constant(path.body_rotation))
+    )
+
+
+__all__ = ["AxisPlaces", "axis_places", "axis_points", "points_on_axis"]

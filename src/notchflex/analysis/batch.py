@@ -1,0 +1,320 @@
+"""Many robots, or many loads, at once: tables in, tables out, in pieces that fit the cache.
+
+Robots of one form (as many notches, tendons and modes, the same laws) run through one program, a
+row of numbers each. A batch is cut into pieces; the cores take one after the other, so that memory
+is bounded whatever the batch. Where JAX has a GPU they run there, whole pieces side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from lanewise import WIDTH
+from notchflex._summary import Displayed, Summary
+from notchflex.analysis.batch_rows import followed_row
+from notchflex.analysis.outputs import DEFAULT_OUTPUTS, known_outputs
+from notchflex.analysis.solve import prepared_for
+from notchflex.errors import InputError
+from notchflex.loads import Load
+from notchflex.loads.command import command, filled
+from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import LoadPath, joined_paths
+from notchflex.loads.validation import shown, whole
+from notchflex.robot import Robot
+from notchflex.solver.derived.quantities import BY_BODY, BY_FLEXURE
+from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.prepare import Prepared, lengthened
+from notchflex.solver.programs.pytree_layout import Form
+from notchflex.solver.programs.static_structure import KnownForm
+from notchflex.solver.programs.threads import number_of_cores, on_cores
+
+# Rows of a piece at most, by how many rows there are.
+_PIECES = {0: 64, 512: 256, 8192: 2048}
+
+
+class Batch(Displayed, Mapping[str, np.ndarray]):
+    """What a batch returned: arrays by name, the rows of the batch as leading axis.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> found = solve_batch(load_robot("pacheco2021-a"), pull(0.0, 2.0, steps=3))
+        >>> found["tip_position"].shape, bool(found["converged"].all())
+        ((3, 3), True)
+    """
+
+    def __init__(self, arrays: dict[str, np.ndarray]) -> None:
+        """Hold arrays by name."""
+        self._arrays = arrays
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """One of the arrays."""
+        return self._arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(self._arrays)
+
+    def __len__(self) -> int:
+        """How many arrays there are."""
+        return len(self._arrays)
+
+    def _summary(self) -> Summary:
+        from notchflex.results.summary import batch_summary
+
+        return batch_summary(self)
+
+
+def solve_batch(
+    robots: Robot | Sequence[Robot],
+    loads: Load | LoadPath | Sequence[Load],
+    *,
+    outputs: Sequence[str] = DEFAULT_OUTPUTS,
+    settings: Settings | None = None,
+    refinement: int = 0,
+    cores: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Batch:
+    """Solve many loads or many robots, each from rest.
+
+    Args:
+        robots: One robot, or one per row.
+        loads: One load, or one per row (the steps of a `LoadPath` are loads of their own here).
+        outputs: What to return, by names of `EquilibriumPath`; fewer names are less memory.
+        settings: How hard the solver tries.
+        refinement: More strain modes, as for `simulate`.
+        cores: How many cores to use; all where not given.
+        progress: Called with the rows done and the rows of the whole batch.
+
+    Returns:
+        Arrays by name, rows as leading axis. A row that did not converge says so in `converged`
+        and holds the last good state.
+
+    Raises:
+        InputError: Robots and loads that are not one or equally many, no such output, or no core.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> found = solve_batch(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=100))
+        >>> found["total_angle"].shape
+        (100,)
+    """
+    every = _robots(robots)
+    path = load_path(loads, max(robot.number_of_tendons for robot in every))
+    found = _simulate(every, path, len(path), outputs, settings, refinement, cores, progress)
+    return Batch({name: array[:, 0] for name, array in found.items()})
+
+
+def simulate_batch(
+    robots: Robot | Sequence[Robot],
+    loads: LoadPath | Sequence[LoadPath],
+    *,
+    outputs: Sequence[str] = DEFAULT_OUTPUTS,
+    settings: Settings | None = None,
+    refinement: int = 0,
+    cores: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Batch:
+    """Follow many paths of loads, each with a memory of its own.
+
+    Args:
+        robots: One robot, or one per row.
+        loads: One path, or one per row, of equally many steps.
+        outputs: What to return, as for `solve_batch`.
+        settings: How hard the solver tries.
+        refinement: More strain modes, as for `simulate`.
+        cores: As for `solve_batch`.
+        progress: As for `solve_batch`.
+
+    Returns:
+        Arrays by name, rows and then steps as leading axes.
+
+    Raises:
+        InputError: Robots and paths that are not one or equally many, paths of unlike lengths, no
+            such output, or no core.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> paths = [pull(0.0, top, steps=4).release() for top in (1.0, 2.0)]
+        >>> simulate_batch(load_robot("pacheco2021-a"), paths)["total_angle"].shape
+        (2, 8)
+    """
+    every = _robots(robots)
+    tendons = max(robot.number_of_tendons for robot in every)
+    try:
+        given = [loads] if isinstance(loads, LoadPath) else list(loads)
+    except TypeError:
+        raise InputError(
+            f"simulate_batch needs a notchflex.LoadPath, or some in order; got {shown(loads)}"
+        ) from None
+    paths = [load_path(one, tendons) for one in given]
+    if not paths or len({len(path) for path in paths}) > 1:
+        raise InputError("a batch needs one path or more, all of equally many steps")
+    joined = paths[0] if len(paths) == 1 else joined_paths(paths)
+    rows = len(paths)
+    return Batch(_simulate(every, joined, rows, outputs, settings, refinement, cores, progress))
+
+
+def _robots(robots: Any) -> list[Robot]:
+    try:
+        every = [robots] if isinstance(robots, Robot) else list(robots)
+    except TypeError:
+        every = []
+    if not every or not all(isinstance(robot, Robot) for robot in every):
+        raise InputError(f"a batch needs a notchflex.Robot, or some of them; got {shown(robots)}")
+    return every
+
+
+def _simulate(
+    robots: list[Robot],
+    joined: LoadPath,
+    paths: int,
+    outputs: Sequence[str],
+    settings: Settings | None,
+    refinement: int,
+    cores: int | None,
+    progress: Callable[[int, int], None] | None,
+) -> dict[str, np.ndarray]:
+    """Follow paths, given one after the other as a long one, each from rest."""
+    asked = known_outputs(outputs)
+    threads = number_of_cores() if cores is None else whole(cores, "cores")
+    if threads < 1:
+        raise InputError(f"cores must be 1 or more, or None for all; got {threads}")
+    count = max(len(robots), paths)
+    if len(robots) not in (1, count) or paths not in (1, count):
+        raise InputError(
+            "a batch needs as many robots as loads, or one of either; "
+            f"got {len(robots)} robots and {paths} loads"
+        )
+    numbers = np.array([*(settings or DEFAULT).numbers])
+    found: dict[str, np.ndarray] = {}
+    done = 0
+    work = [
+        (table, index)
+        for table in _tables(robots, joined, paths, count, asked, refinement)
+        for index in table.pieces(threads)
+    ]
+    with closing(on_cores(lambda one: one[0].run(one[1], numbers), work, threads)) as came:
+        for (table, index), piece in zip(work, came, strict=True):
+            rows = table.rows[index]
+            for name, values in piece.items():
+                _put(found, name, rows, values, count)
+            done += len(rows)
+            if progress is not None:
+                progress(done, count)
+    return found
+
+
+def _put(
+    found: dict[str, np.ndarray], name: str, rows: np.ndarray, values: np.ndarray, count: int
+) -> None:
+    """Put the values of some rows where they belong; robots with fewer notches leave NaN."""
+    if name not in found:
+        found[name] = np.empty((count, *values.shape[1:]), values.dtype)
+    shape = tuple(np.maximum(found[name].shape[1:], values.shape[1:]))
+    if shape != found[name].shape[1:]:
+        wider = [(0, 0), *((0, b - a) for a, b in zip(found[name].shape[1:], shape, strict=True))]
+        found[name] = np.pad(found[name], wider, constant_values=np.nan)
+    first, last = int(rows[0]), int(rows[-1]) + 1
+    own = rows if last - first > len(rows) else slice(first, last)
+    if shape != values.shape[1:]:
+        found[name][own] = np.nan
+    found[name][(own, *(slice(size) for size in values.shape[1:]))] = values
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Rows of a batch whose robots have one form.
+
+    Attributes:
+        chain_form: Form of what is not known of the robots.
+        rows: Which rows of the batch these are.
+        chains: A row per robot, or one for all.
+        commands: A row per path, or one for all, then the steps.
+        command_form: Form of one of them.
+        flexures: How many flexures are the robot's own, by row, or one number for all.
+        outputs: What is asked.
+    """
+
+    chain_form: KnownForm
+    rows: np.ndarray
+    chains: Float[np.ndarray, "k chain"]
+    commands: Float[np.ndarray, "k s command"]
+    command_form: Form
+    flexures: Int[np.ndarray, " k"]
+    outputs: tuple[str, ...]
+
+    def pieces(self, cores: int) -> Iterator[slice]:
+        """Rows that are solved in one call of the program: pieces alike, as many for each core."""
+        rows = len(self.rows)
+        most = max(size for least, size in _PIECES.items() if rows >= least)
+        each = -(-rows // (most * cores))
+        size = -(-rows // (each * cores * WIDTH)) * WIDTH
+        return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
+
+    def run(self, index: slice, numbers: np.ndarray) -> dict[str, np.ndarray]:
+        """Solve a piece of the rows."""
+        commands = self.commands[index]
+        if len(self.commands) == 1:
+            commands = np.repeat(self.commands, index.stop - index.start, axis=0)
+        one_robot = len(self.chains) == 1
+        chains = self.chains[0] if one_robot else self.chains[index]
+        forms = (self.chain_form, self.command_form, self.outputs)
+        by_row = (not one_robot, True, False)
+        came = followed_row.rows(by_row, chains, commands, numbers, *forms)
+        own = self.flexures[index] if len(self.flexures) > 1 else self.flexures
+        return {name: _of_own(name, values, own) for name, values in came.items()}
+
+
+def _of_own(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
+    """Values by flexure or body with NaN where a robot has none, rows and steps as leading axes."""
+    own = flexures + (name in BY_BODY)
+    if name in (*BY_FLEXURE, *BY_BODY) and (own < values.shape[2]).any():
+        beyond = np.arange(values.shape[2]) >= own[:, None]
+        values[np.broadcast_to(beyond[:, None], values.shape[:3])] = np.nan
+    return values
+
+
+def _tables(
+    robots: list[Robot],
+    joined: LoadPath,
+    paths: int,
+    count: int,
+    outputs: tuple[str, ...],
+    refinement: int,
+) -> list[_Table]:
+    """The rows of a batch by the form of their robots, shorter ones filled up to the longest."""
+    steps = len(joined) // paths
+    # The modes that any of the loads asks for, so that rows share a program.
+    every = [prepared_for(robot, joined, None, refinement) for robot in robots]
+    flexures = max(ready.chain.flexures for ready in every)
+    edges = max(ready.chain.contacts.shape[1] for ready in every)
+    by_stroke = not np.isnan(joined.stroke).all()
+    tables: dict[tuple[Form, Form], list[tuple[int, Prepared, int, np.ndarray]]] = {}
+    for row, (robot, own) in enumerate(zip(robots, every, strict=True)):
+        part = joined if len(robots) == 1 or paths == 1 else joined.part(row * steps, steps)
+        commands = filled(command(part, robot, own.chain), flexures, by_stroke)
+        ready = lengthened(own, flexures, edges)
+        form = ready.command_form(commands)
+        packed = form.pack(commands, leading=1).reshape(-1, steps, form.size)
+        entry = (row, ready, own.chain.flexures, packed)
+        tables.setdefault((ready.chain_form, form), []).append(entry)
+    made = []
+    for (_, form), entries in tables.items():
+        numbers, robots_of_one, own, commands = zip(*entries, strict=True)
+        rows = np.arange(count) if len(robots) == 1 else np.array(numbers)
+        whole = np.stack([ready.vector for ready in robots_of_one])
+        own_chains = [ready.chain for ready in robots_of_one]
+        known = KnownForm.of(robots_of_one[0].chain_form, own_chains, whole)
+        commands = np.concatenate(commands)
+        chains = known.pack(whole)
+        made.append(_Table(known, rows, chains, commands, form, np.array(own), outputs))
+    return made
+
+
+__all__ = ["Batch", "simulate_batch", "solve_batch"]

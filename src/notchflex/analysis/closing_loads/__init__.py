@@ -1,0 +1,1 @@
+"""Loads and angles at which notches close."""

@@ -1,0 +1,1 @@
+"""Derivatives of results by loads and by numbers of the robot file."""

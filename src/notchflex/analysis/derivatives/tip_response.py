@@ -1,0 +1,139 @@
+"""How the tip answers small changes of its drives and of what pushes at it: for control."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex._jax import constant
+from notchflex.analysis.derivatives.kinks import Kink, kinks
+from notchflex.analysis.derivatives.tangent import Change
+from notchflex.analysis.forward_model import ForwardModel
+from notchflex.analysis.solve import check_refinement
+from notchflex.loads import Load
+from notchflex.loads.applied import Applied
+from notchflex.loads.command import Command
+from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import LoadPath
+from notchflex.loads.validation import robot_given
+from notchflex.results.path import EquilibriumPath
+from notchflex.robot import Robot
+from notchflex.solver.newton import DEFAULT, Settings
+
+_POSE = ("tip_rotation", "tip_position")
+
+
+@dataclass(frozen=True, eq=False)
+class TipResponse:
+    """Slopes of the tip's pose along a path of loads; s steps, t tendons.
+
+    Rows are (rotation vector, rad; position, mm), all in the world. NaN where a step did not
+    converge, and with friction where it was so hard that it was solved in three parts or more: what
+    contacts remember of the parts is not followed.
+
+    Attributes:
+        path: The states.
+        jacobian: Change of the pose per unit of what each tendon is commanded, a tension (N) or a
+            stroke (mm), (s, 6, t).
+        compliance: Change of the pose per moment (N mm) and force (N) at the tip, dead in the
+            world, (s, 6, 6).
+    """
+
+    path: EquilibriumPath
+    jacobian: Float[np.ndarray, "s 6 t"]
+    compliance: Float[np.ndarray, "s 6 6"]
+
+    @cached_property
+    def kinks(self) -> list[Kink]:
+        """Contacts and notches at a switch: there the slopes are those of one side only."""
+        return kinks(self.path)
+
+
+def tip_response(
+    robot: Robot,
+    loads: Load | LoadPath | Iterable[Load],
+    *,
+    settings: Settings | None = None,
+    refinement: int = 0,
+) -> TipResponse:
+    """Follow loads, and find at every state how the tip answers its drives and what pushes at it.
+
+    With friction the answer depends on the way: it is that of going on as the load went. A contact
+    that slid in the last step goes on sliding, one that stuck goes on sticking. Where a contact is
+    about to slip or a notch to close, the slopes are those of one side; `kinks` lists these.
+
+    Args:
+        robot: The robot.
+        loads: A path, or loads in order.
+        settings: How hard the solver tries.
+        refinement: More strain modes, as for `simulate`.
+
+    Returns:
+        The slopes, and the path they belong to, followed with modes for loads in space.
+
+    Raises:
+        InputError: A load that is none.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> found = tip_response(load_robot("pacheco2021-a"), pull(0.5, 1.0, steps=2))
+        >>> found.jacobian.shape, found.compliance.shape
+        ((2, 6, 1), (2, 6, 6))
+    """
+    path = load_path(loads, robot_given(robot).number_of_tendons)
+    check_refinement(refinement)
+    model = ForwardModel(robot, path, settings or DEFAULT, refinement, any_load=True)
+    found = model.solve(robot, path)
+    changes = [Change(loads, None) for loads in _unit_loads(found)]
+    # Each state is varied alone: what the contacts remember of the state before stays.
+    by_loads = model.derivatives(found, changes, _POSE, remembers=False)
+    slopes = np.moveaxis(_pose_change(found, by_loads), 0, -1)
+    turn = np.eye(6)
+    if found.base_to_world is not None:
+        turn = np.kron(np.eye(2), found.base_to_world)
+    tendons = found.chain.tendons
+    return TipResponse(found, slopes[..., :tendons], slopes[..., tendons:] @ turn.T)
+
+
+def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
+    """Changes of the loads, packed: a unit of every drive, then of tip moment and force."""
+    long = path.prepared.long
+    packed, form = path.prepared.long_commands(path.commands)
+    none: Command = form.unpack(np.zeros(form.size))
+    assert none.applied is not None  # the chain is assembled for loads
+    units = [none._replace(value=constant(row)) for row in np.eye(long.chain.tendons)]
+    for row in np.eye(6):
+        applied = _with_tip(none.applied, row, np.asarray(long.chain.body_length)[-1])
+        units.append(none._replace(applied=applied))
+    for unit in units:
+        yield np.broadcast_to(np.asarray(form.pack(unit)), packed.shape)
+
+
+def _pose_change(
+    path: EquilibriumPath, changes: Mapping[str, np.ndarray]
+) -> Float[np.ndarray, "k s 6"]:
+    """Rotation vectors and displacements of the tip, in the world."""
+    spin = changes["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
+    turned = [spin[..., b, a] - spin[..., a, b] for a, b in ((1, 2), (2, 0), (0, 1))]
+    return np.concatenate([0.5 * np.stack(turned, axis=-1), changes["tip_position"]], axis=-1)
+
+
+def _with_tip(applied: Applied, wrench: Float[np.ndarray, " 6"], length: float) -> Applied:
+    """Loads with a moment and a force more at the tip, dead in the base frame."""
+    moment, force = wrench[:3], wrench[3:]
+    last = np.zeros(len(applied.dead_force))
+    last[-1] = 1.0
+    arm = np.zeros((3, 3))
+    arm[2] = length * force
+    return applied._replace(
+        dead_force=constant(applied.dead_force + np.multiply.outer(last, force)),
+        dead_moment=constant(applied.dead_moment + np.multiply.outer(last, moment)),
+        dead_arm=constant(applied.dead_arm + np.multiply.outer(last, arm)),
+    )
+
+
+__all__ = ["TipResponse", "tip_response"]

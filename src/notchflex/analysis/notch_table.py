@@ -1,0 +1,93 @@
+"""What a notch is before anything pulls, and how it closes: one row for every notch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from notchflex.analysis.closing_loads.closing import closing, moment_arms
+from notchflex.mechanics.chain import assemble
+from notchflex.mechanics.flexure import rod
+from notchflex.results.quantities.registry import DEGREES
+from notchflex.robot import Robot
+from notchflex.robot.error_messages import fields_of
+from notchflex.robot.kinds import Notch
+
+
+def notch_table(robot: Robot) -> list[dict[str, Any]]:
+    """Return geometry, section and closing of every notch, base to tip.
+
+    Args:
+        robot: The robot, n notches, t tendons.
+
+    Returns:
+        n rows with the values of the robot file, their units in their names, and
+
+        * `area_mm2` and `second_moment_mm4` of the section that the cut leaves, where it is
+          weakest; `centroid_mm` (from the tube axis toward the spine) where there is a spine,
+        * `moment_arm_mm`, t numbers: how far each tendon runs from the neutral axis, positive
+          where it bends the notch toward its direction, 0 where it does not go,
+        * `closing_angle_deg`, `closing_tendon` (from 1: the one with the longest arm),
+          `closing_tension_N` (of that tendon, pulled from rest; NaN if none was found),
+          `closing_status` ("closes", "never", or "not found" where the solver failed),
+          `closing_outer_strain` (Pacheco 2021, eq. 16) and `closing_peak_strain` (farthest fibre),
+          both NaN without a spine.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> row = notch_table(load_robot("pacheco2021-a"))[0]
+        >>> round(row["closing_angle_deg"], 2), round(row["moment_arm_mm"][0], 3)
+        (30.63, 1.387)
+    """
+    table = closing(robot)
+    arms = moment_arms(assemble(robot, flat=False))
+    described = {notch: _description(notch, robot) for notch in dict.fromkeys(robot.notches)}
+    return [
+        {
+            "notch": index + 1,
+            **described[notch],
+            "moment_arm_mm": arms[index].tolist(),
+            "closing_angle_deg": float(table.angle[index]) * DEGREES,
+            "closing_tendon": int(table.tendon[index]),
+            "closing_tension_N": float(table.tension[index]),
+            "closing_status": str(table.status[index]),
+            "closing_outer_strain": float(table.outer_strain[index]),
+            "closing_peak_strain": float(table.peak_strain[index]),
+        }
+        for index, notch in enumerate(robot.notches)
+    ]
+
+
+def named_values(notch: Notch) -> dict[str, Any]:
+    """Return the values of a notch as in a robot file, their units in their names.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> list(named_values(load_robot("pacheco2021-a").notches[0]))[:3]
+        ['kind', 'cut', 'depth_mm']
+    """
+    return {
+        _with_unit(type(notch), name): getattr(notch, name)
+        for name in fields_of(type(notch))
+        if name != "repeat"
+    }
+
+
+def _description(notch: Notch, robot: Robot) -> dict[str, Any]:
+    one = rod(notch, robot.tube)
+    section = one.section
+    weakest = int(np.argmin(section.second_moment_weak))
+    values: dict[str, Any] = {
+        "area_mm2": float(section.area[weakest]),
+        "second_moment_mm4": float(section.second_moment_weak[weakest]),
+    }
+    if float(one.lip_closes) > 0.0:  # opposite a spine
+        values["centroid_mm"] = robot.tube.outer_radius - float(section.edge_spine[weakest])
+    return named_values(notch) | values
+
+
+def _with_unit(kind: type, name: str) -> str:
+    extra = fields_of(kind)[name].json_schema_extra or {}
+    unit = extra.get("unit", "")
+    return f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name

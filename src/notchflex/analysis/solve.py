@@ -1,0 +1,168 @@
+"""The public functions: one load, a path with friction history, many loads each from rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from notchflex.errors import InputError
+from notchflex.loads import Load
+from notchflex.loads.applied import follows, is_planar, is_unloaded
+from notchflex.loads.command import command
+from notchflex.loads.conversion import load_path
+from notchflex.loads.load_path import LoadPath
+from notchflex.mechanics.chain import tendons_in_plane
+from notchflex.mechanics.flexure import LEVELS
+from notchflex.results.equilibrium import Equilibrium
+from notchflex.results.path import EquilibriumPath
+from notchflex.results.state import SavedState, State, check_robot, fitted
+from notchflex.robot import Robot
+from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.prepare import Prepared, prepared
+from notchflex.solver.programs.run import run
+
+MOST_REFINEMENT = 3
+
+
+def simulate(
+    robot: Robot,
+    loads: Load | LoadPath | Iterable[Load],
+    *,
+    from_state: State | SavedState | None = None,
+    settings: Settings | None = None,
+    refinement: int = 0,
+) -> EquilibriumPath:
+    """Follow loads one after the other, with friction history.
+
+    Args:
+        robot: The robot.
+        loads: A path such as `pull(0.0, 3.0).release()`, or loads in order.
+        from_state: State to continue from; rest where not given.
+        settings: Tolerance and limits of the solver.
+        refinement: 0 for the usual strain modes; 1, 2 or 3 adds more. A result that does not change
+            has converged (`moment_error` says how much is missing).
+
+    Returns:
+        The states, one per load. Where a load does not converge, `converged` is false and `reason`
+        says why; later loads are not tried.
+
+    Raises:
+        InputError: Invalid loads, or a state of another robot.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> path = simulate(load_robot("pacheco2021-a"), pull(0.0, 1.0, steps=3).release())
+        >>> bool(path.total_angle[3] == path.total_angle[2] > path.total_angle[1])
+        True
+    """
+    load = load_path(loads, robot.number_of_tendons)
+    if from_state is not None:
+        check_robot(from_state, robot)
+    ready = prepared_for(robot, load, from_state, refinement)
+    start = None if from_state is None else fitted(from_state, ready.chain)
+    commands = command(load, robot, ready.chain)
+    came = run(ready, commands, start, settings or DEFAULT, each_from_start=False)
+    return EquilibriumPath(robot, load, ready, came, settings=settings or DEFAULT)
+
+
+def solve(
+    robot: Robot,
+    load: Load,
+    *,
+    from_state: State | SavedState | None = None,
+    settings: Settings | None = None,
+    refinement: int = 0,
+) -> Equilibrium:
+    """Find the equilibrium under one load, from rest or from a state.
+
+    Args:
+        robot: The robot.
+        load: Tension or stroke of its tendons.
+        from_state: State to start from; rest where not given.
+        settings: Tolerance and limits of the solver.
+        refinement: More strain modes, as for `simulate`.
+
+    Returns:
+        The equilibrium, or the last good state on the way with `converged` false and a reason.
+
+    Raises:
+        InputError: An invalid load, or a state of another robot.
+
+    Example:
+        >>> from math import degrees
+        >>> from notchflex import Load, load_robot
+        >>> state = solve(load_robot("pacheco2021-a"), Load(tension=2.0))
+        >>> print(f"{degrees(state.total_angle):.2f} deg")
+        150.08 deg
+    """
+    return simulate(robot, load, from_state=from_state, settings=settings, refinement=refinement)[0]
+
+
+def solve_each(
+    robot: Robot,
+    loads: LoadPath | Iterable[Load],
+    *,
+    settings: Settings | None = None,
+    refinement: int = 0,
+) -> EquilibriumPath:
+    """Solve many loads, each from rest.
+
+    Args:
+        robot: The robot.
+        loads: The loads.
+        settings: Tolerance and limits of the solver.
+        refinement: More strain modes, as for `simulate`.
+
+    Returns:
+        The states, one per load; a failure of one does not touch the others.
+
+    Raises:
+        InputError: Invalid loads.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> path = solve_each(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=3))
+        >>> path.converged.tolist()
+        [True, True, True]
+    """
+    load = load_path(loads, robot.number_of_tendons)
+    ready = prepared_for(robot, load, refinement=refinement)
+    commands = command(load, robot, ready.chain)
+    came = run(ready, commands, None, settings or DEFAULT, each_from_start=True)
+    return EquilibriumPath(
+        robot, load, ready, came, each_from_rest=True, settings=settings or DEFAULT
+    )
+
+
+def check_refinement(refinement: int) -> None:
+    """Raise if there is no such refinement."""
+    if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
+        raise InputError(
+            f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
+        )
+
+
+def prepared_for(
+    robot: Robot,
+    load: LoadPath,
+    from_state: State | SavedState | None = None,
+    refinement: int = 0,
+) -> Prepared:
+    """The robot with modes enough for all loads of a path, and for the state before it."""
+    check_refinement(refinement)
+    if from_state is not None and from_state.refinement != refinement:
+        raise InputError(
+            f"the state was computed with refinement {from_state.refinement}, not {refinement}; "
+            "go on with the same"
+        )
+    unloaded = is_unloaded(load)
+    loaded = not unloaded or (from_state is not None and from_state.loaded)
+    level = "tendons" if not loaded else "plane"
+    if not (tendons_in_plane(robot) and (unloaded or is_planar(load, robot))):
+        level = "space"
+    if from_state is not None:
+        level = max(level, from_state.level, key=LEVELS.index)
+    turning = loaded and (follows(load) or (from_state is not None and from_state.follows))
+    return prepared(robot, level, loaded=loaded, follows=turning, refinement=refinement)
+
+
+__all__ = ["simulate", "solve", "solve_each"]

@@ -1,0 +1,140 @@
+"""The notches of a robot as tables that fit a terminal: how they are cut, and how they close."""
+
+from __future__ import annotations
+
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from notchflex.cli import terminal
+from notchflex.robot import Robot
+
+NO_NUMBER = "–"
+CLOSES, NEVER, NOT_FOUND = "closes", "never", "not found"
+_MEANINGS = {
+    NEVER: "no tension closes the notch",
+    NOT_FOUND: "the solver did not converge at the tensions in question, so the notch may close; "
+    "`notchflex simulate` shows how far it bends",
+}
+SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
+"""Heads for what every notch has, so that there is room for what is its own."""
+
+
+def description_tables(robot: Robot) -> list[Table]:
+    """Return how the notches are cut, with one table for each kind; equal notches share a row."""
+    from notchflex.analysis.notch_table import named_values
+
+    rows: dict[str, dict[tuple[Any, ...], list[int]]] = {}
+    names: dict[str, list[str]] = {}
+    for number, notch in enumerate(robot.notches, start=1):
+        values = named_values(notch)
+        kind = values.pop("kind")
+        names[kind] = list(values)
+        rows.setdefault(kind, {}).setdefault(tuple(values.values()), []).append(number)
+    return [_description(kind, names[kind], alike) for kind, alike in rows.items()]
+
+
+def _description(kind: str, names: list[str], alike: dict[tuple[Any, ...], list[int]]) -> Table:
+    given = [place for place in range(len(names)) if any(one[place] is not None for one in alike)]
+    heads = [_head(names[place]) for place in given]
+    cells = [
+        [run_of(numbers), *(_value(values[place]) for place in given)]
+        for values, numbers in alike.items()
+    ]
+    return _filled([f"{kind}\nnotch", *heads], cells)
+
+
+def run_of(numbers: list[int]) -> str:
+    """Write rising numbers shortly.
+
+    Example:
+        >>> run_of([1, 2, 3, 7]), run_of([1, 3, 5, 7]), run_of([2, 6])
+        ('1–3, 7', '1, 3 … 7', '2, 6')
+    """
+    steps = {after - before for before, after in pairwise(numbers)}
+    if len(numbers) > 3 and len(steps) == 1 and steps != {1}:
+        return f"{numbers[0]}, {numbers[1]} … {numbers[-1]}"
+    runs = groupby(enumerate(numbers), key=lambda item: item[1] - item[0])
+    ends = [[number for _, number in run] for _, run in runs]
+    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]}–{r[-1]}" for r in ends)
+
+
+def closing_table(notches: list[dict[str, Any]]) -> Table:
+    """Return the sections and the closing of all notches; columns without a number are left out."""
+    several = len(notches[0]["moment_arm_mm"]) > 1
+    columns = {
+        "notch": [str(row["notch"]) for row in notches],
+        "A\nmm²": _numbers(notches, "area_mm2", ".4f"),
+        "y\nmm": _numbers(notches, "centroid_mm", ".4f"),
+        "I\nmm⁴": _numbers(notches, "second_moment_mm4", ".4e"),
+        "tendon": [str(row["closing_tendon"]) if several else NO_NUMBER for row in notches],
+        "arm\nmm": [f"{row['moment_arm_mm'][row['closing_tendon'] - 1]:.4f}" for row in notches],
+        "closing\ndeg": _numbers(notches, "closing_angle_deg", ".2f"),
+        "tension\nN": [
+            f"{row['closing_tension_N']:.3f}"
+            if row["closing_status"] == CLOSES
+            else row["closing_status"]
+            for row in notches
+        ],
+        "strain\n%": _numbers(notches, "closing_outer_strain", ".2f", 100.0),
+        "peak\n%": _numbers(notches, "closing_peak_strain", ".2f", 100.0),
+    }
+    shown = {head: cells for head, cells in columns.items() if {*cells} != {NO_NUMBER}}
+    return _filled(list(shown), [list(row) for row in zip(*shown.values(), strict=True)])
+
+
+def closing_legend(notches: list[dict[str, Any]]) -> str:
+    """Return what the columns of the closing table mean."""
+    pulled = "the tendon" if len(notches[0]["moment_arm_mm"]) == 1 else "the tendon named"
+    spine = any("centroid_mm" in row for row in notches)
+    shown = {row["closing_status"] for row in notches}
+    words = (
+        "A, y, I: area, centroid (from the tube axis toward the spine) and second moment"
+        if spine
+        else "A, I: area and second moment"
+    )
+    strains = (
+        ", and the strain there of the outer fibre (Pacheco 2021, eq. 16) and of the farthest "
+        "fibre (peak)"
+        if spine
+        else ""
+    )
+    return (
+        f"{words} of what the cut leaves, where it is weakest. arm: moment arm of {pulled}. "
+        f"Closing: angle of the notch and tension of that tendon pulled alone from rest{strains}."
+        + "".join(f" {status}: {text}." for status, text in _MEANINGS.items() if status in shown)
+    )
+
+
+def _numbers(rows: list[dict[str, Any]], key: str, form: str, scale: float = 1.0) -> list[str]:
+    values = [scale * row.get(key, np.nan) for row in rows]
+    return [format(value, form) if np.isfinite(value) else NO_NUMBER for value in values]
+
+
+def _head(name: str) -> str:
+    return SHORTER.get(name, name).replace("_", "\n")
+
+
+def _value(value: Any) -> str:
+    if value is None:
+        return NO_NUMBER
+    return value if isinstance(value, str) else f"{value:g}"
+
+
+def _filled(heads: list[str], rows: list[list[str]]) -> Table:
+    """Make a table whose columns stand two characters apart, or one where it would be too wide."""
+    # Units stand on one line at the foot of the heads.
+    deepest = max(head.count("\n") for head in heads)
+    widths = [
+        max(map(len, (*head.split("\n"), *(row[place] for row in rows))))
+        for place, head in enumerate(heads)
+    ]
+    gap = 2 if sum(widths) + 2 * len(widths) <= terminal.NARROW else 1
+    table = Table(box=None, padding=(0, gap, 0, 0), header_style="bold", pad_edge=False)
+    for head in heads:
+        table.add_column("\n" * (deepest - head.count("\n")) + head, justify="right")
+    for row in rows:
+        table.add_row(*row)
+    return table

@@ -1,0 +1,102 @@
+"""Which steps of a long path a table shows: a regular stride, with peaks and reversals."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from notchflex.errors import InputError
+
+if TYPE_CHECKING:
+    from notchflex.results import EquilibriumPath
+
+MOST_ROWS = 60
+"""A path with no more steps than this is shown whole."""
+
+
+def shown_rows(path: EquilibriumPath, most: int = MOST_ROWS) -> tuple[list[int], int]:
+    """Return the steps to show and the stride between them.
+
+    Args:
+        path: Solved path, S steps.
+        most: A path with no more steps than this is shown whole.
+
+    Returns:
+        Indices in rising order, and the stride: 1 where every step is shown. Otherwise every
+        stride-th step, and beside these the first and the last one, every step where a commanded
+        tension or stroke reverses (of a path that reverses all the time only its extremes), and
+        the first step that did not converge.
+    """
+    steps = len(path)
+    stride = next(
+        size * 10**power
+        for power in range(7)  # 1, 2, 5, 10, 20, ...: so that round loads stay round
+        for size in (1, 2, 5)
+        if steps <= most * size * 10**power
+    )
+    rows = set(range(0, steps, stride)) | {0, steps - 1}
+    if stride > 1:
+        reversals = reversals_of(path)
+        rows |= reversals if len(reversals) <= most else _extremes(path)
+        rows |= {int(step) for step in np.flatnonzero(~np.asarray(path.converged))[:1]}
+    return sorted(rows), stride
+
+
+def reversals_of(path: EquilibriumPath) -> set[int]:
+    """Return the steps at which a commanded tension or stroke stops rising or falling.
+
+    Where a load is held for some steps before it reverses, the first and the last of these.
+    """
+    found: set[int] = set()
+    for column in _commanded(path):
+        change = np.sign(np.diff(column))
+        moves = np.flatnonzero(change)
+        for before, after in pairwise(moves):
+            if change[before] != change[after]:
+                found |= {int(before) + 1, int(after)}
+    return found
+
+
+def rows_note(steps: int, shown: int, stride: int) -> str:
+    """Return the sentence that says which steps are shown; "" where all are."""
+    if stride == 1:
+        return ""
+    which = {1: "st", 2: "nd", 3: "rd"}.get(stride, "th")
+    return (
+        f"{steps} steps, {shown} shown: every {stride}{which} one, and where the load reverses. "
+        "--all shows every step."
+    )
+
+
+def _extremes(path: EquilibriumPath) -> set[int]:
+    return {
+        int(pick(column))
+        for column in _commanded(path)
+        for pick in (np.nanargmin, np.nanargmax)
+        if np.isfinite(column).any()
+    }
+
+
+def _commanded(path: EquilibriumPath) -> list[np.ndarray]:
+    """The columns of what was commanded; the tensions of what was not are no commands."""
+    columns = [*np.asarray(path.commanded_tension).T, *np.asarray(path.commanded_stroke).T]
+    return [column for column in columns if np.isfinite(column).any()]
+
+
+def all_rows(path: EquilibriumPath) -> tuple[list[int], int]:
+    """Return every step of a path, as `shown_rows` does.
+
+    Raises:
+        InputError: The path is longer than a terminal can hold.
+    """
+    if len(path) > _MOST_ALL:
+        raise InputError(
+            f"--all: a table of {len(path):,} rows; write them with --csv FILE instead "
+            f"(--all shows up to {_MOST_ALL:,})."
+        )
+    return list(range(len(path))), 1
+
+
+_MOST_ALL = 20_000

@@ -1,0 +1,62 @@
+"""`notchflex completion`: verbs and options completed by the shell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from notchflex.cli import terminal
+from notchflex.errors import InputError
+from notchflex.results.files.streams import write_document
+
+Shell = Literal["bash", "zsh", "fish", "powershell"]
+
+
+def completion(
+    shell: Annotated[
+        Shell | None,
+        Parameter(help="bash, zsh, fish or powershell; the one that runs if left out."),
+    ] = None,
+    /,
+    *,
+    install: Annotated[
+        bool,
+        Parameter(
+            negative=(),
+            show_default=False,
+            help="Write the script to its place for this user, and a line that reads it to the "
+            "start-up file of the shell; what was written is told.",
+        ),
+    ] = False,
+) -> None:
+    """Print the script that completes verbs and options in a shell, or install it."""
+    from cyclopts.completion.detect import ShellDetectionError
+
+    from notchflex.cli.app import build
+
+    app = build()
+    try:
+        if not install:
+            write_document(_with_files(app.generate_completion(shell=shell)))
+            return
+        written: Path = app.install_completion(shell=shell)
+        written.write_text(_with_files(written.read_text(encoding="utf-8")), encoding="utf-8")
+    except ShellDetectionError:
+        raise InputError(
+            "which shell this is cannot be told; name it: notchflex completion bash (or zsh, fish, "
+            "powershell)."
+        ) from None
+    except OSError as problem:
+        raise InputError(
+            f"the script cannot be written: {problem.filename}: {problem.strerror}."
+        ) from None
+    terminal.output().print(
+        f"Written: {written}. It works in every shell that is started from now on.", soft_wrap=True
+    )
+
+
+def _with_files(script: str) -> str:
+    """Where nothing else fits, bash proposes files: robots and data are files too."""
+    return script.replace("complete -F _notchflex", "complete -o default -F _notchflex")

@@ -1,0 +1,205 @@
+"""`notchflex doctor`: what this installation is made of, and whether it computes right."""
+
+from __future__ import annotations
+
+import platform
+import re
+import sys
+from collections.abc import Iterable
+from importlib import metadata
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from notchflex import __version__
+from notchflex._extras import install_command
+from notchflex.cli import terminal
+from notchflex.cli.arguments.options import JsonFile, Quiet
+from notchflex.results.files.writing import STANDARD_OUTPUT, check_output
+
+BUILDERS = ("test", "dev", "docs", "all")
+"""Extras for those who change the program, or of all others together."""
+
+
+ClearCache = Annotated[
+    bool,
+    Parameter(
+        help="Remove the compiled programs kept on disk; they are compiled anew when needed."
+    ),
+]
+
+
+def doctor(*, clear_cache: ClearCache = False, json: JsonFile = None, quiet: Quiet = False) -> int:
+    """Check the installation: versions, the device of JAX, extras, the kept programs.
+
+    JAX 0.10.2 and 0.11.0 compute wrong sums on the processor; one such sum is computed and
+    compared. The exit code is 1 where it is wrong: no number of this program can be trusted then.
+    """
+    terminal.be_quiet(quiet)
+    if json is not None:
+        check_output(json, "--json")
+    if clear_cache:
+        from notchflex.solver.programs import store as _store
+
+        removed = _store.clear()
+        terminal.note(f"removed {removed.programs} programs, {removed.size / 1e6:.1f} MB")
+    with terminal.working("computing a sum that is known"):
+        found = examination()
+    if json is not None:
+        from notchflex.results.files.json import write_json
+
+        write_json(json, found)
+    if json != STANDARD_OUTPUT and not quiet:
+        _print(found)
+    if found["healthy"]:
+        return 0
+    canary = found["canary"]
+    terminal.error(
+        f"JAX {found['packages']['jax']} computes wrong numbers on this machine: a sum that is "
+        f"{canary['expected']:.0f} came out as {canary['computed']:.0f}. Install another version: "
+        "pip install 'jax!=0.10.2,!=0.11.0'"
+    )
+    return 1
+
+
+def examination() -> dict[str, Any]:
+    """Return what `doctor` has found out, as plain values."""
+    from notchflex.cli.compile_cache import use_compile_cache
+    from notchflex.solver.programs import shipped as _shipped
+    from notchflex.solver.programs import store as _store
+
+    use_compile_cache()
+    from notchflex._canary import canary
+    from notchflex._jax import jax
+
+    sum_of_squares = canary()
+    folder, kept = _store.program_folder(), _store.usage()
+    return {
+        "program": "notchflex",
+        "version": __version__,
+        "healthy": sum_of_squares.sings,
+        "python": platform.python_version(),
+        "executable": sys.executable,
+        "system": platform.platform(),
+        "packages": _versions(requirements()[""]),
+        "device": {
+            "kind": jax.default_backend(),
+            "names": [str(device) for device in jax.devices()],
+            "x64": bool(jax.config.jax_enable_x64),  # pyright: ignore[reportAttributeAccessIssue]
+        },
+        "canary": {"expected": sum_of_squares.expected, "computed": sum_of_squares.computed},
+        "extras": _extras(),
+        "compile_cache": {
+            "folder": None if folder is None else str(folder),
+            "programs": kept.programs,
+            "bytes": kept.size,
+            "most_bytes": _store.MOST_BYTES,
+            "shipped": _shipped.count(),
+        },
+    }
+
+
+def requirements(lines: Iterable[str] | None = None) -> dict[str, list[str]]:
+    """Return the packages that each extra asks for; "" has what every installation needs.
+
+    Args:
+        lines: Requirements as a wheel states them; those of the installed program if None.
+
+    Example:
+        >>> lines = ["numpy>=2", "h5py>=3; extra == 'data'", "notchflex[data]; extra == 'all'"]
+        >>> requirements(lines)
+        {'': ['numpy'], 'data': ['h5py'], 'all': []}
+    """
+    if lines is None:
+        try:
+            lines = metadata.requires("notchflex") or []
+        except metadata.PackageNotFoundError:
+            lines = []
+    found: dict[str, list[str]] = {"": []}
+    for line in lines:
+        what, _, when = line.partition(";")
+        name = re.match(r"[\w.-]+", what.strip())
+        extra = re.search(r"extra\s*==\s*[\"']([\w-]+)[\"']", when)
+        packages = found.setdefault(extra[1] if extra else "", [])
+        if name and name[0] != "notchflex":
+            packages.append(name[0])
+    return found
+
+
+def _versions(packages: Iterable[str]) -> dict[str, str | None]:
+    """Version of each package, None where it is not installed; JAX's library too."""
+    names = list(dict.fromkeys(packages))
+    if "jax" in names:
+        names.insert(names.index("jax") + 1, "jaxlib")
+    return {name: _version(name) for name in names}
+
+
+def _version(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _extras() -> dict[str, Any]:
+    return {
+        extra: {
+            "packages": (versions := _versions(packages)),
+            "installed": all(version is not None for version in versions.values()),
+            "install": install_command(extra),
+        }
+        for extra, packages in requirements().items()
+        if extra and extra not in BUILDERS and packages
+    }
+
+
+def _print(found: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    console = terminal.output()
+
+    def section(title: str, rows: Iterable[tuple[str, str]]) -> None:
+        table = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
+        table.add_column(style="cyan", no_wrap=True, min_width=14)
+        table.add_column(overflow="fold")
+        for row in rows:
+            table.add_row(*row)
+        console.print(title, style="bold")
+        console.print(table)
+
+    missing = "not installed"
+    device = found["device"]
+    cache = found["compile_cache"]
+    section(
+        f"notchflex {found['version']}",
+        [
+            ("python", f"{found['python']}, {found['executable']}"),
+            ("system", found["system"]),
+            *((name, version or missing) for name, version in found["packages"].items()),
+        ],
+    )
+    section(
+        "\nJAX",
+        [
+            ("device", f"{device['kind']}: {', '.join(device['names'])}"),
+            ("floats", "64 bits" if device["x64"] else "32 bits"),
+            ("known sum", "right" if found["healthy"] else "WRONG"),
+            (
+                "programs",
+                f"{cache['programs']} compiled, {cache['bytes'] / 1e6:.1f} MB of at most "
+                f"{cache['most_bytes'] / 1e6:.0f}, in {cache['folder']}",
+            )
+            if cache["folder"]
+            else ("programs", "compiled in every process, not kept"),
+            ("shipped", f"{cache['shipped']} programs of typical calls; only a wheel carries them"),
+        ],
+    )
+    section("\nExtras", [(name, _extra_words(extra)) for name, extra in found["extras"].items()])
+
+
+def _extra_words(extra: dict[str, Any]) -> str:
+    here = [f"{name} {version}" for name, version in extra["packages"].items() if version]
+    gone = [name for name, version in extra["packages"].items() if not version]
+    if not gone:
+        return ", ".join(here)
+    return f"{', '.join(gone)} missing: {extra['install']}"

@@ -1,0 +1,64 @@
+"""`notchflex friction-rig`: the coefficient of friction from two hanging weights."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from notchflex.cli import terminal
+from notchflex.cli.arguments.options import JsonFile, PlotFile
+from notchflex.results.files.writing import (
+    STANDARD_OUTPUT,
+    check_distinct,
+    check_output,
+    check_picture,
+)
+
+
+def friction_rig(
+    data: Annotated[
+        str,
+        Parameter(
+            help="CSV with `weight_1_g` (pulls), `weight_2_g` (is lifted), `turn_1_deg` and "
+            "`turn_2_deg`; if known the standard deviations `weight_1_sd_g`, `turn_1_sd_deg`, ..."
+        ),
+    ],
+    /,
+    *,
+    json: JsonFile = None,
+    plot: PlotFile = None,
+) -> None:
+    """Find the coefficient of friction of a tendon over two edges from two hanging weights.
+
+    Every row is a reading: weight 1 is just about to lift weight 2, the tendon turning over two
+    edges in between (Liu 2022, eq. 21). Prints the coefficient with its 95 % interval, the spread
+    of the readings, those that stand out, and whether a constant coefficient is enough.
+    """
+    check_distinct({"--json": json, "--plot": plot})
+    if json is not None:
+        check_output(json, "--json", inputs=[data])
+    if plot is not None:
+        check_picture(plot, "--plot", inputs=[data])
+
+    from notchflex.fit.friction_rig.documents import friction_document
+    from notchflex.fit.friction_rig.readings import read_friction_rig
+    from notchflex.fit.friction_rig.rig import friction_rig as estimate
+
+    rig = estimate(read_friction_rig(data))
+    if json is not None:
+        from notchflex.results.files.json import write_json
+
+        write_json(json, friction_document(rig))
+    if plot is not None:
+        with terminal.working(f"drawing {plot}"):
+            from notchflex.plotting import friction_picture
+
+            friction_picture(rig).save(plot)
+    if json != STANDARD_OUTPUT:
+        console = terminal.output()
+        console.print(data, soft_wrap=True)
+        for sentence in rig.words:
+            console.print(sentence)
+    if rig.readings.ignored:
+        terminal.note(f"ignored columns: {', '.join(rig.readings.ignored)}.")

@@ -1,0 +1,1 @@
+"""The friction rig: a coefficient of friction from two hanging weights."""

@@ -1,0 +1,180 @@
+"""Readings of the two-weight friction rig, and reading them from a CSV."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.errors import InputError
+from notchflex.fit.friction_rig.two_weights import (
+    coefficient_from_weights,
+    impossible,
+    slopes_of_coefficient,
+)
+from notchflex.results.files.csv_reading import read_table
+
+COLUMNS = {
+    "weight_1": ("weight_1_g", "weight_1_sd_g"),
+    "weight_2": ("weight_2_g", "weight_2_sd_g"),
+    "turn_1": ("turn_1_deg", "turn_1_sd_deg"),
+    "turn_2": ("turn_2_deg", "turn_2_sd_deg"),
+}
+"""Field of the readings to its column, and to that of its standard deviation."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrictionReadings:
+    """N readings of the rig: weight 1 is just about to lift weight 2 over two edges.
+
+    Attributes:
+        weight_1: Weight that pulls, g, (N,).
+        weight_2: Weight that is lifted, g, (N,).
+        turn_1: Angle by which the string turns over the first edge, rad, (N,).
+        turn_2: The same over the second edge, rad, (N,).
+        deviation: Standard deviations of these four, in their order and units, (N, 4); NaN where
+            not known. A reading without any is taken to be as accurate as the others.
+        source: Where they came from.
+        lines: Lines of the file that they stand in; empty if there is none.
+        ignored: Columns of the file that were not used.
+
+    Raises:
+        InputError: Shapes that do not fit, or a reading that cannot be.
+
+    Example:
+        >>> rig = FrictionReadings([200.0, 300.0], [150.0, 221.0], [1.6, 1.6], [1.6, 1.6])
+        >>> rig.coefficient.round(4).tolist()
+        [0.0697, 0.0741]
+    """
+
+    weight_1: NDArray[np.float64]
+    weight_2: NDArray[np.float64]
+    turn_1: NDArray[np.float64]
+    turn_2: NDArray[np.float64]
+    deviation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    source: str = "readings"
+    lines: tuple[int, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the numbers, and bring them to arrays of floats."""
+        arrays = [np.array(getattr(self, name), float, ndmin=1) for name in COLUMNS]
+        count = len(arrays[0])
+        deviation = np.array(self.deviation, float)
+        if not deviation.size:
+            deviation = np.full((count, 4), np.nan)
+        if any(one.shape != (count,) for one in arrays) or deviation.shape != (count, 4):
+            raise InputError("readings need four numbers each, and as many standard deviations")
+        if not count:
+            raise InputError("there are no readings; give at least one")
+        if not np.isfinite(arrays).all() or np.isinf(deviation).any() or (deviation <= 0.0).any():
+            raise InputError(
+                "readings must be finite, their standard deviations above 0 or NaN where not known"
+            )
+        for name, value in zip(COLUMNS, arrays, strict=True):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "deviation", deviation)
+        found = impossible(*arrays)
+        if found is not None:
+            raise InputError(f"{self.at(found[0])}: {found[1]}")
+
+    def __len__(self) -> int:
+        """Number of readings."""
+        return len(self.weight_1)
+
+    def __repr__(self) -> str:
+        """How many, from where."""
+        return f"<FrictionReadings of {self.source}: {len(self)}>"
+
+    def at(self, reading: int) -> str:
+        """Return where a reading (from 0) stands, for messages."""
+        if self.lines:
+            return f"{self.source}, line {self.lines[reading]}"
+        return f"{self.source}, reading {reading + 1}"
+
+    @cached_property
+    def coefficient(self) -> NDArray[np.float64]:
+        """Coefficient of friction of every reading, (N,)."""
+        return coefficient_from_weights(self.weight_1, self.weight_2, self.turn_1, self.turn_2)
+
+    @cached_property
+    def coefficient_deviation(self) -> NDArray[np.float64]:
+        """Standard deviation of it by those of the reading, (N,); NaN where none is known.
+
+        To first order; of a reading of which only some are known, by these.
+        """
+        slopes = slopes_of_coefficient(
+            self.coefficient, self.weight_1, self.weight_2, self.turn_1, self.turn_2
+        )
+        known = ~np.isnan(self.deviation)
+        part = slopes.T * np.where(known, self.deviation, 0.0)
+        return np.where(known.any(axis=1), np.sqrt(np.sum(part**2, axis=1)), np.nan)
+
+    @property
+    def turn(self) -> NDArray[np.float64]:
+        """Angle by which the string turns over both edges, rad, (N,)."""
+        return self.turn_1 + self.turn_2
+
+
+def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
+    r"""Read readings of the two-weight rig from a CSV.
+
+    The file is UTF-8 with commas and its header first, with the columns `weight_1_g`,
+    `weight_2_g`, `turn_1_deg` and `turn_2_deg` and, if known, `weight_1_sd_g`, `turn_1_sd_deg` and
+    so on; lines that start with `#` are skipped, other columns ignored.
+
+    Args:
+        source: Path of the file.
+
+    Returns:
+        The readings, in the order of the file.
+
+    Raises:
+        InputError: The file cannot be used, or a reading is impossible; one sentence names the
+            line.
+
+    Example:
+        >>> from pathlib import Path
+        >>> text = "weight_1_g,weight_2_g,turn_1_deg,turn_2_deg\n200,150,90,90\n"
+        >>> _ = Path("rig.csv").write_text(text)
+        >>> read_friction_rig("rig.csv").coefficient.round(4).tolist()
+        [0.0718]
+    """
+    table = read_table(source)
+    missing = [column for column, _ in COLUMNS.values() if column not in table.header]
+    if missing:
+        words = f"column {missing[0]} is" if len(missing) == 1 else f"columns {missing[0]} "
+        if len(missing) > 1:
+            words = f"columns {', '.join(missing)} are"
+        raise InputError(f"{table.name}: the {words} not there; {table.columns}.")
+    deviation = np.full((len(table), len(COLUMNS)), np.nan)
+    values: dict[str, NDArray[np.float64]] = {}
+    used: set[str] = set()
+    for place, (name, (column, spread)) in enumerate(COLUMNS.items()):
+        values[name] = table.numbers(column)
+        used.add(column)
+        if spread in table.header:
+            used.add(spread)
+            deviation[:, place] = table.numbers(spread, may_miss=True)
+            if (deviation[:, place] <= 0.0).any():
+                row = int(np.argmax(deviation[:, place] <= 0.0))
+                raise InputError(
+                    f"{table.at(row)}: {spread} is {deviation[row, place]:g}; a standard deviation "
+                    "is above 0, or empty where it is not known."
+                )
+        if column.endswith("_deg"):
+            values[name] = np.radians(values[name])
+            deviation[:, place] = np.radians(deviation[:, place])
+    return FrictionReadings(
+        **values,
+        deviation=deviation,
+        source=table.name,
+        lines=table.lines,
+        ignored=tuple(column for column in table.header if column not in used),
+    )
+
+
+__all__ = ["COLUMNS", "FrictionReadings", "read_friction_rig"]

@@ -1,0 +1,1 @@
+"""Measurements: reading, writing, repeats, simulated ones."""

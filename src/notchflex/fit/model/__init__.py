@@ -1,0 +1,1 @@
+"""The model at every measured row, and its residuals."""

@@ -1,9 +1,0 @@
-"""Friction between tendon and tube: how far tension can fall over one contact."""
-
-from notchflex._packages import import_all
-from notchflex.friction.corner import CornerLaw
-from notchflex.friction.registry import FrictionLaw, friction_law
-
-import_all(__name__, __path__)
-
-__all__ = ["CornerLaw", "FrictionLaw", "friction_law"]

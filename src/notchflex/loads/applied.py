@@ -1,0 +1,311 @@
+"""External loads as the solver takes them: sums over each body, in the frame of the base.
+
+With R the rotation of a body against the base, a force f that keeps its direction in the base
+acts on the body's frame as R^T f, at a point p of the body with the moment p x R^T f about its
+origin. Of many such forces only three sums are needed whatever R is: f, the moments, and the
+products p f^T. Forces that turn with the body are constant in its frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from math import hypot
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import array_module, constant
+from notchflex.errors import InputError
+from notchflex.loads.external import ExternalLoad
+from notchflex.loads.load_path import LoadPath
+from notchflex.mechanics.chain import bending_normal
+from notchflex.mechanics.motion import IN_PLANE, PLANE, rotation_about, turned, unskew
+from notchflex.robot import Robot
+
+# Part of a vector that may stick out of a plane by rounding.
+_ROUNDING = 1e-12
+
+
+class Applied(NamedTuple):
+    """External loads on the bodies, base first; loads as leading axis. Units N, N mm.
+
+    Attributes:
+        dead_force: Sum of the forces that keep their direction, in the base frame.
+        dead_moment: Sum of the moments that keep their direction, in the base frame.
+        dead_arm: Sum of the products p f^T of the points where those forces act (in the body's
+            frame) and the forces (in the base frame).
+        following: Moment and force of what turns with a body, about its origin, in its frame.
+    """
+
+    dead_force: Float[Array, "*s bodies d"]
+    dead_moment: Float[Array, "*s bodies a"]
+    dead_arm: Float[Array, "*s bodies d d"]
+    following: Float[Array, "*s bodies w"]
+
+
+def applied(
+    load_path: LoadPath,
+    robot: Robot,
+    body_mass: Float[np.ndarray, " bodies"],
+    body_centre: Float[np.ndarray, "bodies 3"],
+    body_length: Float[np.ndarray, " bodies"],
+    frame: Float[np.ndarray, "3 3"] | None = None,
+) -> Applied:
+    """Sum up what acts from outside on each body.
+
+    Args:
+        load_path: The loads, s steps.
+        robot: The robot.
+        body_mass: Mass of each body, base first, g; zeros where the density is not known.
+        body_centre: Centre of mass of each body in its frame, mm.
+        body_length: Axial length of each body, mm; the tip is the end of the last one.
+        frame: Frame whose x and z span the plane of a flat chain, in which the sums are wanted.
+
+    Returns:
+        The sums, s steps as leading axis; those on the base too.
+
+    Raises:
+        InputError: A body that the robot does not have, or gravity where nothing has a mass.
+    """
+    axes = _axes(_turn(load_path), None if frame is None else tuple(frame.ravel().tolist()))
+    sums: list[tuple[np.ndarray, ...]] = []
+    for external in load_path.different:
+        _check(external, robot)
+        tip = float(body_length[-1])
+        sums.append(_sums(external, axes, body_mass, body_centre, tip))
+    if len(load_path) == 1:
+        return Applied(*(constant(field[None]) for field in sums[0]))
+    # Loads that stay the same over many steps are summed up once.
+    every = (np.array(field)[load_path.which] for field in zip(*sums, strict=True))
+    return Applied(*map(constant, every))
+
+
+def in_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
+    """Loads of space as those of the plane that x and z of a frame span."""
+    turn = np.asarray(frame)
+    arm = turn.T @ np.asarray(loads.dead_arm) @ turn
+    following = [np.asarray(loads.following)[..., part] @ turn for part in (_FIRST, _LAST)]
+    return Applied(
+        dead_force=constant((np.asarray(loads.dead_force) @ turn)[..., IN_PLANE]),
+        dead_moment=constant((np.asarray(loads.dead_moment) @ turn)[..., 1:2]),
+        dead_arm=constant(arm[..., IN_PLANE, :][..., IN_PLANE]),
+        following=constant(np.concatenate(following, axis=-1)[..., PLANE]),
+    )
+
+
+def out_of_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
+    """Loads of the plane that x and z of a frame span as those of space."""
+    turn = np.asarray(frame)
+    plane, about = turn[:, IN_PLANE], turn[:, 1]
+    following = np.asarray(loads.following) @ np.eye(6)[PLANE]
+    turned = [following[..., part] @ turn.T for part in (_FIRST, _LAST)]
+    return Applied(
+        dead_force=constant(np.asarray(loads.dead_force) @ plane.T),
+        dead_moment=constant(np.asarray(loads.dead_moment) * about),
+        dead_arm=constant(plane @ np.asarray(loads.dead_arm) @ plane.T),
+        following=constant(np.concatenate(turned, axis=-1)),
+    )
+
+
+_FIRST, _LAST = slice(0, 3), slice(3, 6)
+
+
+def body_wrench(rotation: Float[Array, "d d"], one: Applied) -> Float[Array, " w"]:
+    """Wrench (moment, force) of the loads on one body, about its origin, in its frame.
+
+    Args:
+        rotation: Rotation of the body against the base.
+        one: The sums for this body, without leading axes.
+
+    Returns:
+        The wrench, N mm and N; plain or traced numbers as given.
+
+    Example:
+        >>> at_side = Applied(np.eye(3)[2], np.zeros(3), np.outer([2.0, 0, 0], [0, 0, 1.0]), 0.0)
+        >>> body_wrench(np.eye(3), at_side).tolist()
+        [0.0, -2.0, 0.0, 0.0, 0.0, 1.0]
+    """
+    xp = array_module(rotation, *one)
+    # The vector of the skew part of p f^T is minus half of p x f.
+    moment = turned(rotation.T, one.dead_moment) - 2.0 * unskew(one.dead_arm @ rotation)
+    return xp.concatenate([moment, one.dead_force @ rotation]) + one.following
+
+
+def is_unloaded(load_path: LoadPath) -> bool:
+    """Whether nothing acts from outside in any step."""
+    return all(external.is_nothing for external in load_path.different)
+
+
+def follows(load_path: LoadPath) -> bool:
+    """Whether anything turns with a body in any step."""
+    return any(external.follows for external in load_path.different)
+
+
+def is_planar(load_path: LoadPath, robot: Robot) -> bool:
+    """Whether every load from outside stays in the robot's plane of bending.
+
+    It does where each force lies in the plane and acts at a point of it, and each moment turns
+    about its normal. Own weight counts as acting on the tube axis.
+
+    Args:
+        load_path: The loads.
+        robot: The robot; one whose notches bend in several planes has no plane to stay in.
+
+    Returns:
+        Whether they all do, to rounding; each load alone, not their sum.
+    """
+    normal = bending_normal(robot)
+    if normal is None:
+        return False
+    turned = _turned_by(_turn(load_path)) @ normal
+    for external in load_path.different:
+        # Only directions matter here: any mass will do, and where on the tube axis it is.
+        forces = list(_forces(external, 0, 0.0))
+        if external.gravity is not None:
+            forces.append((0, external.weight(1.0), _NONE, _NONE, False))
+        for _, force, moment, point, following in forces:
+            if _sticks_out(force, moment, point, normal if following else turned, normal):
+                return False
+    return True
+
+
+def _sticks_out(
+    force: Sequence[float],
+    moment: Sequence[float],
+    point: Sequence[float],
+    normal: Float[np.ndarray, " 3"],
+    normal_of_body: Float[np.ndarray, " 3"],
+) -> bool:
+    """Whether a force leaves a plane or acts beside it, or a moment turns out of it."""
+    across = hypot(*_crossed(moment, normal.tolist()))
+    at = _along(point, normal_of_body) if any(force) else 0.0
+    return (
+        abs(_along(force, normal)) > _ROUNDING * hypot(*force)
+        or across > _ROUNDING * hypot(*moment)
+        or abs(at) > _ROUNDING * hypot(*point)
+    )
+
+
+def _along(vector: Sequence[float], normal: Float[np.ndarray, " 3"]) -> float:
+    x, y, z = normal.tolist()
+    return vector[0] * x + vector[1] * y + vector[2] * z
+
+
+def _crossed(first: Sequence[float], second: Sequence[float]) -> list[float]:
+    """Cross product of plain numbers."""
+    (a, b, c), (x, y, z) = first, second
+    return [b * z - c * y, c * x - a * z, a * y - b * x]
+
+
+def _turn(load_path: LoadPath) -> tuple[float, ...]:
+    """Rotation vector of the base, by which rotations are looked up."""
+    return tuple(load_path.base_rotation.tolist())
+
+
+@lru_cache(maxsize=64)
+def _turned_by(vector: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
+    """Rotation of a rotation vector: the base stays as it is from load to load."""
+    found = np.array(rotation_about(constant(vector)))
+    found.setflags(write=False)
+    return found
+
+
+def _check(external: ExternalLoad, robot: Robot) -> None:
+    last = robot.number_of_notches
+    for force in external.body_forces:
+        if force.body > last:
+            raise InputError(
+                f"there is no body {force.body}; {robot.name} has the bodies 0 (the base) to "
+                f"{last}, one after each notch"
+            )
+    given = external.gravity is not None and any(external.gravity)
+    if given and robot.material.density is None and external.tip_mass == 0.0:
+        raise InputError(
+            f"gravity has nothing to act on: the density of {robot.name} is not known and no mass "
+            "hangs at its tip; give material.density (kg/m3) or a tip_mass (g)"
+        )
+
+
+_NONE = (0.0, 0.0, 0.0)
+_Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool]
+
+
+def _forces(external: ExternalLoad, last: int, tip: float) -> Iterator[_Force]:
+    """All that acts but the robot's own weight: body, force, moment, point, whether it follows.
+
+    The tip is `tip` (mm) beyond the origin of the last body.
+    """
+    for one in external.body_forces:
+        yield one.body, one.force, one.moment, one.point, one.following
+    x, y, z = external.tip_point
+    point = (x, y, z + tip)
+    if any(external.tip_force) or any(external.tip_moment):
+        yield last, external.tip_force, external.tip_moment, point, external.following
+    if external.tip_mass:
+        yield last, external.weight(external.tip_mass), _NONE, point, False
+
+
+class _Axes(NamedTuple):
+    """Axes that sums are wanted along and about, as plain numbers: there are few, and rarely many.
+
+    Attributes:
+        along: In the frame of the bodies.
+        about: Likewise.
+        held_along: The same in the world.
+        held_about: Likewise.
+    """
+
+    along: tuple[Sequence[float], ...]
+    about: tuple[Sequence[float], ...]
+    held_along: tuple[Sequence[float], ...]
+    held_about: tuple[Sequence[float], ...]
+
+
+@lru_cache(maxsize=64)
+def _axes(base: tuple[float, ...], frame: tuple[float, ...] | None) -> _Axes:
+    """Axes of a frame (of all three axes, or of the plane of its x and z) on a turned base."""
+    turn, along, about = _turned_by(base), np.eye(3), np.eye(3)
+    if frame is not None:
+        own = np.reshape(frame, (3, 3))
+        along, about = own[:, IN_PLANE], own[:, 1:2]
+    columns = (along, about, turn @ along, turn @ about)
+    return _Axes(*(tuple(map(tuple, one.T.tolist())) for one in columns))
+
+
+def _components(vector: Sequence[float], axes: tuple[Sequence[float], ...]) -> list[float]:
+    x, y, z = vector
+    return [x * a + y * b + z * c for a, b, c in axes]
+
+
+def _sums(
+    external: ExternalLoad,
+    axes: _Axes,
+    body_mass: Float[np.ndarray, " bodies"],
+    body_centre: Float[np.ndarray, "bodies 3"],
+    tip: float,
+) -> tuple[np.ndarray, ...]:
+    """The sums for all bodies."""
+    along, about, held_along, held_about = axes
+    count, d, a = len(body_mass), len(along), len(about)
+    moments, arms_end = d + a, d + a + d * d
+    table = np.zeros((count, arms_end + a + d))
+    for body, force, moment, point, follows in _forces(external, count - 1, tip):
+        if follows:
+            turning = [one + more for one, more in zip(moment, _crossed(point, force), strict=True)]
+            table[body, arms_end:] += _components(turning, about) + _components(force, along)
+        else:
+            own = _components(force, held_along)
+            arms = [part * one for part in _components(point, along) for one in own]
+            table[body, :arms_end] += own + _components(moment, held_about) + arms
+    if external.gravity is not None:
+        weight = body_mass[:, None] * np.array(_components(external.weight(1.0), held_along))
+        arms = (body_centre @ np.array(along).T)[:, :, None] * weight[:, None]
+        table[:, :d] += weight
+        table[:, moments:arms_end] += arms.reshape(count, -1)
+    arm = table[:, moments:arms_end].reshape(count, d, d)
+    return table[:, :d], table[:, d:moments], arm, table[:, arms_end:]
+
+
+__all__ = ["Applied", "applied", "body_wrench", "follows", "is_planar", "is_unloaded"]

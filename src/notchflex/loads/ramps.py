@@ -1,0 +1,72 @@
+"""The usual load paths: one tendon pulled by tension or drawn by stroke, in equal steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from notchflex.errors import InputError
+from notchflex.loads.load_path import LoadPath
+from notchflex.loads.validation import number, whole
+
+
+def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
+    """Pull one tendon by tension, from one value to another in equal steps.
+
+    Args:
+        start: First tension, N.
+        stop: Last tension, N.
+        steps: Number of steps, both ends included.
+        tendon: Which tendon, counted from 1.
+
+    Returns:
+        The path; `.release()` adds the way back, `.loaded(...)` external loads.
+
+    Raises:
+        InputError: Fewer than one step, a negative or infinite tension, no such tendon.
+
+    Example:
+        >>> pull(0.0, 3.0, steps=4).tension[:, 0].tolist()
+        [0.0, 1.0, 2.0, 3.0]
+    """
+    return _ramp("tension", start, stop, steps, tendon)
+
+
+def stroke_path(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
+    """Prescribe the stroke of one tendon, from one value to another in equal steps.
+
+    Args:
+        start: First stroke, mm.
+        stop: Last stroke, mm.
+        steps: Number of steps, both ends included.
+        tendon: Which tendon, counted from 1.
+
+    Returns:
+        The path; `.release()` adds the way back, `.loaded(...)` external loads.
+
+    Raises:
+        InputError: Fewer than one step, an infinite stroke, no such tendon.
+
+    Example:
+        >>> stroke_path(0.0, 1.0, steps=3).stroke[:, 0].tolist()
+        [0.0, 0.5, 1.0]
+    """
+    return _ramp("stroke", start, stop, steps, tendon)
+
+
+def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> LoadPath:
+    steps, tendon = whole(steps, "steps"), whole(tendon, "tendon")
+    if steps < 1:
+        raise InputError(f"a range needs at least one step; got {steps}")
+    if tendon < 1:
+        raise InputError(f"tendons are counted from 1; got {tendon}")
+    first, last = number(start, f"the first {what}"), number(stop, f"the last {what}")
+    commanded = np.full((steps, tendon), np.nan)
+    with np.errstate(over="ignore", invalid="ignore"):
+        commanded[:, tendon - 1] = np.linspace(first, last, steps)
+    if not np.isfinite(commanded[:, tendon - 1]).all():
+        raise InputError(f"a {what} range needs finite ends; got {first:g} and {last:g}")
+    nothing = np.full_like(commanded, np.nan)
+    return LoadPath(commanded, nothing) if what == "tension" else LoadPath(nothing, commanded)
+
+
+__all__ = ["pull", "stroke_path"]

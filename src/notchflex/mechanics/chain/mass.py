@@ -1,0 +1,65 @@
+"""What the pieces of a robot weigh: the uncut tube, and what the notches leave of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.mechanics.flexure import Rod
+from notchflex.robot import Robot, Tube
+from notchflex.robot.kinds import Notch
+
+# From kg/m3 to g/mm3.
+_GRAMS = 1e-6
+
+
+def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bodies"]:
+    """Length of each rigid piece on the tube axis, base first, mm."""
+    following = (*notches[1:], None)
+    behind = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
+    return np.array([tube.base_length, *behind])
+
+
+def body_masses(
+    robot: Robot, rods: Rod
+) -> tuple[Float[np.ndarray, " bodies"], Float[np.ndarray, "bodies 3"]]:
+    """Mass and centre of mass of each body, with its share of the notches.
+
+    A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
+    its centre halfway on the tube axis. What a notch leaves of the tube (area of its sections
+    times the length of the neutral axis) is heavy too, but only bodies carry loads: half of its
+    mass is put on the body before it where the neutral axis starts, half on the body behind it
+    where the neutral axis ends.
+
+    Args:
+        robot: The robot, n notches.
+        rods: Its flexures as they stand in the chain, each starting from the proximal body.
+
+    Returns:
+        Masses (g, (n + 1,)), base first, and centres (mm, (n + 1, 3)) in the frames of the
+        bodies; zero masses where the material's density is not known.
+    """
+    notches = robot.notches
+    centre = np.zeros((len(notches) + 1, 3))
+    density = robot.material.density
+    if density is None:
+        return np.zeros(len(centre)), centre
+    length = body_lengths(robot.tube, robot.notches)
+    wall = np.pi * (robot.tube.outer_radius**2 - robot.tube.inner_radius**2)
+    piece = wall * length
+    half = 0.5 * np.sum(np.asarray(rods.section.area) * np.asarray(rods.length), axis=-1)
+    start = np.asarray(rods.start_offset)
+    end = -np.einsum("nba,nb->na", np.asarray(rods.end_rotation), np.asarray(rods.end_offset))
+    volume = piece.copy()
+    volume[:-1] += half
+    volume[1:] += half
+    centre[:, 2] = 0.5 * length * piece
+    centre[:-1] += half[:, None] * start
+    centre[1:] += half[:, None] * end
+    # Every body has some volume: where no tube is left between two notches, halves of those.
+    return _GRAMS * density * volume, centre / volume[:, None]
+
+
+__all__ = ["body_masses"]

@@ -1,0 +1,99 @@
+"""A chain made longer by flexures that do nothing, so that unlike robots share one program."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from jaxtyping import Array
+
+from notchflex._jax import constant, jax
+from notchflex.mechanics.chain.chain import Chain
+from notchflex.mechanics.flexure import Rod
+
+_ROTATIONS = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")
+_NOTHING = (
+    "start_offset",
+    "curve_offset",
+    "end_offset",
+    "node_offset",
+    "reference_strain",
+    "basis",
+    "turn",
+    "turn_pair",
+    "step",
+    "node_turn",
+    "lip_closes",
+    "chord",
+)
+
+
+def padded(chain: Chain, flexures: int, edges: int) -> Chain:
+    """The same robot with more flexures beyond its tip, and more places for edges met.
+
+    What is added is stiff, straight and of no length, crossed by no tendon: the last body's frame
+    is then the tip, and no other number of the robot changes.
+
+    Args:
+        chain: The chain, as plain arrays.
+        flexures: How many flexures it is to have, as many as now or more.
+        edges: How many edges at which a tendon meets the wall it is to have places for.
+    """
+    more = flexures - chain.flexures
+    contacts = np.pad(
+        chain.contacts, ((0, 0), (0, edges - chain.contacts.shape[1])), constant_values=-1
+    )
+    if more == 0:
+        return dataclasses.replace(chain, contacts=contacts)
+
+    def longer(leaf: Any) -> Array:
+        return np.concatenate([leaf, np.repeat(leaf[-1:], more, axis=0)])  # pyright: ignore
+
+    def changed(part: Any, **values: Any) -> Any:
+        """A part whose added entries have other values."""
+        wider = jax.tree.map(longer, part)
+        own = {name: getattr(wider, name).copy() for name in values}
+        for name, value in values.items():
+            own[name][-more:] = value
+        return dataclasses.replace(wider, **own)
+
+    def with_nothing(values: Any) -> Array:
+        return constant(np.pad(values, [(0, more)] + [(0, 0)] * (np.ndim(values) - 1)))
+
+    return dataclasses.replace(
+        chain,
+        rods=_rods(chain, changed),
+        memory=jax.tree.map(longer, chain.memory),
+        groups=tuple(
+            changed(group, present=0.0, visits=0.0, ends=0.0, back=1, body_length=0.0)
+            for group in chain.groups
+        ),
+        lips=tuple(changed(group, closes=0.0, back=1) for group in chain.lips),
+        body_length=with_nothing(chain.body_length),
+        body_mass=with_nothing(chain.body_mass),
+        body_centre=with_nothing(chain.body_centre),
+        stiffness=np.concatenate([chain.stiffness, np.ones((more, chain.stiffness.shape[1]))]),
+        elastic=None if chain.elastic is None else _elastic(chain.elastic, more),
+        lip_stiffness=longer(chain.lip_stiffness),
+        notch_frame=longer(chain.notch_frame),
+        contacts=contacts,
+    )
+
+
+def _rods(chain: Chain, changed: Any) -> Rod:
+    rods = chain.rods
+    values = {name: 0.0 for name in _NOTHING if getattr(rods, name) is not None}
+    values |= {name: np.eye(getattr(rods, name).shape[-1]) for name in _ROTATIONS}
+    wider: Rod = changed(rods, idle=1.0, **values)
+    # The first that is added begins at the tip, at the end of the last body.
+    wider.start_offset[chain.flexures, -1] = chain.body_length[-1]  # pyright: ignore
+    return wider
+
+
+def _elastic(elastic: Any, more: int) -> Array:
+    idle = np.broadcast_to(np.eye(elastic.shape[-1]), (more, *elastic.shape[1:]))
+    return np.concatenate([elastic, idle])  # pyright: ignore
+
+
+__all__ = ["padded"]

@@ -1,0 +1,72 @@
+"""From the notches of a robot to the lips that may close them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import constant
+from notchflex.mechanics.contact.edge import Edges
+from notchflex.mechanics.contact.pairs import LipGroup
+from notchflex.mechanics.contact.spine import SpineLips
+from notchflex.mechanics.flexure import Rod
+from notchflex.mechanics.tendon.openings import passages
+from notchflex.robot import Tube
+from notchflex.robot.kinds import Notch
+
+
+def lay_lips(
+    notches: Sequence[Notch], tube: Tube, rods: Rod, body_length: Float[Array, " bodies"]
+) -> tuple[LipGroup, ...]:
+    """Lips of every kind that the notches have.
+
+    Args:
+        notches: Every notch, base to tip.
+        tube: The tube, whose outer edges meet.
+        rods: All flexures of the chain.
+        body_length: Length of the rigid pieces on the tube axis, base first, mm.
+    """
+    groups: list[LipGroup] = []
+    if np.any(rods.lip_closes):
+        closes = rods.lip_closes[:, None]
+        groups.append(SpineLips(closes, cast("Array", np.ones(closes.shape, int))))
+    sides = sorted({side % 360.0 for side in _sides(notches)})
+    if sides:
+        line = passages(notches, body_length, sides)
+        angle = np.radians(sides)
+        across = tube.outer_radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+        along = np.array([0.0, 0.0, 1.0])
+        # As many lips as close at one flexure, whichever sides they are on.
+        count = int(line.closes.sum(axis=1).max(initial=1.0))
+        chosen = np.argsort(-line.closes, axis=1, kind="stable")[:, :count]
+
+        def own(values: np.ndarray) -> np.ndarray:
+            index = chosen.reshape(*chosen.shape, *(1,) * (values.ndim - 2))
+            return np.take_along_axis(values, index, axis=1)
+
+        closes = own(line.closes)
+        groups.append(
+            Edges(
+                closes=constant(closes),
+                back=cast("Array", np.where(closes > 0.0, own(line.back), 1)),
+                leaves=constant(own(across + line.left[..., None] * along)),
+                enters=constant(own(across + line.enters[..., None] * along)),
+                normal=constant(np.broadcast_to(along, (*closes.shape, 3))),
+            )
+        )
+    return tuple(groups)
+
+
+def _sides(notches: Sequence[Notch]) -> list[float]:
+    """Sides on which a notch opens the wall, where it does not leave a spine."""
+    neighbours = [None, *notches, None]
+    return [
+        opening.side_deg
+        for before, notch, after in zip(neighbours, neighbours[1:], neighbours[2:], strict=False)
+        if notch is not None
+        for opening in notch.openings(before, after)
+        if opening.side_deg is not None
+    ]

@@ -1,0 +1,57 @@
+"""How the lips of a notch meet: what they leave open, and what their contact force does.
+
+Like a tendon's span, an opening lies between an anchor, the body with the face that may be closed
+against, and the body whose edge comes to it. What it leaves open depends on the pose of the one
+seen from the other, or on the flexure's strains alone.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, NamedTuple
+
+from jaxtyping import Array, Float, Int
+
+from notchflex._pytree import Pytree
+from notchflex.mechanics.flexure import FlexureState, Rod
+from notchflex.mechanics.motion import Motion
+
+
+class Touch(NamedTuple):
+    """Lips of one kind at one flexure (mm).
+
+    Attributes:
+        gap: What is left of the opening, >= 0 in a solved state.
+        wrench: Moment and force on the distal body per unit of contact force, about and along its
+            frame; its opposite acts on the anchor. None for lips that act on the modes alone.
+        slope: Change of the gap per unit of mode; None for lips that act on bodies.
+    """
+
+    gap: Float[Array, " l"]
+    wrench: Float[Array, "l w"] | None
+    slope: Float[Array, "l modes"] | None
+
+
+class LipGroup(Pytree, ABC):
+    """Lips of one kind. Arrays carry the flexures as leading axis, then the lips.
+
+    Attributes:
+        acts_on_bodies: Whether the contact is a force on bodies.
+        closes: 1 where there are such lips at a flexure.
+        back: How many bodies before the distal one their anchor is.
+    """
+
+    acts_on_bodies: ClassVar[bool]
+    closes: Float[Array, "*n l"]
+    back: Int[Array, "*n l"]
+
+    @abstractmethod
+    def touch(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Touch:
+        """Lips at one flexure (of a group without its leading axis).
+
+        Args:
+            rod: The flexure.
+            flexure: Its state.
+            anchors: Pose of the distal body seen from the anchor of each, lips as leading axis;
+                None where nothing acts on bodies.
+        """

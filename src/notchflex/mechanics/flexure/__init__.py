@@ -1,0 +1,50 @@
+"""Flexures: one notch becomes a short rod with a few strain modes."""
+
+from notchflex._packages import import_all
+from notchflex.mechanics.flexure.build import LEVELS, stack, with_level
+from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
+from notchflex.mechanics.flexure.plane import flattened
+from notchflex.mechanics.flexure.registry import rod
+from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod_kinematics import (
+    free_pose,
+    pull_change,
+    relative_pose,
+    rod_end,
+    turn_doubt,
+)
+from notchflex.mechanics.flexure.state import (
+    FlexureState,
+    fibre_slope,
+    fibre_stretch,
+    flexure_state,
+    held_by_strains,
+    in_space,
+    of_rod,
+)
+
+import_all(__name__, __path__)
+
+__all__ = [
+    "LEVELS",
+    "Elastica",
+    "FlexureState",
+    "Rod",
+    "elastica",
+    "fibre_slope",
+    "fibre_stretch",
+    "flattened",
+    "flexure_state",
+    "free_pose",
+    "held_by_strains",
+    "in_space",
+    "modulus_from_single_notch",
+    "of_rod",
+    "pull_change",
+    "relative_pose",
+    "rod",
+    "rod_end",
+    "stack",
+    "turn_doubt",
+    "with_level",
+]

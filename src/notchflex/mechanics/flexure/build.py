@@ -1,0 +1,102 @@
+"""Fewer or more modes of a rod, and many rods as one."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+from jaxtyping import Array
+
+from notchflex._jax import constant, jax
+from notchflex.mechanics.flexure.rod import Rod
+
+LEVELS = ("tendons", "plane", "space")
+"""For which loads a chain is assembled: tendons alone, loads in the plane of bending, or any."""
+
+_HAT = ("turn", "step", "node_turn")
+_AT_NODES = (
+    "reference_strain",
+    "basis",
+    "node_turn",
+    "node_place",
+    "node_reach",
+    "node_rotation",
+    "node_offset",
+)
+
+
+def with_level(rod: Rod, level: str) -> Rod:
+    """Keep the modes that a level of loads needs; strains that are constant keep one node."""
+    modes = rod.levels[LEVELS.index(level)]
+    kept: dict[str, Any] = {name: getattr(rod, name)[..., : modes + 1] for name in _HAT}
+    kept |= {"basis": rod.basis[..., :modes], "idle": rod.idle[..., :modes]}
+    if rod.turn_pair is not None:
+        kept["turn_pair"] = rod.turn_pair[..., : modes + 1, : modes + 1]
+    alike = (rod.reference_strain, kept["basis"], *jax.tree.leaves(rod.section))
+    if all((leaf == leaf[:1]).all() for leaf in alike):
+        # The one node in the middle.
+        middle = slice(len(rod.length) // 2, len(rod.length) // 2 + 1)
+        kept |= {name: kept.get(name, getattr(rod, name))[middle] for name in _AT_NODES}
+        kept["section"] = jax.tree.map(lambda leaf: leaf[middle], rod.section)
+        kept["length"] = constant([rod.length.sum()])
+    return dataclasses.replace(rod, **kept)
+
+
+def stack(rods: Sequence[Rod]) -> Rod:
+    """Put flexures together as leading axis, the smaller ones filled up."""
+    modes = max(rod.modes for rod in rods)
+    nodes = max(rod.length.shape[0] for rod in rods)
+    poses = max(rod.step.shape[0] for rod in rods)
+    levels = tuple(max(rod.levels[i] for rod in rods) for i in range(3))
+    filled = [_filled(rod, modes, nodes, poses, levels) for rod in rods]
+    unused: dict[str, Any] = {
+        name: None
+        for name in ("small", "chord")
+        if not any(np.any(getattr(rod, name)) for rod in filled)
+    }
+    used = [dataclasses.replace(rod, **unused) if unused else rod for rod in filled]
+    together: Rod = jax.tree.map(lambda *leaves: _stacked(np.stack(leaves)), *used)
+    return together
+
+
+def _stacked(values: np.ndarray) -> Array:
+    """Numbers as floats, but whole ones, which are places, as they are."""
+    return cast("Array", values) if values.dtype.kind == "i" else constant(values)
+
+
+def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...]) -> Rod:
+    """The rod with idle modes, nodes that stand for nothing, and steps that go nowhere."""
+    more, further = modes - rod.modes, poses - rod.step.shape[0]
+    count = rod.length.shape[0]
+    if (more, further, count, levels) == (0, 0, nodes, rod.levels):
+        return rod
+    index = np.minimum(np.arange(nodes), count - 1)
+    at_end = np.minimum(np.arange(poses + 1), rod.step.shape[0])
+
+    def wider(values: Array, axes: int = 1) -> Array:
+        return constant(np.pad(values, [(0, 0)] * (values.ndim - axes) + [(0, more)] * axes))
+
+    def longer(values: Array) -> Array:
+        return constant(np.pad(values, [(0, further)] + [(0, 0)] * (values.ndim - 1)))
+
+    pair = None if rod.turn_pair is None else longer(wider(rod.turn_pair, 2))
+    reach = np.pad(rod.node_reach[index], ((0, 0), (0, further)))
+    return dataclasses.replace(
+        rod,
+        length=rod.length[index] * (np.arange(nodes) < count),
+        reference_strain=rod.reference_strain[index],
+        basis=wider(rod.basis)[index],
+        turn=wider(rod.turn)[at_end],
+        turn_pair=pair,
+        step=longer(wider(rod.step)),
+        node_turn=wider(rod.node_turn)[index],
+        node_place=rod.node_place[index],
+        node_reach=reach,
+        node_rotation=rod.node_rotation[index],
+        node_offset=rod.node_offset[index],
+        section=jax.tree.map(lambda leaf: leaf[index], rod.section),
+        idle=constant(np.arange(modes) >= rod.modes),
+        levels=levels,
+    )

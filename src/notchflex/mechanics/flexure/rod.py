@@ -1,0 +1,85 @@
+"""What one notch becomes for the solver: a short rod with a few strain modes, as arrays.
+
+The rod is followed along its neutral axis and looked at in nodes. The strain of node k is
+`reference_strain[k] + basis[k] @ q`; strains are (curvature about x, y, z of the rod, shear along
+x, y, stretch along z), the stretch being 1 where nothing is strained.
+
+Its pose is found beside a curve r(s) that may be chosen: the free rod itself, so that only what
+the load adds is left to integrate, or a point. With the pose written as g(s) r(s), g follows the
+twist Ad_r (strain - strain of the curve). Of that twist, linear in (1, q), the turns up to Gauss's
+nodes and the steps at them are all that is kept (`rod_kinematics.py`).
+"""
+
+from __future__ import annotations
+
+from jaxtyping import Array, Float, Int
+
+from notchflex._pytree import Pytree, static
+from notchflex.mechanics.material.section_law import FibreSection
+
+
+class Rod(Pytree):
+    """One flexure, or with a leading axis all flexures of a chain. Units mm, rad.
+
+    Attributes:
+        start_rotation: Rotation from the rod's first section to the proximal body.
+        start_offset: Where the rod starts, in the frame of the proximal body. A notch alone
+            counts it from its proximal face on the tube axis; the chain adds the body's length.
+        curve_rotation: Rotation from the end of the curve that is followed to its start.
+        curve_offset: Where that curve ends, in the frame of its start.
+        end_rotation: Rotation from the distal body to the rod's last section.
+        end_offset: Where the distal body's frame lies, in the frame of the rod's last section.
+        length: Length of the neutral axis that each node stands for.
+        reference_strain: Strain at each node of the free, cut tube.
+        basis: Strain at each node for a unit of each mode.
+        turn: Turn beside the curve, summed up from the rod's start to each of Gauss's nodes and,
+            last, to its end, for (1, q): in the frame of the rod's start.
+        turn_pair: What the order of turns adds between neighbouring ones of these places, for pairs
+            of (1, q); None in the plane, where the order of turns does not matter.
+        step: Step beside the curve that each of Gauss's nodes stands for, for (1, q).
+        node_turn: As `turn`, to each node of the strains.
+        node_place: How many places of the turn lie up to each node of the strains.
+        node_reach: How far each step has come at each node of the strains, 0 to 1.
+        node_rotation: Rotation from the followed curve at each node to its start.
+        node_offset: Where the followed curve is at each node, in the frame of its start.
+        section: What is left of the tube at each node.
+        lip: Where a notch with a solid spine closes, across the section from the neutral axis
+            (x, y): the fibre that has no length left when the lips meet.
+        lip_closes: 1 where there is such a fibre, 0 where the notch closes otherwise.
+        small: 1 where displacements are taken in proportion to the strains (small deflection);
+            None where no flexure of a chain asks for it, so that nothing is computed for it.
+        chord: 1 where the angle of the chord from start to end is of interest (Liu 2022); None
+            likewise.
+        idle: 1 for modes that only fill up the arrays, because another notch has more.
+        levels: How many modes serve tendons alone, loads in the plane of bending, and space.
+    """
+
+    start_rotation: Float[Array, "*n d d"]
+    start_offset: Float[Array, "*n d"]
+    curve_rotation: Float[Array, "*n d d"]
+    curve_offset: Float[Array, "*n d"]
+    end_rotation: Float[Array, "*n d d"]
+    end_offset: Float[Array, "*n d"]
+    length: Float[Array, "*n nodes"]
+    reference_strain: Float[Array, "*n nodes w"]
+    basis: Float[Array, "*n nodes w modes"]
+    turn: Float[Array, "*n places a hat"]
+    turn_pair: Float[Array, "*n places 3 hat hat"] | None
+    step: Float[Array, "*n gauss d hat"]
+    node_turn: Float[Array, "*n nodes a hat"]
+    node_place: Int[Array, "*n nodes"]
+    node_reach: Float[Array, "*n nodes gauss"]
+    node_rotation: Float[Array, "*n nodes d d"]
+    node_offset: Float[Array, "*n nodes d"]
+    section: FibreSection
+    lip: Float[Array, "*n 2"]
+    lip_closes: Float[Array, "*n"]
+    small: Float[Array, "*n"] | None
+    chord: Float[Array, "*n"] | None
+    idle: Float[Array, "*n modes"]
+    levels: tuple[int, int, int] = static()
+
+    @property
+    def modes(self) -> int:
+        """Number of strain modes of a flexure."""
+        return self.basis.shape[-1]

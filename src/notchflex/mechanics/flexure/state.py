@@ -1,0 +1,158 @@
+"""From the modes of one flexure to its pose, its resultants and its chord."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import jax, jnp
+from notchflex._pytree import Pytree
+from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.rod_kinematics import (
+    Bent,
+    bent,
+    relative_pose,
+    rod_end,
+    twist_slope,
+)
+from notchflex.mechanics.material import SectionLaw
+from notchflex.mechanics.motion import PLANE, Motion, angular, rotation_about
+
+
+class FlexureState(Pytree):
+    """One flexure under given modes (mm, N, rad), in the frame of its proximal body.
+
+    Attributes:
+        bent: Turns and steps of the rod; None where nobody asked for its pose.
+        pose: From the proximal body to the distal one; None where nobody asked.
+        twist: Twist (angular, linear) of the distal body, in its own frame, per unit of mode;
+            None where nobody asked.
+        resultants: Internal moments and forces of each interval, in the rod's frame.
+        strain: Strain of each interval beyond that of the free tube.
+        internal: Generalised internal force of each mode, N mm per unit of mode.
+        bend: Bending of the whole rod about x and y of its frame, of a plane about y, rad.
+        chord_turn: Rotation, in the proximal body's frame, by which the chord from the rod's
+            start to its end has turned in the plane of bending; None where nobody asked.
+        chord_angle: Its angle, rad; None where nobody asked.
+    """
+
+    bent: Bent | None
+    pose: Motion | None
+    twist: Float[Array, "w modes"] | None
+    resultants: Float[Array, "intervals w"]
+    strain: Float[Array, "intervals w"]
+    internal: Float[Array, " modes"]
+    bend: Float[Array, " axes"]
+    chord_turn: Float[Array, "d d"] | None
+    chord_angle: Float[Array, ""] | None
+
+
+def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
+    """What the strains are weighted with to give the length of a fibre per length of the rod.
+
+    A fibre at (x, y) from the neutral axis has the length of the rod's stretch plus its
+    curvatures times their levers, v_z + u_x y - u_y x. This is the concentric wall arc of
+    Pacheco's tendon (its l = h - theta (r_i + ybar)) and the edge of a notch alike.
+    """
+    weights = across @ _ACROSS
+    return weights + np.broadcast_to(_ALONG, weights.shape)
+
+
+_ALONG = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+_ACROSS = np.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+
+
+def of_rod(rod: Rod, values: Float[Array, "*shape 6"]) -> Float[Array, "*shape w"]:
+    """Those of six components, last axis, that a rod of space or of a plane has."""
+    return values if rod.basis.shape[-2] == 6 else values[..., PLANE]
+
+
+def in_space(values: Float[Array, "*shape w"]) -> Float[Array, "*shape 6"]:
+    """All six components, last axis, of what may be of a plane."""
+    return values if values.shape[-1] == 6 else values @ np.eye(6)[PLANE]
+
+
+def fibre_slope(rod: Rod, weights: Float[Array, "t w"]) -> Float[Array, "t modes"]:
+    """Change of the length of fibres, by their weights on the strains, per unit of mode."""
+    return weights @ jnp.einsum("icm,i->cm", rod.basis, rod.length)
+
+
+def flexure_state(
+    rod: Rod,
+    law: SectionLaw,
+    memory: Any,
+    modes: Float[Array, " modes"],
+    *,
+    with_pose: bool,
+) -> FlexureState:
+    """Everything a flexure's modes decide.
+
+    Args:
+        rod: The flexure.
+        law: Its material.
+        memory: Memory of the material at every interval.
+        modes: Amplitude of each strain mode.
+        with_pose: Whether pose and twist are wanted; where no force acts on a body they do not
+            enter the balance.
+
+    Returns:
+        Its state.
+    """
+    own, pose, twist = None, None, None
+    if with_pose:
+        own = bent(rod, modes)
+        pose, twist = relative_pose(rod, modes, own), twist_slope(rod, modes, own)
+    elastic = rod.basis @ modes
+    respond = jax.vmap(law.respond)
+    resultants = of_rod(rod, respond(in_space(elastic), rod.section, memory).resultants)
+    # A mode that only fills up the arrays is held by a stiffness of 1.
+    internal = jnp.einsum("i,ic,icm->m", rod.length, resultants, rod.basis)
+    has_chord = with_pose and rod.chord is not None
+    chord_turn, chord_angle = chord(rod, modes) if has_chord else (None, None)
+    axes = min(angular(elastic[0]), 2)
+    bending = jnp.einsum("i,icm->cm", rod.length, rod.basis[:, :axes])
+    return FlexureState(
+        bent=own,
+        pose=pose,
+        twist=twist,
+        resultants=resultants,
+        strain=elastic,
+        internal=internal + rod.idle * modes,
+        # About x and y of the section's frame; the third axis of space is that of torsion.
+        bend=rod.length @ rod.reference_strain[:, :axes] + bending @ modes,
+        chord_turn=chord_turn,
+        chord_angle=chord_angle,
+    )
+
+
+def held_by_strains(
+    rod: Rod, law: SectionLaw, memory: Any, modes: Float[Array, " modes"]
+) -> Float[Array, "modes modes"]:
+    """Change of what the strains do to each mode (`internal`), per unit of mode."""
+
+    def answered(strain: Array, section: Any, at_node: Any, columns: Array) -> Array:
+        def resultants(varied: Array) -> Array:
+            return of_rod(rod, law.respond(in_space(varied), section, at_node).resultants)
+
+        return jax.vmap(
+            lambda column: jax.jvp(resultants, (strain,), (column,))[1], in_axes=1, out_axes=1
+        )(columns)
+
+    answers = jax.vmap(answered)(rod.basis @ modes, rod.section, memory, rod.basis)
+    weighed = rod.length[:, None, None] * rod.basis
+    return jnp.einsum("icm,ick->mk", weighed, answers) + jnp.diag(rod.idle)
+
+
+def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"], Float[Array, ""]]:
+    """How far the chord of a rod has turned in its plane of bending (Liu 2022, eq. 19).
+
+    The chord is the straight line from the rod's start to its end; for a strip this is the angle
+    that the paper calls bending angle, about two thirds of the slope at the end.
+    """
+    end, free = rod_end(rod, modes).translation, rod.curve_offset
+    about_y = np.eye(3)[1] if len(end) == 3 else np.ones(1)
+    angle = jnp.atan2(end[0] * free[-1] - end[-1] * free[0], end[0] * free[0] + end[-1] * free[-1])
+    turn = rotation_about(angle * about_y)
+    return rod.start_rotation @ turn @ rod.start_rotation.T, angle

@@ -1,0 +1,143 @@
+"""The link J of a robot with slots from two sides: a strip with two curved ends (Gao 2017).
+
+The rod follows the strip's middle line from the wall piece on one side of the tube to that on the
+other: curved end, straight part, curved end (eq. 6-13). Its section is that of two walls, as thick
+as the strip there and as wide as the wall of the tube at that distance from the axis; the paper
+prints b h for the area of both, which must be 2 b h.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from notchflex._jax import constant, jax
+from notchflex.mechanics.flexure.quadrature import Places
+from notchflex.mechanics.flexure.registry import rod
+from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.u_link_geometry import Course, Link
+from notchflex.mechanics.flexure.wrench_modes import wrench_modes
+from notchflex.mechanics.material import FibreSection
+from notchflex.mechanics.motion import Motion, rotation_about
+from notchflex.mechanics.section import clamped_torsion_constant, two_walls
+from notchflex.robot import Tube, ULink
+
+# Poisson's ratio of a robot file that names none. It only gives the modes their shape and tells
+# how much of the torsion is held back; the stiffness is the material's own.
+POISSON_RATIO = 0.33
+
+
+@rod.register
+def _(notch: ULink, tube: Tube, refinement: int = 0) -> Rod:
+    more = (3 + 3 * refinement, 1 + 2 * refinement, (6 + 3 * refinement, 6 + 3 * refinement))
+    return u_link_rod(notch, tube, *more)
+
+
+def u_link_rod(
+    notch: ULink,
+    tube: Tube,
+    moment_modes: int = 3,
+    force_modes: int = 1,
+    nodes: tuple[int, int] = (6, 6),
+    poisson_ratio: float = POISSON_RATIO,
+) -> Rod:
+    """Build the rod of a link.
+
+    Args:
+        notch: The link.
+        tube: The tube that it is cut into.
+        moment_modes: Modes of the moment in the plane, 3 or more, see `wrench_modes`.
+        force_modes: Pairs of modes of the force in the plane, 1 or more.
+        nodes: Gauss's nodes in each curved end, and in the straight part.
+        poisson_ratio: Poisson's ratio for the shape of the modes.
+
+    Returns:
+        The rod, from the proximal wall piece to the distal one.
+
+    Example:
+        >>> u_link_rod(ULink(0.275, 0.70, 2.0, "away"), Tube(5.99, 4.0)).levels
+        (5, 5, 9)
+    """
+    link = Link(notch.slot_radius, notch.strip_thickness, notch.strip_length)
+    curved = link.length - link.strip_length
+    ends = (0.0, 0.5 * curved, link.length - 0.5 * curved, link.length)
+    counts = (nodes[0], nodes[1], nodes[0])
+    # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
+    places = Places(ends, counts, tuple(count - 1 for count in counts))
+    place = places.every
+    course = link.course(np.array([*place, 0.0, link.length]))
+    section = _section(link, tube, Course(*(values[:-2] for values in course)), poisson_ratio)
+    # A slot cut from the side away from the bend leaves the wall on the bend's side, where the
+    # link then begins; over the slot that follows stands its mirror image.
+    hand = 1.0 if notch.proximal_slot == "away" else -1.0
+    # The strip lies above its proximal slot, whose lower edge is the proximal face.
+    middle = np.array([0.0, 0.0, 2.0 * notch.slot_radius + 0.5 * notch.strip_thickness])
+    every = _poses(course, middle, hand)
+    poses, start, end = (Motion(*(part[at] for part in every)) for at in (slice(-2), -2, -1))
+    count = sum(counts)
+    free = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (count, 1))
+    free[:, 1] = hand * course.curvature[:count]
+    basis = wrench_modes(
+        poses,
+        2.0 * place / link.length - 1.0,
+        places.weight,
+        section,
+        middle,
+        moment_modes,
+        force_modes,
+        poisson_ratio,
+    )
+    whole = _between(start, end)
+    turned = rotation_about(constant([0.0, 0.0, np.radians(notch.direction_deg)]))
+    # The distal body's frame: level with the strip's lower edge, on the tube axis.
+    distal = Motion(constant(np.eye(3)), constant([0.0, 0.0, 2.0 * notch.slot_radius]))
+    last = _between(end, distal)
+    in_plane = moment_modes + 2 * force_modes
+    return Rod(
+        start_rotation=constant(turned @ start.rotation),
+        start_offset=constant(turned @ start.translation),
+        curve_rotation=constant(whole.rotation),
+        curve_offset=constant(whole.translation),
+        end_rotation=constant(last.rotation @ turned.T),
+        end_offset=constant(last.translation),
+        **places.fields(_between(start, poses), basis),
+        reference_strain=constant(free),
+        section=jax.tree.map(lambda leaf: leaf[:count], section),
+        lip=constant(np.zeros(2)),
+        lip_closes=constant(0.0),
+        small=constant(0.0),
+        chord=constant(0.0),
+        idle=constant(np.zeros(basis.shape[-1])),
+        levels=(in_plane, in_plane, basis.shape[-1]),
+    )
+
+
+def _poses(course: Course, middle: np.ndarray, hand: float) -> Motion:
+    """Poses of the free middle line, z along it, y out of the plane, in the notch's frame."""
+    place = np.stack([-hand * course.along, 0.0 * course.along, course.above], axis=-1)
+    about_y = hand * (course.heading - 0.5 * np.pi)
+    turns = rotation_about(constant(about_y[:, None] * np.array([0.0, 1.0, 0.0])))
+    return Motion(turns, constant(middle + place))
+
+
+def _between(outer: Motion, inner: Motion) -> Motion:
+    """The inner pose, or many, as seen from the outer one."""
+    return Motion(outer.rotation.T @ inner.rotation, outer.point_inside(inner.translation))
+
+
+def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> FibreSection:
+    """Two walls as wide as the tube's wall there, which are one where the lumen ends."""
+    outer = np.sqrt(tube.outer_radius**2 - course.along**2)
+    inner = np.sqrt(np.maximum(tube.inner_radius**2 - course.along**2, 0.0))
+    middle = 0.5 * (outer + inner)
+    walls = two_walls(outer - inner, course.thickness, middle)
+    return FibreSection(
+        area=walls.area,
+        second_moment_weak=walls.second_moment_weak,
+        second_moment_strong=walls.second_moment_strong,
+        torsion_constant=constant(
+            clamped_torsion_constant(walls, middle, link.length, poisson_ratio)
+        ),
+        shear_centre=walls.shear_centre,
+        edge_spine=walls.edge_spine,
+        edge_near=walls.edge_near,
+    )

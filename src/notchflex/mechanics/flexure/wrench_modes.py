@@ -1,0 +1,96 @@
+"""Strain modes of a curved rod: what forces and moments on its end do to it.
+
+A moment m and a force n on the end of a rod act at a place of it as the force n and the moment
+m + lever x n. While displacements are small the strains of these, by the stiffness there, are
+exact with a constant for each component of m and n; only the change of the levers is missing,
+which is of second order. Stretch and shear in particular go together by the direction of n (Gao
+2017, eq. 1-5): with polynomials of their own they are far less accurate.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+from numpy.polynomial.legendre import legvander
+
+from notchflex.mechanics.material import FibreSection
+from notchflex.mechanics.motion import Motion
+
+_X, _Y, _Z = np.eye(3)
+
+
+def wrench_modes(
+    poses: Motion,
+    part: Float[np.ndarray, " nodes"],
+    length: Float[np.ndarray, " nodes"],
+    section: FibreSection,
+    middle: Float[np.ndarray, " 3"],
+    moment_modes: int,
+    force_modes: int,
+    poisson_ratio: float,
+) -> Float[np.ndarray, "nodes 6 modes"]:
+    """Compute the modes of a rod in the x-z plane, those out of the plane last.
+
+    In the plane the moment about y is constant, or goes with a lever along x or z, and from the
+    fourth mode on with the Legendre polynomials P_2, P_3 ... of arc length (P_1 is nearly a
+    lever); then come forces along x and along z, times P_0, P_1 ... in pairs. Out of the plane
+    come a constant moment about x, one about z and the moment of a sideways force at the middle,
+    then moments about x and z times P_2, P_3 ... as far as in the plane, and that force.
+
+    Args:
+        poses: Pose of the free rod at every node, base to tip, as leading axis.
+        part: Place of every node along the rod, from -1 to 1.
+        length: Length that each node stands for, mm; 0 where it does not count.
+        section: Its section at every node, with the shear centre in the centroid.
+        middle: Point from which levers are counted, mm.
+        moment_modes: Modes of the moment in the plane, 3 or more.
+        force_modes: Pairs of modes of the force in the plane.
+        poisson_ratio: For the ratio of the moduli.
+
+    Returns:
+        Strain at each node per unit of mode, which is about 1 rad of the end for a moment, and a
+        mean strain of 1 for a force.
+    """
+    whole = length.sum()
+    rotation, lever = poses.rotation, poses.translation - middle
+    reach = np.abs(lever).max(axis=0)
+    legendre = legvander(part, max(moment_modes - 2, force_modes - 1))
+
+    moment = [np.ones_like(length), lever[:, 0] / reach[0], lever[:, 2] / reach[2]]
+    moment += [legendre[:, degree] for degree in range(2, moment_modes - 1)]
+    force = [(legendre[:, k], along) for k in range(force_modes) for along in (_X, _Z)]
+    none = np.zeros_like(lever)
+    wrenches = [np.concatenate([size[:, None] * _Y, none], axis=1) for size in moment]
+    wrenches += [np.concatenate([none, size[:, None] * along], axis=1) for size, along in force]
+    sideways = np.cross(lever, _Y) / reach[0]
+    out_of_plane = [about + none for about in (_X, _Z, sideways)]
+    out_of_plane += [
+        legendre[:, degree, None] * about
+        for degree in range(2, moment_modes - 1)
+        for about in (_X, _Z)
+    ]
+    wrenches += [np.concatenate([about, none], axis=1) for about in out_of_plane]
+    wrenches += [np.concatenate([none, _Y + none], axis=1)]
+    of_force = np.arange(len(wrenches)) >= moment_modes
+    of_force[-len(out_of_plane) - 1 : -1] = False
+
+    in_frame = np.einsum(
+        "kji,mkcj->kmci", rotation, np.reshape(wrenches, (len(wrenches), -1, 2, 3))
+    ).reshape(len(length), len(wrenches), 6)
+    strain = _compliance(section, poisson_ratio)[:, None] * in_frame
+    work = np.einsum("k,kmc,kmc->m", length, in_frame, strain)
+    return np.moveaxis(strain * (np.where(of_force, whole, 1.0) / work)[:, None], 1, 2)
+
+
+def _compliance(section: FibreSection, poisson_ratio: float) -> Float[np.ndarray, "nodes 6"]:
+    """Strains per resultant, times Young's modulus."""
+    ratio = 2.0 * (1.0 + poisson_ratio)  # E / G
+    stiffness = [
+        section.second_moment_strong,
+        section.second_moment_weak,
+        section.torsion_constant / ratio,
+        section.area / ratio,
+        section.area / ratio,
+        section.area,
+    ]
+    return 1.0 / np.stack([np.asarray(one) for one in stiffness], axis=-1)

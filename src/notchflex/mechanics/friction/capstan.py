@@ -1,0 +1,41 @@
+"""Capstan friction: the tension falls by exp(-coefficient * turning) at a sliding contact."""
+
+from __future__ import annotations
+
+from jaxtyping import Array, Float
+
+from notchflex._jax import constant
+from notchflex.mechanics.friction.registry import FrictionLaw, friction_law
+from notchflex.robot import Capstan
+
+
+class CapstanLaw(FrictionLaw):
+    """Capstan law with the turning of a gap placed at one edge or at both.
+
+    Attributes:
+        coefficient: Coefficient of friction.
+        moved_to_exit: Part of the entry edge's turning that counts at the exit edge: 0 where
+            each edge keeps its own, 1 where the whole turning of a notch lies ahead of it
+            (Pacheco 2021, eq. 10, whose product includes the notch itself).
+    """
+
+    coefficient: Float[Array, ""]
+    moved_to_exit: Float[Array, ""]
+
+    def bounds(
+        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
+    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
+        """Coefficient times turning at each edge."""
+        moved = self.moved_to_exit * entry_turning
+        return (
+            self.coefficient * (exit_turning + moved),
+            self.coefficient * (entry_turning - moved),
+        )
+
+
+@friction_law.register
+def _(friction: Capstan) -> CapstanLaw:
+    return CapstanLaw(
+        coefficient=constant(friction.coefficient),
+        moved_to_exit=constant(1.0 if friction.wrap == "whole-before" else 0.0),
+    )

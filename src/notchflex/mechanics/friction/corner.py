@@ -1,0 +1,49 @@
+"""Friction at a sharp corner: Coulomb's law with the pressure on the bisector."""
+
+from __future__ import annotations
+
+from jaxtyping import Array, Bool, Float
+
+from notchflex._jax import constant, jnp
+from notchflex.mechanics.friction.registry import FrictionLaw, friction_law
+from notchflex.robot import Corner
+
+# mu tan(beta/2) = 1 lets a corner hold any tension; just below, the bound is 21 in the logarithm,
+# a ratio of 1e9, and it and its derivative are still finite.
+LARGEST = 1.0 - 1e-9
+
+
+class CornerLaw(FrictionLaw):
+    """Law of a string over a corner, each edge with its own turning (Gao 2017, eq. 23).
+
+    Attributes:
+        coefficient: Coefficient of friction.
+    """
+
+    coefficient: Float[Array, ""]
+
+    def bounds(
+        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
+    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
+        """Twice the inverse hyperbolic tangent of coefficient times tangent of half the turning.
+
+        It is ln((cos b + mu sin b) / (cos b - mu sin b)) with b = half the turning.
+        """
+        return self._bound(exit_turning), self._bound(entry_turning)
+
+    def valid(
+        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
+    ) -> Bool[Array, "*t"]:
+        """Tell where coefficient times tangent of half the turning is below 1 at both edges."""
+        return (self._slope(exit_turning) < LARGEST) & (self._slope(entry_turning) < LARGEST)
+
+    def _slope(self, turning: Float[Array, "*t"]) -> Float[Array, "*t"]:
+        return self.coefficient * jnp.tan(0.5 * turning)
+
+    def _bound(self, turning: Float[Array, "*t"]) -> Float[Array, "*t"]:
+        return 2.0 * jnp.arctanh(jnp.minimum(self._slope(turning), LARGEST))
+
+
+@friction_law.register
+def _(friction: Corner) -> CornerLaw:
+    return CornerLaw(coefficient=constant(friction.coefficient))

@@ -1,0 +1,9 @@
+"""Materials: how a cross-section answers strain."""
+
+from notchflex._packages import import_all
+from notchflex.mechanics.material.registry import section_law
+from notchflex.mechanics.material.section_law import FibreSection, Response, SectionLaw
+
+import_all(__name__, __path__)
+
+__all__ = ["FibreSection", "Response", "SectionLaw", "section_law"]

@@ -1,0 +1,120 @@
+"""Pacheco's superelastic Nitinol: three branches of stress over strain, odd in strain.
+
+Pacheco 2021, eq. 13. Their notch takes its moment from the strain of one fibre, the outer one on
+the spine (eq. 14 and 16 with the secant modulus of that fibre). With theta = kappa h along the
+neutral axis eq. 16 is strain = kappa (r_o - ybar), and eq. 14 at its fixed point is
+moment = I stress(strain) / (r_o - ybar): a law of the cross-section, no iteration.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import constant, jnp
+from notchflex.mechanics.material.registry import section_law
+from notchflex.mechanics.material.section_law import (
+    FibreSection,
+    Response,
+    SectionLaw,
+    elastic_resultants,
+    elastic_stiffness,
+)
+from notchflex.robot import Superelastic
+
+_POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
+_NODES, _WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
+# Of all strains and resultants those of weak-axis bending.
+_WEAK = np.arange(6) == 1
+
+
+class SuperelasticLaw(SectionLaw):
+    """Linear, then the flat superelastic branch, then plastic stiffening. Stresses in MPa.
+
+    Weak-axis bending follows the curve; everything else (sideways bending, torsion, shear,
+    stretch) stays on the linear branch, of which the paper says nothing.
+    """
+
+    elastic_modulus: Float[Array, ""]
+    superelastic_modulus: Float[Array, ""]
+    transition_strain: Float[Array, ""]
+    plastic_strain: Float[Array, ""]
+    plastic_modulus: Float[Array, ""]
+    plastic_exponent: Float[Array, ""]
+    shear_modulus: Float[Array, ""]
+
+    def _branches(self, strain: Float[Array, ""]) -> tuple[Array, Array, Array]:
+        """A strain split into its parts on the three branches, each with the strain's sign."""
+        linear = jnp.clip(strain, -self.transition_strain, self.transition_strain)
+        before_plastic = jnp.clip(strain, -self.plastic_strain, self.plastic_strain)
+        return linear, before_plastic - linear, strain - before_plastic
+
+    def stress(self, strain: Float[Array, ""]) -> Float[Array, ""]:
+        """Stress of a fibre (MPa), Pacheco 2021 eq. 13, odd in strain."""
+        linear, superelastic, plastic = self._branches(strain)
+        # exp(b/x) with b < 0 vanishes with all its derivatives at x = 0
+        safe = jnp.where(plastic == 0.0, 1.0, jnp.abs(plastic))
+        hardening = jnp.sign(plastic) * jnp.exp(self.plastic_exponent / safe)
+        return (
+            self.elastic_modulus * linear
+            + self.superelastic_modulus * superelastic
+            + self.plastic_modulus * hardening
+        )
+
+    def energy_density(self, strain: Float[Array, ""]) -> Float[Array, ""]:
+        """Area under the curve of `stress` up to a strain, N mm/mm^3."""
+        linear, superelastic, plastic = (jnp.abs(part) for part in self._branches(strain))
+        at_transition = self.elastic_modulus * linear
+        at_plastic = at_transition + self.superelastic_modulus * superelastic
+        # The integral of exp(b/x) has no elementary form (it is x exp(b/x) + b E1(-b/x), and
+        # E1 is slow here); Gauss's rule is right to 1e-9 for strains up to ten times -b.
+        safe = jnp.where(plastic == 0.0, 1.0, plastic)
+        hardening = safe * (jnp.exp(self.plastic_exponent / (safe * _NODES)) @ _WEIGHTS)
+        return (
+            0.5 * at_transition * linear
+            + 0.5 * (at_transition + at_plastic) * superelastic
+            + at_plastic * plastic
+            + jnp.where(plastic == 0.0, 0.0, self.plastic_modulus * hardening)
+        )
+
+    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
+        """Stiffness on the linear branch."""
+        return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
+
+    def _elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Array:
+        """Resultants on the linear branch."""
+        moduli = self.elastic_modulus, self.shear_modulus
+        return jnp.asarray(elastic_resultants(*moduli, section, strain))
+
+    def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
+        """Resultants with the weak-axis moment taken from the outer fibre on the spine."""
+        stress = self.stress(strain[1] * section.edge_spine)
+        moment = section.second_moment_weak / section.edge_spine * stress
+        return Response(jnp.where(_WEAK, moment, self._elastic(strain, section)), memory)
+
+    def energy(
+        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
+    ) -> Float[Array, ""]:
+        """Area under the moment over the curvature, and the elastic rest."""
+        del memory
+        others = jnp.where(_WEAK, 0.0, self._elastic(strain, section))
+        density = self.energy_density(strain[1] * section.edge_spine)
+        return 0.5 * others @ strain + (
+            section.second_moment_weak / section.edge_spine**2 * density
+        )
+
+
+@section_law.register
+def _(material: Superelastic) -> SuperelasticLaw:
+    modulus = constant(material.elastic_modulus)
+    return SuperelasticLaw(
+        elastic_modulus=modulus,
+        superelastic_modulus=constant(material.superelastic_modulus),
+        transition_strain=constant(material.transition_strain),
+        plastic_strain=constant(material.plastic_strain),
+        plastic_modulus=constant(material.plastic_modulus),
+        plastic_exponent=constant(material.plastic_exponent),
+        shear_modulus=modulus / (2.0 * (1.0 + material.poisson_ratio)),
+    )

@@ -1,0 +1,73 @@
+"""Where a line along the wall leaves one rigid piece of the tube and enters the next.
+
+A tendon is such a line, and so are the edges of the notches. What a notch opens, on which side,
+its description knows (`Notch.openings`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from notchflex.robot import openings_along
+from notchflex.robot.kinds import Notch
+
+
+class Passage(NamedTuple):
+    """One line along the wall over n flexures (mm, in the frames of the bodies behind them).
+
+    Attributes:
+        visits: 1 where the body behind the flexure has wall on that side.
+        closes: 1 where the opening is on that very side, not all round.
+        back: How many bodies before that one it visited the last one, its anchor; 1 where it does
+            not visit.
+        left: Where it left the anchor, along the tube in the anchor's frame.
+        enters: Where the line enters that body, along the tube.
+        leaves: Where it leaves that body again.
+        base_leaves: Where it leaves the base.
+    """
+
+    visits: Float[np.ndarray, " n"]
+    closes: Float[np.ndarray, " n"]
+    back: Int[np.ndarray, " n"]
+    left: Float[np.ndarray, " n"]
+    enters: Float[np.ndarray, " n"]
+    leaves: Float[np.ndarray, " n"]
+    base_leaves: Float[np.ndarray, ""]
+
+
+def passage(
+    notches: Sequence[Notch], body_length: Float[Array, " bodies"], direction_deg: float
+) -> Passage:
+    """Follow a line along the wall.
+
+    Args:
+        notches: Every notch, base to tip.
+        body_length: Length of the rigid pieces on the tube axis, base first, mm.
+        direction_deg: Side of the tube.
+    """
+    count = len(notches)
+    visits, closes, left, enters = (np.zeros(count) for _ in range(4))
+    back = np.ones(count, int)
+    leaves = np.array(body_length, float)
+    last = 0
+    for body, opening in openings_along(notches, direction_deg):
+        visits[body - 1], enters[body - 1] = 1.0, opening.enters
+        closes[body - 1] = opening.faces(direction_deg)
+        leaves[last] += opening.leaves
+        back[body - 1], left[body - 1] = body - last, leaves[last]
+        last = body
+    return Passage(visits, closes, back, left, enters, leaves[1:], leaves[0])
+
+
+def passages(
+    notches: Sequence[Notch],
+    body_length: Float[Array, " bodies"],
+    directions_deg: Sequence[float],
+) -> Passage:
+    """Follow several lines; they are the last axis."""
+    lines = [passage(notches, body_length, direction) for direction in directions_deg]
+    return Passage(*(np.stack(values, axis=-1) for values in zip(*lines, strict=True)))

@@ -1,0 +1,162 @@
+"""From the tendons of a robot file to the groups that the chain walks with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import constant
+from notchflex.errors import InputError
+from notchflex.mechanics.flexure import Rod, fibre_stretch
+from notchflex.mechanics.motion import Motion
+from notchflex.mechanics.tendon.crossing import TendonGroup
+from notchflex.mechanics.tendon.openings import Passage, passages
+from notchflex.mechanics.tendon.straight import Straight
+from notchflex.mechanics.tendon.wall_arc import WallArc
+from notchflex.robot import Tendon
+from notchflex.robot.kinds import Notch
+
+_PULLS = {"straight": "gap", "straight-dead": "dead", "straight-follower": "follower"}
+
+
+class Ground(NamedTuple):
+    """What tendons are laid through.
+
+    Attributes:
+        notches: Every notch, base to tip.
+        rods: All flexures of the chain.
+        free: Relative poses of all flexures in the free robot.
+        body_length: Length of the rigid pieces on the tube axis, base first, mm.
+        turns_with_chord: Whether tendons turn with the chords of the flexures.
+    """
+
+    notches: Sequence[Notch]
+    rods: Rod
+    free: Motion
+    body_length: Float[Array, " bodies"]
+    turns_with_chord: bool
+
+
+class Laid(NamedTuple):
+    """Tendons laid through a robot.
+
+    Attributes:
+        groups: One group per kind of path in use.
+        place: Where every tendon crosses a section of the tube, mm from its axis.
+        base_length: Length of every tendon inside the base, mm.
+    """
+
+    groups: tuple[TendonGroup, ...]
+    place: Float[Array, "t 3"]
+    base_length: Float[np.ndarray, " t"]
+
+
+def route(tendons: Sequence[Tendon], ground: Ground) -> Laid:
+    """Group the tendons by the way they run and lay them through the chain.
+
+    Raises:
+        InputError: A tendon ends in a body that has no wall on its side.
+    """
+    line = passages(
+        ground.notches, ground.body_length, [tendon.direction_deg for tendon in tendons]
+    )
+    groups: list[TendonGroup] = []
+    for path in ("wall-arc", *_PULLS):
+        numbers = tuple(i for i, tendon in enumerate(tendons) if tendon.path == path)
+        if numbers:
+            chosen = [tendons[i] for i in numbers]
+            own = Passage(*(np.asarray(values)[..., list(numbers)] for values in line))
+            masks = _masks(numbers, chosen, own)
+            lay = _wall_arc if path == "wall-arc" else _straight
+            groups.append(lay(masks, chosen, own, ground, path))
+    return Laid(tuple(groups), _on_tube(tendons), np.asarray(line.base_leaves))
+
+
+def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
+    """Where each tendon is: flexures as rows, tendons as columns."""
+    count = line.visits.shape[0]
+    end = np.array([tendon.end_body or count for tendon in tendons])
+    body = np.arange(1, count + 1)[:, None]
+    present = (body <= end).astype(float)
+    visits = present * line.visits
+    ends = (body == end).astype(float)
+    for column, number in enumerate(numbers):
+        if not (ends * visits)[:, column].any():
+            on_its_side = ", ".join(str(j + 1) for j in np.flatnonzero(line.visits[:, column]))
+            raise InputError(
+                f"tendon[{number + 1}].end_body has no wall on the tendon's side; "
+                f"the bodies there are {on_its_side}"
+            )
+    return {
+        "numbers": numbers,
+        "present": present,
+        "visits": visits,
+        "ends": ends,
+        "back": np.where(visits > 0.0, line.back, 1),
+        # A cable may end at an edge beyond the axial length of the last piece.
+        "body_length": visits * np.maximum(line.leaves - line.enters, 0.0),
+    }
+
+
+def _on_tube(tendons: Sequence[Tendon]) -> Float[Array, "t 3"]:
+    """Where the tendons cross a section of the tube, mm from its axis."""
+    radius = np.array([tendon.radius for tendon in tendons], float)
+    direction = np.deg2rad(np.array([tendon.direction_deg for tendon in tendons], float))
+    return constant(
+        np.stack([radius * np.cos(direction), radius * np.sin(direction), 0.0 * radius], axis=-1)
+    )
+
+
+def _wall_arc(
+    masks: dict[str, Any], tendons: Sequence[Tendon], line: Passage, ground: Ground, path: str
+) -> WallArc:
+    del line, path
+    rods = ground.rods
+    across = (
+        np.einsum("nab,tb->nta", rods.end_rotation, _on_tube(tendons)) + rods.end_offset[:, None]
+    )[..., :2]
+    return WallArc(
+        **masks,
+        natural_gap=np.einsum(
+            "ntc,nic,ni->nt", fibre_stretch(across), rods.reference_strain, rods.length
+        ),
+        across=across,
+    )
+
+
+def _straight(
+    masks: dict[str, Any], tendons: Sequence[Tendon], line: Passage, ground: Ground, path: str
+) -> Straight:
+    along = np.array([0.0, 0.0, 1.0])
+    place = np.asarray(_on_tube(tendons))
+    entry = place + line.enters[..., None] * along
+    leave = place + line.leaves[..., None] * along
+    base = place + np.asarray(line.base_leaves)[:, None] * along
+    return Straight(
+        **masks,
+        natural_gap=_free_gaps(masks["visits"], entry, leave, base, ground.free),
+        leaves=constant(place + line.left[..., None] * along),
+        enters=constant(entry),
+        along=constant(np.broadcast_to(along, entry.shape)),
+        pulls=_PULLS[path],
+        turns_with_chord=ground.turns_with_chord,
+    )
+
+
+def _free_gaps(
+    visits: Float[np.ndarray, "n t"],
+    entry: Float[np.ndarray, "n t 3"],
+    leave: Float[np.ndarray, "n t 3"],
+    base: Float[np.ndarray, "t 3"],
+    free: Motion,
+) -> Float[Array, "n t"]:
+    """Length of every straight span in the free robot, mm; 0 where a tendon passes by."""
+    point, gaps = base, np.zeros(visits.shape)
+    for j in range(len(visits)):
+        point = (point - free.translation[j]) @ free.rotation[j]
+        gaps[j] = visits[j] * np.linalg.norm(entry[j] - point, axis=-1)
+        point = np.where(visits[j][:, None] > 0.0, leave[j], point)
+    return constant(gaps)

@@ -1,0 +1,1 @@
+"""Pictures of comparisons, calibrations and the friction rig."""

@@ -1,0 +1,1 @@
+"""Renderers of a picture: matplotlib for paper, plotly for the browser."""

@@ -1,0 +1,1 @@
+"""Shapes of robots: outline, bent notches, loads that act on them."""

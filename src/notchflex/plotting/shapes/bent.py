@@ -1,0 +1,272 @@
+"""A robot in one state as points in space: its rigid bodies, its flexures along their length.
+
+All is taken from the chain: where the walls of the bodies begin and end on every side from the
+openings of the notches, the flexures from their rods. A new notch shape needs nothing here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plotting.shapes.twist import between
+from notchflex.robot import Robot
+
+if TYPE_CHECKING:
+    from notchflex.mechanics.chain import Chain
+    from notchflex.results import EquilibriumPath
+
+Points = NDArray[np.float64]
+Walls = list[tuple[float, float] | None]
+
+FLEXURE_POINTS = 20  # a notch bends by less than a right angle; 2 degrees a piece look round
+UP = np.array([0.0, 0.0, 1.0])
+HELD = 0.8  # length of held tube drawn below the base, in outer radii
+
+
+@dataclass(frozen=True)
+class Sections:
+    """One flexure from its start to its end, k sections (mm, in the frame of the base).
+
+    Attributes:
+        rotation: Axes of each section as columns: across in the plane of bending, across out of
+            it, along; (k, 3, 3).
+        position: Its neutral axis, (k, 3).
+        spine: How far it reaches against its first axis, (k,).
+        near: How far it reaches along it, (k,).
+        area: Its area, (k,), mm².
+    """
+
+    rotation: Points
+    position: Points
+    spine: Points
+    near: Points
+    area: Points
+
+    def fibre(self, across: Any, out: Any = 0.0) -> Points:
+        """Return the line at (across, out) from the neutral axis, (k, 3)."""
+        across, out = np.broadcast_to(across, len(self.area)), np.broadcast_to(out, len(self.area))
+        return (
+            self.position
+            + across[:, None] * self.rotation[..., 0]
+            + out[:, None] * self.rotation[..., 1]
+        )
+
+
+@dataclass(frozen=True)
+class Bent:
+    """A robot of n notches in one state, in the frame of its base (mm).
+
+    Attributes:
+        robot: The robot.
+        chain: The robot as arrays.
+        rotation: Rotation of each body, (n + 1, 3, 3).
+        position: Its proximal face centre, (n + 1, 3).
+        flexures: The flexures, base to tip.
+    """
+
+    robot: Robot
+    chain: Chain
+    rotation: Points
+    position: Points
+    flexures: list[Sections]
+
+    @cached_property
+    def body_length(self) -> Points:
+        """Length of each body on the tube axis, (n + 1,)."""
+        return np.asarray(self.chain.body_length)
+
+    @property
+    def tip(self) -> Points:
+        """The tip on the tube axis."""
+        return self.on_body(-1, [0.0, 0.0, self.body_length[-1]])
+
+    def on_body(self, body: int, points: Any) -> Points:
+        """Carry points (..., 3) of a body's frame to that of the base."""
+        return self.position[body] + np.asarray(points, float) @ self.rotation[body].T
+
+    def walls(self, side_deg: float) -> Walls:
+        """Return from where to where each body has wall on a side [mm in its frame], or None."""
+        return _walls(self.robot, tuple(self.body_length.tolist()), side_deg)
+
+    def tendon(self, number: int) -> Points:
+        """Return the line of a tendon (from 0) through its true points, from below the base."""
+        return np.concatenate([points for points, _ in self._along(number)])
+
+    def contacts(self, number: int, radius: float | None = None) -> Points:
+        """Return the points of a tendon (from 0) where it rubs, base to tip, (contacts, 3).
+
+        Those are the edges of the bodies that it runs through, but for the one behind which it is
+        fixed.
+
+        Args:
+            number: The tendon.
+            radius: Distance [mm] from the tube axis to which the points are moved outward; None
+                leaves them on the tendon.
+        """
+        edges = [points for points, on_body in self._along(number, radius) if on_body]
+        return np.concatenate(edges)[1:-2]  # neither the foot, nor both edges of the last body
+
+    def _along(self, number: int, radius: float | None = None) -> Iterator[tuple[Points, bool]]:
+        """Pieces of a tendon, and whether each lies on a body or crosses a notch."""
+        from notchflex.mechanics.tendon.wall_arc import WallArc
+
+        group = next(group for group in self.chain.groups if number in group.numbers)
+        column = group.numbers.index(number)
+        present, visits = (
+            np.asarray(values)[:, column] for values in (group.present, group.visits)
+        )
+        walls = self.walls(self.robot.tendon[number].direction_deg)
+        place = np.asarray(self.chain.tendon_place)[number]
+        if radius is not None:
+            angle = np.radians(self.robot.tendon[number].direction_deg)
+            place = radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+        for body in range(len(self.position)):
+            if body and not present[body - 1]:
+                break
+            if body and isinstance(group, WallArc):
+                across = np.asarray(group.across)[body - 1, column]
+                yield self.flexures[body - 1].fibre(*across), False
+            ends = walls[body]
+            if ends is not None and (body == 0 or visits[body - 1]):
+                yield self.on_body(body, [place + at * UP for at in ends]), True
+
+    def lips(self, notch: int, radius: float | None = None) -> Points:
+        """Return the point between the lips of a notch (from 0), where it closes.
+
+        Args:
+            notch: The notch.
+            radius: Distance [mm] of the point from the tube axis; None is that of the lips.
+        """
+        outer = self.robot.tube.outer_radius if radius is None else radius
+        found: list[tuple[float, Points]] = []
+        for turn in (0.0, 180.0):
+            side = self.robot.notches[notch].direction_deg + turn
+            walls = self.walls(side)
+            behind = walls[notch + 1]
+            if behind is None:
+                continue
+            before = max(body for body in range(notch + 1) if walls[body] is not None)
+            last = walls[before]
+            assert last is not None
+            angle = np.radians(side)
+            across = outer * np.array([np.cos(angle), np.sin(angle), 0.0])
+            first = self.on_body(before, across + last[1] * UP)
+            second = self.on_body(notch + 1, across + behind[0] * UP)
+            found.append((float(np.linalg.norm(second - first)), 0.5 * (first + second)))
+        return min(found, key=lambda item: item[0])[1]
+
+
+@lru_cache(maxsize=256)
+def _walls(robot: Robot, body_length: tuple[float, ...], side_deg: float) -> Walls:
+    # Not at the head of the file: importing the pictures alone needs no solver.
+    from notchflex._jax import constant
+    from notchflex.mechanics.tendon.openings import passage
+
+    line = passage(robot.notches, constant(body_length), side_deg)
+    walls: Walls = [(-HELD * robot.tube.outer_radius, float(line.base_leaves))]
+    for visits, *ends in zip(line.visits, line.enters, line.leaves, strict=True):
+        # What is fixed in the last body may enter it beyond its far face.
+        walls.append((float(min(ends)), float(max(ends))) if visits else None)
+    return walls
+
+
+@lru_cache(maxsize=1)
+def _node_poses() -> Any:
+    """Compiled once for a shape of the arrays, not for every picture."""
+    from notchflex._jax import jax
+    from notchflex.mechanics.flexure.rod_kinematics import node_poses
+
+    return jax.jit(jax.vmap(node_poses))
+
+
+def bent(
+    robot: Robot,
+    chain: Chain,
+    modes: Any,
+    body_position: Points,
+    body_rotation: Points,
+    pieces: int = FLEXURE_POINTS,
+) -> Bent:
+    """Return a robot in one state, seen from its base: a turned base gives the same.
+
+    Args:
+        robot: The robot, n notches.
+        chain: Its chain.
+        modes: Amplitudes of the strain modes of each flexure.
+        body_position: Proximal face centre of each body [mm], (n + 1, 3).
+        body_rotation: Rotation of each body, (n + 1, 3, 3).
+        pieces: Straight pieces that each flexure is drawn with, at least; the nodes of its rod may
+            ask for more.
+    """
+    from notchflex._jax import jax
+
+    turn, origin = body_rotation[0], body_position[0]
+    rotation, position = turn.T @ body_rotation, (body_position - origin) @ turn
+    rods = jax.tree.map(np.asarray, chain.rods)
+    nodes = jax.tree.map(np.asarray, _node_poses()(chain.rods, np.asarray(modes)))
+    # From the proximal body's frame: start, nodes; from the distal one's: end.
+    first = np.concatenate([rods.start_rotation[:, None], nodes.rotation], axis=1)
+    places = np.concatenate([rods.start_offset[:, None], nodes.translation], axis=1)
+    last = np.swapaxes(rods.end_rotation, -1, -2)
+    axes = np.concatenate([rotation[:-1, None] @ first, (rotation[1:] @ last)[:, None]], axis=1)
+    end = position[1:] - np.einsum("nij,njk,nk->ni", rotation[1:], last, rods.end_offset)
+    along = position[:-1, None] + places @ np.swapaxes(rotation[:-1], -1, -2)
+    line = np.concatenate([along, end[:, None]], axis=1)
+    flexures: dict[int, Sections] = {}
+    counts = (rods.length > 0.0).sum(axis=1)
+    for count in np.unique(counts):  # flexures with equally many nodes are filled up at once
+        own = np.flatnonzero(counts == count)
+        there = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in own])
+        kept = np.concatenate([np.zeros((len(own), 1), int), there + 1], axis=1)
+        kept = np.concatenate([kept, np.full((len(own), 1), axes.shape[1] - 1)], axis=1)
+        parts = -(-pieces // (int(count) + 1))
+        row = own[:, None]
+        turned, points = between(axes[row, kept], line[row, kept], parts)
+        at_node = np.arange(points.shape[1]) / parts - 1.0
+        section = rods.section
+        for j, nodes_there, frames, places_there in zip(own, there, turned, points, strict=True):
+            spine, near, area = (
+                np.interp(at_node, np.arange(count), values[j, nodes_there])
+                for values in (section.edge_spine, section.edge_near, section.area)
+            )
+            flexures[int(j)] = Sections(frames, places_there, spine, near, area)
+    return Bent(robot, chain, rotation, position, [flexures[j] for j in range(len(counts))])
+
+
+def bent_at(path: EquilibriumPath, step: int, pieces: int = FLEXURE_POINTS) -> Bent:
+    """Return the robot of a path at one of its steps; for `pieces` see `bent`."""
+    modes, own = path.run.solved.point.unknowns.modes[step], path.chain
+    chain = _of_space(path.robot, own.level, own.refinement)
+    places, turns = path.body_position[step], path.body_rotation[step]
+    return bent(path.robot, chain, modes, places, turns, pieces)
+
+
+@lru_cache(maxsize=16)
+def _of_space(robot: Robot, level: str, refinement: int) -> Chain:
+    """The robot's chain with its flexures in space, whose modes are those of the flat one."""
+    from notchflex.mechanics.chain import assemble
+
+    return assemble(robot, level, refinement=refinement, flat=False)
+
+
+def bent_by_angles(
+    robot: Robot, notch_angle: Points, pieces: int = FLEXURE_POINTS, level: str = "tendons"
+) -> Bent:
+    """Return a robot whose notches have given angles [rad], (n,), as measured ones have.
+
+    For `pieces` see `bent`; `level` is that of the chain, which decides on the nodes of its rods.
+    """
+    from notchflex.analysis import bodies_from_angles
+    from notchflex.mechanics.contact import free_angle
+
+    chain = _of_space(robot, level, 0)
+    modes = np.zeros(np.shape(chain.stiffness))
+    modes[:, 0] = notch_angle - free_angle(chain.rods)
+    position, rotation = bodies_from_angles(robot, notch_angle[None])
+    return bent(robot, chain, modes, position[0], rotation[0], pieces)

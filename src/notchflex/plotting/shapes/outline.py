@@ -1,0 +1,184 @@
+"""The outline of a bent robot, to scale, as seen from the side.
+
+A view looks across the tube: its horizontal axis is a direction across the base, its other axis
+the tube axis of the base turned up. A body is drawn as the wall that it has on either side and
+what joins the two; what a cut leaves is a bent strip, as thick as its section.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plotting.shapes.bent import HELD, Bent
+from notchflex.robot import Robot
+
+_CLAMP = 1.7  # half the width of what holds the tube, in outer radii
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Polygons and lines in the plane of a view [mm], each (k, 2).
+
+    Attributes:
+        bodies: Outline of every body, base first.
+        bores: Lines of the inner wall of every body, one for each side on which it has wall.
+        flexures: Strip of every notch.
+        tendons: Line of every tendon.
+        lips: Point between the lips of every notch, where it closes.
+        centre_line: The tube axis from base to tip.
+        held: What holds the tube, from the base downward.
+    """
+
+    bodies: list[NDArray[np.float64]]
+    bores: list[NDArray[np.float64]]
+    flexures: list[NDArray[np.float64]]
+    tendons: list[NDArray[np.float64]]
+    lips: list[NDArray[np.float64]]
+    centre_line: NDArray[np.float64]
+    held: NDArray[np.float64]
+
+
+def bending_plane(robot: Robot, offset: float = 1e-9) -> float | None:
+    """Return the direction [rad] in which all notches of a robot bend; None if they do not.
+
+    Args:
+        robot: The robot.
+        offset: How far directions may differ and still be one plane.
+    """
+    directions = np.radians([notch.direction_deg for notch in robot.notches])
+    first = float(directions[0])
+    return first if np.all(np.abs(np.sin(directions - first)) < offset) else None
+
+
+def outline(shape: Bent, view: float) -> Outline:
+    """Return the outline of a robot in one state.
+
+    Args:
+        shape: The robot.
+        view: Direction across the base that is drawn to the right [rad]; 0 is x.
+    """
+    across = np.array([np.cos(view), np.sin(view), 0.0])
+
+    def flat(points: Any) -> NDArray[np.float64]:
+        points = np.asarray(points)
+        return np.stack([points @ across, points[..., 2]], axis=-1)
+
+    outer, inner = shape.robot.tube.outer_radius, shape.robot.tube.inner_radius
+    bodies, bores = [], []
+    for body in range(len(shape.position)):
+        polygon = body_corners(shape, body, view)
+
+        def place(points: Any, body: int = body) -> NDArray[np.float64]:
+            local = np.asarray(points, float)
+            inside = local[:, :1] * across + local[:, 1:] * np.array([0.0, 0.0, 1.0])
+            return flat(shape.on_body(body, inside))
+
+        bodies.append(place(polygon))
+        for sign, wall in zip((1.0, -1.0), _sides(shape, body, view), strict=True):
+            if wall is not None:
+                bores.append(place([(sign * inner, at) for at in wall]))
+    below = np.array([0.0, 0.0, -HELD * outer])
+    clamp = [side * _CLAMP * outer * across for side in (-1.0, 1.0)]
+    flexures = [
+        np.concatenate([flat(one.fibre(-one.spine)), flat(one.fibre(one.near))[::-1]])
+        for one in shape.flexures
+    ]
+    return Outline(
+        bodies=bodies,
+        bores=bores,
+        flexures=flexures,
+        tendons=[flat(shape.tendon(number)) for number in range(len(shape.robot.tendon))],
+        lips=[flat(shape.lips(notch)) for notch in range(len(shape.flexures))],
+        centre_line=flat(_centre_line(shape)),
+        held=flat(shape.on_body(0, [*clamp, clamp[1] + below, clamp[0] + below])),
+    )
+
+
+def body_corners(shape: Bent, body: int, view: float) -> list[tuple[float, float]]:
+    """Return the outline of a body in its own frame: corners (across, along) [mm], in order.
+
+    Args:
+        shape: The robot.
+        body: Which body, 0 is the base.
+        view: Direction across the tube that is drawn to the right [rad].
+    """
+    across = np.array([np.cos(view), np.sin(view), 0.0])
+    tube = shape.robot.tube
+    right, left = _sides(shape, body, view)
+    return _body(right, left, tube.outer_radius, _reach(shape, body, across, tube.inner_radius))
+
+
+def _sides(shape: Bent, body: int, view: float) -> list[tuple[float, float] | None]:
+    """From where to where a body has wall on the right and the left."""
+    return [shape.walls(np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
+
+
+def _centre_line(shape: Bent) -> NDArray[np.float64]:
+    """The tube axis, along the bodies and, where a notch has a spine beside it, the notches."""
+    rods = shape.chain.rods
+    points: list[NDArray[np.float64]] = []
+    for body, length in enumerate(shape.body_length):
+        if body and float(rods.lip_closes[body - 1]) > 0.0:
+            points.append(
+                shape.flexures[body - 1].fibre(*np.asarray(rods.end_offset)[body - 1, :2])
+            )
+        points.append(shape.on_body(body, [[0.0, 0.0, 0.0], [0.0, 0.0, length]]))
+    return np.concatenate(points)
+
+
+def _reach(
+    shape: Bent, body: int, across: NDArray[np.float64], inner: float
+) -> tuple[float, float]:
+    """How near to the axis the wall of a body comes on the right and the left.
+
+    To the inside of the tube, or farther where a flexure is joined to it.
+    """
+    reach = [inner, inner]
+    joined = []
+    if body:
+        joined.append((shape.flexures[body - 1], -1))
+    if body < len(shape.flexures):
+        joined.append((shape.flexures[body], 0))
+    for one, end in joined:
+        edges = np.stack([one.fibre(-one.spine)[end], one.position[end], one.fibre(one.near)[end]])
+        local = (edges - shape.position[body]) @ shape.rotation[body] @ across
+        side = 0 if local[1] > 0.0 else 1
+        nearest = float(np.min(local if side == 0 else -local))
+        reach[side] = min(reach[side], max(nearest, 0.0))
+    return reach[0], reach[1]
+
+
+def _body(
+    right: tuple[float, float] | None,
+    left: tuple[float, float] | None,
+    outer: float,
+    reach: tuple[float, float],
+) -> list[tuple[float, float]]:
+    """Corners of a body (across, along), from the lower right one upward, then down on the left."""
+    if right is None or left is None:
+        sign, wall, inside = (-1.0, left, reach[1]) if right is None else (1.0, right, reach[0])
+        assert wall is not None  # a body has wall somewhere
+        low, high = wall
+        return [
+            (sign * at, z) for at, z in ((outer, low), (outer, high), (inside, high), (inside, low))
+        ]
+    low, high = max(right[0], left[0]), min(right[1], left[1])
+    # Both walls are joined where they stand side by side, else from one to the other aslant.
+    top = [(reach[0], high), (-reach[1], high)] if high > low else []
+    foot = [(-reach[1], low), (reach[0], low)] if high > low else []
+    return [
+        (outer, right[0]),
+        (outer, right[1]),
+        (reach[0], right[1]),
+        *top,
+        (-reach[1], left[1]),
+        (-outer, left[1]),
+        (-outer, left[0]),
+        (-reach[1], left[0]),
+        *foot,
+        (reach[0], right[0]),
+    ]

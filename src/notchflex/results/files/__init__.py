@@ -1,0 +1,1 @@
+"""Results as files and tables: JSON, CSV, NetCDF, Parquet, data frames."""

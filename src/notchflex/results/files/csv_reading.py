@@ -1,0 +1,210 @@
+"""Tables of numbers from CSV files: read line by line, refused with the line and the column.
+
+A table is UTF-8 with commas and its header first; empty lines and lines that start with `#` are
+skipped. Semicolons between the columns, as spreadsheets write them where numbers have a decimal
+comma, are read too. What stands in the columns is said by whoever asks for them.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.errors import InputError
+from notchflex.results.quantities.registry import QUANTITIES
+
+LARGEST = 1e6
+"""Nothing that was measured (N, mm, deg, g) is larger; a slip of the keyboard is."""
+
+_DECIMAL = re.compile(r"[-+]?\d*([.,])\d+(?:[eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as it stands in a file.
+
+    Attributes:
+        name: The file, for messages.
+        header: Names of the columns.
+        lines: Line of the file that each row stands in.
+        rows: Entries of each row, as many as columns, without spaces around them.
+        decimal: What separates the decimals of its numbers, a point or a comma.
+    """
+
+    name: str
+    header: tuple[str, ...]
+    lines: tuple[int, ...]
+    rows: tuple[tuple[str, ...], ...]
+    decimal: str = "."
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def texts(self, column: str) -> tuple[str, ...]:
+        """Return the entries of a column."""
+        position = self.header.index(column)
+        return tuple(row[position] for row in self.rows)
+
+    def numbers(self, column: str, *, may_miss: bool = False) -> NDArray[np.float64]:
+        """Return a column of numbers, (rows,).
+
+        Args:
+            column: Its name.
+            may_miss: Whether an entry may be empty, which is then NaN.
+
+        Raises:
+            InputError: An entry is no finite number; the message names line and column.
+        """
+        return np.array(
+            [
+                math.nan
+                if may_miss and not text
+                else _number(text, column, line, self.name, self.decimal)
+                for text, line in zip(self.texts(column), self.lines, strict=True)
+            ]
+        )
+
+    def at(self, row: int) -> str:
+        """Return where a row (from 0) stands, as messages begin: file and line."""
+        return f"{self.name}, line {self.lines[row]}"
+
+    @property
+    def columns(self) -> str:
+        """The columns, for a message."""
+        return f"the columns are {', '.join(self.header)}"
+
+
+def read_table(source: str | os.PathLike[str]) -> Table:
+    """Read a table.
+
+    Args:
+        source: Path of the file.
+
+    Returns:
+        Its header and rows, at least one.
+
+    Raises:
+        InputError: No such file, not a CSV, empty, two columns of one name, or a row that has
+            more or fewer entries than the header.
+    """
+    path = Path(source)
+    try:
+        # utf-8-sig: spreadsheets put a byte-order mark before the first column's name.
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except IsADirectoryError:
+        raise InputError(f"{path} is a folder; name a CSV file.") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is no text in UTF-8; save it as CSV.") from None
+    except (OSError, ValueError) as problem:
+        words = getattr(problem, "strerror", None) or str(problem)
+        raise InputError(f"{path} cannot be read: {words}.") from None
+    separator = _separator(text)
+    table: list[tuple[int, tuple[str, ...]]] = []
+    try:
+        reader = csv.reader(text.splitlines(), strict=True, delimiter=separator)
+        for row in reader:
+            if any(field.strip() for field in row) and not row[0].lstrip().startswith("#"):
+                table.append((reader.line_num, tuple(field.strip() for field in row)))
+    except csv.Error as problem:
+        raise InputError(f"{path} is no CSV: {problem}.") from None
+    if not table:
+        raise InputError(f"{path} is empty; it needs a header and at least one row of numbers.")
+    (_, header), *body = table
+    if len(header) == 1 and "\t" in header[0]:
+        raise InputError(
+            f"{path}: the columns are separated by tabs; save it with commas between the columns "
+            "and points in the numbers."
+        )
+    for column in header:
+        if column and header.count(column) > 1:
+            raise InputError(f"{path}: the column {column} is there more than once; keep one.")
+    if not body:
+        raise InputError(f"{path} has a header and no rows; it needs at least one row of numbers.")
+    for line, row in body:
+        if len(row) != len(header):
+            raise InputError(
+                f"{path}, line {line}: {len(row)} entries for {len(header)} columns; "
+                "every row needs one entry for each column."
+            )
+    lines, rows = tuple(line for line, _ in body), tuple(row for _, row in body)
+    decimal = "." if separator == "," else _decimal(path, lines, rows)
+    return Table(str(source), header, lines, rows, decimal)
+
+
+def _separator(text: str) -> str:
+    """Return what separates the columns: a semicolon where the header has no comma."""
+    lines = (line for line in text.splitlines() if line.strip(" ;,"))
+    header = next((line for line in lines if not line.lstrip().startswith("#")), "")
+    return ";" if ";" in header and "," not in header else ","
+
+
+def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) -> str:
+    """Return the decimal separator of a table with semicolons, whose numbers may have either.
+
+    Raises:
+        InputError: Some numbers have a comma and others a point: one of them separates thousands.
+    """
+    found: dict[str, tuple[int, str]] = {}
+    for line, row in zip(lines, rows, strict=True):
+        for entry in row:
+            number = _DECIMAL.fullmatch(entry)
+            if number is not None:
+                found.setdefault(number[1], (line, entry))
+    if len(found) == 2:
+        (line, entry), (other_line, other) = sorted(found.values())
+        raise InputError(
+            f"{path}: {entry} in line {line} and {other} in line {other_line} have different "
+            "decimal separators; write all numbers with points, or all with commas."
+        )
+    return next(iter(found), ".")
+
+
+def tendon_columns(header: Sequence[str], quantity: str, tendons: int) -> dict[int, str]:
+    """Return the column of a quantity of each tendon (from 0) that has one.
+
+    Args:
+        header: The columns.
+        quantity: Name of a quantity of the table of quantities, such as "tension".
+        tendons: How many tendons the robot has; the only one may go without its number.
+    """
+    found: dict[int, str] = {}
+    for tendon in range(tendons):
+        labels: list[object] = [tendon + 1] if tendons > 1 else ["", 1]
+        names = [QUANTITIES[quantity].header(tendon=label) for label in labels]
+        there = [name for name in names if name in header]
+        if there:
+            found[tendon] = there[0]
+    return found
+
+
+def no_tendon_column(table: Table, tendons: int) -> InputError:
+    """Return what is raised where a table has no column for any tendon."""
+    label = "" if tendons == 1 else 1
+    wanted = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
+    more = "" if tendons == 1 else f" (and so on to tendon {tendons})"
+    return InputError(
+        f"{table.name}: there is no column {wanted[0]} or {wanted[1]}{more}; {table.columns}."
+    )
+
+
+def _number(text: str, column: str, line: int, name: str, decimal: str) -> float:
+    try:
+        value = float(text if decimal == "." else text.replace(decimal, ".", 1))
+    except ValueError:
+        got = repr(text) if text else "nothing"
+        raise InputError(f"{name}, line {line}: {column} is {got}; give a number.") from None
+    if not math.isfinite(value):
+        raise InputError(f"{name}, line {line}: {column} is {text}; give a finite number.")
+    if abs(value) > LARGEST:
+        raise InputError(f"{name}, line {line}: {column} is {text}; give at most {LARGEST:g}.")
+    return value

@@ -1,0 +1,199 @@
+"""Paths to files and back: `save_path` writes JSON, NetCDF, Parquet or CSV, `read_path` reads."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from notchflex._extras import need
+from notchflex.errors import InputError
+from notchflex.results.files.json import path_document, plain
+from notchflex.results.files.record import decoded, encoded, path_of, record_of
+from notchflex.results.files.writing import replacing
+
+if TYPE_CHECKING:
+    from notchflex.results.path import EquilibriumPath
+
+READ_BACK = "read_back"
+"""Key of a JSON document under which the exact numbers stand."""
+
+_KINDS = ".json, .nc, .parquet or .csv"
+
+
+def save_path(path: EquilibriumPath, file: str | FilePath) -> None:
+    """Write a path to a file; by its suffix as JSON, NetCDF, Parquet or CSV.
+
+    JSON, NetCDF and Parquet hold the whole path, and `read_path` makes an equal one of them. CSV
+    holds the numbers of every step only, and `read_table` reads those.
+
+    Args:
+        path: Solved path.
+        file: Where to; ends in .json, .nc, .parquet or .csv. It is whole or not there.
+
+    Raises:
+        InputError: Another suffix, a library that is not installed, or it cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> import notchflex as nf
+        >>> path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 1.0, steps=3))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     nf.save_path(path, Path(folder) / "loop.json")
+        ...     again = nf.read_path(Path(folder) / "loop.json")
+        >>> bool((again.notch_angle == path.notch_angle).all())
+        True
+    """
+    match FilePath(file).suffix.lower():
+        case ".json":
+            from notchflex.results.files.json import write_json
+
+            write_json(file, whole_document(path))
+        case ".nc":
+            write_netcdf(file, path)
+        case ".parquet":
+            from notchflex.results.files.parquet import write_parquet
+
+            write_parquet(file, path)
+        case ".csv":
+            from notchflex.results.files.csv import write_path_csv
+
+            write_path_csv(file, path)
+        case other:
+            raise InputError(_no_kind(file, other, "written"))
+
+
+def read_path(file: str | FilePath) -> EquilibriumPath:
+    """Read a path back from a file; it equals the one that was written, its states too.
+
+    Nothing is solved: every number is that of the file. A simulation goes on from `.state` as from
+    that of the path that was written.
+
+    Args:
+        file: A .json, .nc or .parquet that `notchflex simulate` or `save_path` wrote.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: No such file, a table that holds no path, a file that was changed or damaged.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> import notchflex as nf
+        >>> wrist = nf.load_robot("pacheco2021-a")
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     nf.save_path(nf.simulate(wrist, nf.pull(0.0, 2.0, steps=3)), f"{folder}/pull.json")
+        ...     pulled = nf.read_path(f"{folder}/pull.json")
+        >>> round(float(nf.solve(wrist, nf.Load(1.0), from_state=pulled.state).total_angle), 3)
+        1.412
+    """
+    suffix = FilePath(file).suffix.lower()
+    if suffix == ".csv":
+        raise InputError(
+            f"{file}: a CSV holds the numbers of every step, but neither the robot nor the memory "
+            "of its friction, so no path can be made of it. Read its numbers with "
+            "notchflex.read_table, or write .json, .nc or .parquet."
+        )
+    if suffix not in (".json", ".nc", ".parquet"):
+        raise InputError(_no_kind(file, suffix, "read"))
+    if not FilePath(file).is_file():
+        raise InputError(f"there is no file {file}.")
+    if suffix == ".json":
+        return _from_json(file)
+    if suffix == ".nc":
+        return _from_netcdf(file)
+    from notchflex.results.files.parquet import read_head
+
+    return path_of(read_head(file), str(file))
+
+
+def whole_document(path: EquilibriumPath) -> dict[str, Any]:
+    """Return a path as the JSON document that can be read back: for people, and for `read_path`."""
+    return {**path_document(path), READ_BACK: encoded(record_of(path))}
+
+
+def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
+    """Write a path as NetCDF: what `to_xarray` has, and the rest of its record in a group.
+
+    Raises:
+        InputError: A library is not installed, or the file cannot be written.
+    """
+    need_netcdf("NetCDF")
+    from notchflex.results.files.dataset import RECORD_GROUP, dataset_of, record_dataset
+
+    data, record = dataset_of(path), record_dataset(path)
+    with replacing(target) as temporary:
+        data.to_netcdf(temporary, engine="h5netcdf")
+        record.to_netcdf(temporary, engine="h5netcdf", group=RECORD_GROUP, mode="a")
+
+
+def need_netcdf(what: str) -> None:
+    """Raise if NetCDF cannot be written; for the argument see `need`."""
+    for module in ("xarray", "h5netcdf", "h5py"):
+        need(module, "data", what)
+
+
+def _from_netcdf(file: str | FilePath) -> EquilibriumPath:
+    need_netcdf("NetCDF")
+    import xarray
+
+    from notchflex.results.files.dataset import RECORD_GROUP, path_of_datasets
+
+    try:
+        data = xarray.load_dataset(file, engine="h5netcdf")
+        record = None
+        if RECORD_GROUP in _groups(file):
+            record = xarray.load_dataset(file, engine="h5netcdf", group=RECORD_GROUP)
+    except (OSError, ValueError, KeyError) as problem:
+        words = " ".join(str(problem).split())
+        raise InputError(f"{file} cannot be read as NetCDF: {words}.") from None
+    return path_of_datasets(data, record, str(file))
+
+
+def _groups(file: str | FilePath) -> list[str]:
+    import h5py
+
+    with h5py.File(file, "r") as opened:
+        return [str(name) for name in opened]
+
+
+def _from_json(file: str | FilePath) -> EquilibriumPath:
+    try:
+        document = json.loads(FilePath(file).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        reason = getattr(problem, "strerror", None) or f"it is no JSON ({problem})"
+        raise InputError(f"{file} cannot be read: {reason}.") from None
+    if not isinstance(document, dict) or READ_BACK not in document:
+        raise InputError(
+            f"{file} holds no path that can be read back; give a file that simulate --json or "
+            "save_path wrote."
+        )
+    path = path_of(decoded(document[READ_BACK], str(file)), str(file))
+    if not _same_steps(path, document.get("steps")):
+        raise InputError(
+            f"{file}: its steps are not those that its part {READ_BACK!r} holds, so one of them "
+            "was changed; write the file again."
+        )
+    return path
+
+
+def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
+    """Whether the steps of a document are those of a path, but for steps that were not tried.
+
+    Version 0.1.0 wrote zeros for the shape of those.
+    """
+    wanted = plain(path_document(path))["steps"]
+    if not isinstance(steps, list) or len(steps) != len(wanted):
+        return False
+    pairs = zip(wanted, steps, np.asarray(path.run.tried), strict=True)
+    return all(one == other for one, other, tried in pairs if tried)
+
+
+def _no_kind(file: str | FilePath, suffix: str, done: str) -> str:
+    got = f"the suffix {suffix}" if suffix else "no suffix"
+    return f"{file}: got {got}; a path is {done} as {_KINDS}."

@@ -1,0 +1,243 @@
+"""A path as plain arrays and facts, from which an equal path is made: what files carry.
+
+A record holds what a solver found (states, memory, everything told of them) and what it was asked
+(robot file, loads, settings). Reading it back solves nothing, so the numbers are those written,
+whatever the version or the machine that reads them.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex import __version__
+from notchflex.errors import InputError
+
+if TYPE_CHECKING:
+    from notchflex.results.path import EquilibriumPath
+    from notchflex.robot import Robot
+
+FORMAT = "notchflex path 1"
+IN_BASE = "_in_base"
+"""Ends the name of an array in the frame of a base that is turned in the world."""
+
+_TURNED = ("body_position", "body_rotation", "tip_position", "base_force", "base_moment")
+_STATE, _START = "state", "before."
+_RUN = ("residual", "iterations", "converged", "tried", "reached")
+_HELD = ("smallest_eigenvalue", "determinant_sign")
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a path is made of.
+
+    Attributes:
+        facts: The robot file as text, the external loads, how it was solved; plain values.
+        arrays: Everything else by name, in mm, N, rad.
+    """
+
+    facts: Mapping[str, Any]
+    arrays: Mapping[str, NDArray[Any]]
+
+
+def record_of(path: EquilibriumPath) -> Record:
+    """Return the record of a path."""
+    chain = path.chain
+    facts = {
+        "format": FORMAT,
+        "program": "notchflex",
+        "version": __version__,
+        "robot": robot_of(path.robot),
+        "level": chain.level,
+        "loaded": chain.loaded,
+        "refinement": chain.refinement,
+        "flat": chain.frame is not None,
+        "each_from_rest": path.each_from_rest,
+        "base_rotation_rad": path.load.base_rotation.tolist(),
+        "settings": {one.name: getattr(path.settings, one.name) for one in fields(path.settings)},
+        "external": _loads_of(path),
+    }
+    return Record(facts, dict(_arrays_of(path)))
+
+
+def robot_of(robot: Robot) -> str:
+    """Return the robot file of a robot, with the comments of the one that it was read from."""
+    from notchflex.robot.robot import source_of
+    from notchflex.robot.writing import robot_text
+
+    return robot_text(robot, source_of(robot))
+
+
+def path_of(record: Record, source: str) -> EquilibriumPath:
+    """Return the path of a record.
+
+    Args:
+        record: What `record_of` returned, or what was read of it.
+        source: Where it was read from, for messages.
+
+    Raises:
+        InputError: Something is missing or fits nothing.
+    """
+    if record.facts.get("format") != FORMAT:
+        got = record.facts.get("format")
+        raise InputError(
+            f"{source} is laid out as {got!r}, not as {FORMAT!r}: it cannot be made a path of by "
+            f"notchflex {__version__}; write it again with this version."
+        )
+    try:
+        return _path_of(record)
+    except InputError as problem:
+        raise InputError(f"{source} cannot be read back: {problem}") from None
+    except KeyError as problem:
+        raise InputError(
+            f"{source} cannot be read back: {problem.args[0]} is missing; write it again."
+        ) from None
+    except (TypeError, ValueError, IndexError) as problem:
+        raise InputError(
+            f"{source} cannot be read back: it is damaged ({problem}); write it again."
+        ) from None
+
+
+def encoded(record: Record) -> dict[str, Any]:
+    """Return a record for JSON: numbers as their bytes, so that not one digit is lost."""
+    arrays = {
+        name: {
+            "type": (plain := np.ascontiguousarray(array).astype(_little(array))).dtype.str,
+            "shape": list(plain.shape),
+            "base64": base64.b64encode(plain.tobytes()).decode("ascii"),
+        }
+        for name, array in record.arrays.items()
+    }
+    return {"facts": dict(record.facts), "arrays": arrays}
+
+
+def decoded(document: Any, source: str) -> Record:
+    """Return the record of what `encoded` returned.
+
+    Raises:
+        InputError: It is none.
+    """
+    try:
+        arrays = {
+            str(name): np.frombuffer(base64.b64decode(one["base64"]), np.dtype(one["type"]))
+            .reshape(one["shape"])
+            .copy()
+            for name, one in document["arrays"].items()
+        }
+        return Record(dict(document["facts"]), arrays)
+    except (AttributeError, KeyError, TypeError, ValueError) as problem:
+        raise InputError(
+            f"{source} cannot be read back: what it holds for that is damaged ({problem}); "
+            "write it again."
+        ) from None
+
+
+def _little(array: NDArray[Any]) -> Any:
+    return array.dtype.newbyteorder("<")
+
+
+def _loads_of(path: EquilibriumPath) -> str:
+    """The external loads: each different one, and which of them every step has."""
+    distinct = [asdict(one) for one in path.load.different]
+    return json.dumps({"distinct": distinct, "step": path.load.which.tolist()})
+
+
+def _loads_from(text: str) -> tuple[Any, ...]:
+    from notchflex.loads import BodyForce, ExternalLoad
+
+    told = json.loads(text)
+    distinct = [
+        ExternalLoad(**one | {"body_forces": [BodyForce(**force) for force in one["body_forces"]]})
+        for one in told["distinct"]
+    ]
+    return tuple(distinct[number] for number in told["step"])
+
+
+def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
+    import jax.tree_util as tree_util
+
+    from notchflex.results.recorded import BEFORE, TOLD
+
+    run = path.run
+    turned = bool(path.load.base_rotation.any())
+    yield "commanded_tension", path.load.tension
+    yield "commanded_stroke", path.load.stroke
+    for name in TOLD:
+        own = f"{name}{IN_BASE}" if turned and name in _TURNED else name
+        yield own, np.asarray(run.quantity(name))
+    for name in _RUN:
+        # A path counts more as not converged than the solver does.
+        yield ("solver_converged" if name == "converged" else name), np.asarray(getattr(run, name))
+    yield _HELD[0], path.smallest_eigenvalue
+    yield _HELD[1], path.determinant_sign
+    for name in BEFORE:
+        yield _START + name, run.before(name)
+    for key, leaf in tree_util.tree_flatten_with_path(run.solved)[0]:
+        yield _STATE + tree_util.keystr(key), np.asarray(leaf)
+
+
+def _path_of(record: Record) -> EquilibriumPath:
+    import jax.tree_util as tree_util
+
+    from notchflex.loads import LoadPath
+    from notchflex.results.path import EquilibriumPath
+    from notchflex.results.recorded import BEFORE, TOLD, Recorded
+    from notchflex.robot import robot_from_text
+    from notchflex.solver.newton import Settings
+    from notchflex.solver.programs.prepare import prepared
+
+    facts, arrays = record.facts, record.arrays
+    robot = robot_from_text(facts["robot"])
+    load = LoadPath(
+        arrays["commanded_tension"],
+        arrays["commanded_stroke"],
+        np.array(facts["base_rotation_rad"]),
+        _loads_from(facts["external"]),
+    )
+    ready = prepared(
+        robot,
+        facts["level"],
+        loaded=facts["loaded"],
+        refinement=facts["refinement"],
+        flat=facts["flat"],
+    )
+    steps = len(load)
+    leaves, structure = tree_util.tree_flatten_with_path(ready.rest)
+    state: list[NDArray[Any]] = []
+    for key, leaf in leaves:
+        name = _STATE + tree_util.keystr(key)
+        state.append(_of_shape(arrays[name], (steps, *np.shape(leaf)), name))
+    turned = bool(load.base_rotation.any())
+    told = {
+        name: arrays[f"{name}{IN_BASE}" if turned and name in _TURNED else name] for name in TOLD
+    }
+    for name, values in told.items():
+        _of_shape(values, (steps, *values.shape[1:]), name)
+    run = {
+        name: _of_shape(arrays["solver_converged" if name == "converged" else name], (steps,), name)
+        for name in _RUN
+    }
+    recorded = Recorded(
+        solved=tree_util.tree_unflatten(structure, state),
+        told=told,
+        first={name: arrays[_START + name] for name in BEFORE},
+        held=(arrays[_HELD[0]], arrays[_HELD[1]]),
+        **run,
+    )
+    return EquilibriumPath(
+        robot, load, ready, recorded, facts["each_from_rest"], Settings(**facts["settings"])
+    )
+
+
+def _of_shape(array: NDArray[Any], shape: tuple[int, ...], name: str) -> NDArray[Any]:
+    if array.shape != shape:
+        raise InputError(
+            f"{name} has the shape {array.shape}, and this robot and its loads ask for {shape}."
+        )
+    return array

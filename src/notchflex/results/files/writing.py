@@ -1,0 +1,250 @@
+"""Where results go: paths checked before anything is computed, files replaced whole.
+
+A file is first written beside its destination under a temporary name and then renamed over it, so
+that whoever reads it sees the old file or the new one and never half of either.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import tempfile
+from collections.abc import Generator, Iterable
+from pathlib import Path
+
+from notchflex._extras import need
+from notchflex.errors import InputError
+from notchflex.results.files.streams import write_document
+
+STANDARD_OUTPUT = "-"
+PAPER = (".png", ".svg", ".pdf")
+BROWSER = (".html",)
+MOVING = (".gif",)
+_DRAWN_BY = {".html": ("matplotlib", "plotly"), ".gif": ("matplotlib", "PIL")}
+"""What has to be installed for a kind of picture, where that is more than matplotlib."""
+
+
+def check_output(target: str, option: str, *, inputs: Iterable[str | Path] = ()) -> None:
+    """Raise if a file cannot be written at `target`; nothing is created or changed.
+
+    Args:
+        target: A path, or `-` for standard output.
+        option: The option that named it, for the message.
+        inputs: Files that are read; an output must not replace one of them.
+
+    Raises:
+        InputError: The folder is missing, the path is a folder or read-only, or it is an input.
+    """
+    if target == STANDARD_OUTPUT:
+        return
+    if not target.strip():
+        raise InputError(f"{option} needs the name of a file, and got an empty one.")
+    if "\0" in target:
+        raise InputError(f"{option} {target!r} cannot be written: it holds a null character.")
+    path = Path(target)
+    folder = path.parent
+    try:
+        if path.is_dir():
+            raise InputError(
+                f"{option} {target}: this is a folder; give the name of a file to write in it."
+            )
+        if not folder.exists():
+            raise InputError(
+                f"{option} {target}: the folder {folder} does not exist; "
+                "make it first or choose another."
+            )
+        if not folder.is_dir():
+            raise InputError(f"{option} {target}: {folder} is a file, not a folder.")
+        if path.exists() and not os.access(path, os.W_OK):
+            raise InputError(f"{option} {target}: this file may not be written; choose another.")
+        if _replaceable(path) and not _folder_takes_files(folder):
+            raise InputError(
+                f"{option} {target}: no file may be written in the folder {folder}; choose another."
+            )
+        for source in inputs:
+            if Path(source).exists() and path.exists() and path.samefile(source):
+                raise InputError(
+                    f"{option} {target}: this would replace the file that is read; choose another."
+                )
+    except (OSError, ValueError) as problem:
+        if isinstance(problem, InputError):
+            raise
+        words = getattr(problem, "strerror", None) or str(problem)
+        raise InputError(f"{option} {target!r} cannot be written: {words}.") from None
+
+
+def check_folder(
+    folder: str, names: Iterable[str], option: str, *, inputs: Iterable[str | Path] = ()
+) -> tuple[Path, ...]:
+    """Raise if files cannot be written in a folder, which may be missing; nothing is changed.
+
+    Args:
+        folder: The folder; if it is missing, the one that it would be made in must be there.
+        names: Names of the files.
+        option: The option that named the folder, for the message.
+        inputs: Files that are read; none of them may be replaced.
+
+    Returns:
+        The paths of the files.
+
+    Raises:
+        InputError: A file cannot be written there, has no name of a file, or is an input.
+    """
+    if not folder.strip():
+        raise InputError(f"{option} needs the name of a folder, and got an empty one.")
+    if folder == STANDARD_OUTPUT:
+        raise InputError(f"{option} - : files cannot go to standard output; name a folder.")
+    files: list[Path] = []
+    for name in names:
+        if Path(name).name != name or "\0" in name:
+            raise InputError(f"{option} {folder}: a file cannot be called {name!r}.")
+        files.append(Path(folder) / name)
+    there = os.path.exists(folder) if "\0" not in folder else False
+    sources = list(inputs)
+    for target in files if there else [folder]:
+        check_output(str(target), option, inputs=sources)
+    return tuple(files)
+
+
+def check_picture(
+    target: str,
+    option: str,
+    *,
+    inputs: Iterable[str | Path] = (),
+    kinds: tuple[str, ...] = PAPER + BROWSER,
+) -> None:
+    """Raise if a picture cannot be written at `target`: as `check_output`, and its kind too.
+
+    Args:
+        target: A path.
+        option: The option that named it, for the message.
+        inputs: Files that are read; an output must not replace one of them.
+        kinds: The suffixes that this picture may have.
+
+    Raises:
+        InputError: The suffix is none of them, or what draws the picture is not installed.
+    """
+    if target == STANDARD_OUTPUT:
+        raise InputError(
+            f"{option} - : a picture cannot go to standard output; name a file, "
+            "for example wrist.png."
+        )
+    suffix = Path(target).suffix.lower()
+    if suffix not in kinds:
+        got = f"the suffix {suffix}" if suffix else "no suffix"
+        known = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
+        raise InputError(f"{option} {target}: got {got}; a picture is written as {known}.")
+    check_output(target, option, inputs=inputs)
+    for module in _DRAWN_BY.get(suffix, ("matplotlib",)):
+        need(module, "plot", option)
+
+
+def check_distinct(outputs: dict[str, str | None]) -> None:
+    """Raise if two options name the same file, or both standard output.
+
+    Args:
+        outputs: Option to its target; None where the option was not given.
+
+    Raises:
+        InputError: Two targets are the same.
+    """
+    seen: dict[str, str] = {}
+    for option, target in outputs.items():
+        if target is None:
+            continue
+        # What holds a null character names no file: `check_output` tells that.
+        plain = target == STANDARD_OUTPUT or "\0" in target
+        name = target if plain else os.path.realpath(target)
+        if name in seen:
+            where = "standard output" if target == STANDARD_OUTPUT else target
+            raise InputError(
+                f"{seen[name]} and {option} both write to {where}; give them different files."
+            )
+        seen[name] = option
+
+
+@contextlib.contextmanager
+def replacing(target: str | Path) -> Generator[Path]:
+    """Give a path to write to; on success the file there becomes `target`, whole.
+
+    The temporary file lies in the folder of `target` and keeps its suffix. If the body of the
+    `with` raises, the temporary file is removed and `target` is as it was.
+
+    Args:
+        target: Path of the file to make or replace. A link is followed; what is no ordinary
+            file (/dev/null, a pipe) is written directly.
+
+    Yields:
+        The path to write to.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    if not _replaceable(Path(target)):  # not its real path: /dev/stdout may be a link to no name
+        try:
+            yield Path(target)
+        except OSError as problem:
+            words = problem.strerror or problem
+            raise InputError(f"{target} cannot be written: {words}.") from None
+        return
+    destination = Path(os.path.realpath(target))
+    try:
+        handle, name = tempfile.mkstemp(
+            dir=destination.parent, prefix=f".{destination.stem}-", suffix=destination.suffix
+        )
+        os.close(handle)
+    except OSError as problem:
+        raise InputError(f"{target} cannot be written: {problem.strerror}.") from None
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(_mode_for(destination))
+        os.replace(temporary, destination)
+    except OSError as problem:
+        raise InputError(f"{target} cannot be written: {problem.strerror or problem}.") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(target: str | Path, text: str) -> None:
+    """Write UTF-8 text to a file, whole or not at all, or to standard output for `-`.
+
+    Args:
+        target: Path, or `-`.
+        text: What to write.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    if str(target) == STANDARD_OUTPUT:
+        write_document(text)
+        return
+    with replacing(target) as temporary:
+        temporary.write_text(text, encoding="utf-8", errors="replace", newline="\n")
+
+
+def _replaceable(path: Path) -> bool:
+    """Say whether renaming over `path` is right: an ordinary file, or none yet."""
+    return not path.exists() or path.is_file()
+
+
+def _folder_takes_files(folder: Path) -> bool:
+    """Say whether a file can be made in `folder`, by making one without a name and dropping it.
+
+    Asking for permissions is not enough: a read-only file system or a full quota grants them.
+    """
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _mode_for(destination: Path) -> int:
+    """Return the permissions of the file there is, or those a new file would get."""
+    if destination.exists():
+        return stat.S_IMODE(destination.stat().st_mode)
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

@@ -1,0 +1,238 @@
+"""What a simulation returns: the states of a path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, overload
+
+import jax.tree_util as tree_util
+import numpy as np
+from jaxtyping import Float, Int
+
+from notchflex._jax import constant
+from notchflex._summary import Displayed, Summary
+from notchflex.loads.applied import out_of_frame
+from notchflex.loads.command import Command, command
+from notchflex.loads.load_path import LoadPath
+from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.motion import rotation_about
+from notchflex.results.equilibrium import ConvergenceError, Equilibrium
+from notchflex.results.quantities.path_formulas import FORMULAS
+from notchflex.results.quantities.properties import PathQuantities
+from notchflex.results.recorded import Recorded
+from notchflex.results.state import State
+from notchflex.robot import Robot
+from notchflex.solver.continuation import Solved
+from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.prepare import Prepared
+from notchflex.solver.programs.run import Run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from xarray import Dataset
+
+    from notchflex.plotting import Picture
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EquilibriumPath(PathQuantities, Displayed):
+    """Equilibria along a load path. Units mm, N, N mm, rad; s steps, n notches, t tendons.
+
+    Where a step did not converge its row holds the last good state (its `tension` and `stroke`
+    are that state's, not the commanded ones), `converged` is false and `reason` says why; the
+    steps after it were not tried and hold the same state.
+
+    Attributes:
+        robot: The robot.
+        load: The loads.
+        prepared: The robot as arrays.
+        run: What the solver returned, as arrays, or what was read of it from a file.
+        each_from_rest: Whether every state starts from the same one, not from its neighbour.
+        settings: How hard the solver tried.
+    """
+
+    robot: Robot
+    load: LoadPath
+    prepared: Prepared
+    run: Run | Recorded
+    each_from_rest: bool = False
+    settings: Settings = DEFAULT
+
+    @property
+    def chain(self) -> Chain:
+        """The robot as arrays."""
+        return self.prepared.chain
+
+    def __len__(self) -> int:
+        """Number of steps."""
+        return len(self.load)
+
+    @overload
+    def __getitem__(self, step: int) -> Equilibrium: ...
+    @overload
+    def __getitem__(self, step: slice) -> list[Equilibrium]: ...
+    def __getitem__(self, step: int | slice) -> Equilibrium | list[Equilibrium]:
+        """One state, or some of them."""
+        if isinstance(step, slice):
+            return [Equilibrium(self, i) for i in range(*step.indices(len(self)))]
+        if not -len(self) <= step < len(self):
+            raise IndexError(f"step {step} of a path of {len(self)} steps")
+        return Equilibrium(self, step % len(self))
+
+    def quantity(self, name: str) -> Any:
+        """Return a quantity of every step by its name, steps as leading axis.
+
+        Args:
+            name: Name of a property, such as "notch_angle".
+        """
+        kept = self._kept
+        if name not in kept:
+            own = FORMULAS.get(name)
+            kept[name] = self.solver_quantity(name) if own is None else own(self)
+        return kept[name]
+
+    def solver_quantity(self, name: str) -> np.ndarray:
+        """Return what the solver reports of every step, by its name in `Shape` or `Quantities`.
+
+        Steps that were not tried repeat the last one that was: the solver leaves their rows empty.
+        """
+        values = np.asarray(self.run.quantity(name))
+        if len(self) == 1:  # always tried
+            return values
+        tried = np.asarray(self.run.tried)
+        if tried.all():
+            return values
+        return values[np.maximum.accumulate(np.where(tried, np.arange(len(tried)), 0))]
+
+    @cached_property
+    def _kept(self) -> dict[str, Any]:
+        return {}
+
+    @cached_property
+    def base_to_world(self) -> Float[np.ndarray, "3 3"] | None:
+        """Rotation of the base in the world, shape (3, 3); None for a base that is not turned."""
+        turn = self.load.base_rotation
+        return np.asarray(rotation_about(constant(turn))) if any(turn.tolist()) else None
+
+    @property
+    def front(self) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
+        """How far the friction has reversed along every tendon, m and eta, (s, t) each.
+
+        Gao 2017, eq. 26: the friction of contact i is that of unloading for i < m, eta times
+        the largest for i = m, and that of loading for i > m. Contacts are counted from 1 at the
+        base; m is one more than there are when all have turned (eta is then NaN). A tendon that
+        is pulled for the first time has m = 1 and eta = 1.
+        """
+        return self.quantity("front")
+
+    @cached_property
+    def commands(self) -> Command:
+        """The loads as the solver takes them."""
+        return command(self.load, self.robot, self.chain)
+
+    @cached_property
+    def stability(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest eigenvalue of the stiffness, N mm, and sign of its determinant, (s,) each."""
+        value, sign = self.run.stability(self.commands)
+        return np.asarray(value), np.asarray(sign)
+
+    def state_at(self, step: int) -> State:
+        """State after a step (or the last good one before it), to save or continue from."""
+        solved: Solved = tree_util.tree_map(lambda leaf: np.asarray(leaf)[step], self.run.solved)
+        chain = self.chain
+        if solved.applied is not None and chain.frame is not None:
+            solved = solved._replace(applied=out_of_frame(solved.applied, chain.frame))
+        name = self.robot.name
+        return State(name, solved, chain.level, chain.loaded, chain.refinement, self.robot)
+
+    @property
+    def state(self) -> State:
+        """State after the last converged step."""
+        return self.state_at(-1)
+
+    def to_xarray(self) -> Dataset:
+        """The whole path as a labelled data set: every quantity, with its name and unit.
+
+        Units are those of Python: mm, N, rad. `notchflex.save_path` writes a NetCDF file of it
+        that `notchflex.read_path` reads back, with the states that a simulation continues from.
+
+        Raises:
+            InputError: xarray is not installed.
+
+        Example:
+            >>> from notchflex import load_robot, pull, simulate
+            >>> path = simulate(load_robot("pacheco2021-a"), pull(0.0, 1.0, steps=3))
+            >>> path.to_xarray()["notch_angle"].dims
+            ('step', 'notch')
+        """
+        from notchflex.results.files.dataset import dataset_of
+
+        return dataset_of(self)
+
+    def to_dataframe(self, library: str = "polars") -> Any:
+        """The path as a table of one row per step, with the columns of the CSV file.
+
+        Units stand in the names of the columns: mm, N and, unlike the properties, deg.
+
+        Args:
+            library: "polars" or "pandas".
+
+        Returns:
+            A `polars.DataFrame` or a `pandas.DataFrame`.
+
+        Raises:
+            InputError: The library is not installed, or there is no such library.
+
+        Example:
+            >>> from notchflex import load_robot, pull, simulate
+            >>> path = simulate(load_robot("pacheco2021-a"), pull(0.0, 1.0, steps=3))
+            >>> path.to_dataframe().select("tendon_force_N", "notch_5_deg").shape
+            (3, 2)
+        """
+        from notchflex.results.files.dataframe import dataframe_of
+
+        return dataframe_of(self, library)
+
+    @overload
+    def plot(self) -> Picture: ...
+    @overload
+    def plot(self, x: str, y: str, *, ax: Axes | None = None) -> Axes: ...
+    def plot(
+        self, x: str | None = None, y: str | None = None, *, ax: Axes | None = None
+    ) -> Picture | Axes:
+        """Draw the path, or one of its quantities over another; see `notchflex.plot`.
+
+        Args:
+            x: Quantity or CSV column on the horizontal axis, such as "stroke".
+            y: The same on the vertical axis, such as "tension" or "notch_3_deg".
+            ax: Axes of matplotlib to draw into; new ones if None.
+
+        Returns:
+            Without x and y the usual picture, which a notebook shows; otherwise the axes.
+
+        Raises:
+            InputError: There is no such quantity, it can't be drawn, or matplotlib is missing.
+        """
+        from notchflex._plot import plot
+
+        return plot(self, x, y, ax=ax)
+
+    def _summary(self) -> Summary:
+        from notchflex.results.summary import path_summary
+
+        return path_summary(self)
+
+    def raise_if_failed(self) -> EquilibriumPath:
+        """Itself, if every step converged.
+
+        Raises:
+            ConvergenceError: A step did not; the message says which and why.
+        """
+        if not self.converged.all():
+            step = int(np.argmin(self.converged))
+            raise ConvergenceError(f"step {step + 1} of {len(self)}: {self.reason[step]}")
+        return self
+
+
+__all__ = ["EquilibriumPath"]

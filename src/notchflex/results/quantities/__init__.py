@@ -1,0 +1,1 @@
+"""Quantities of results: the registry of names, symbols and units, and their formulas."""

@@ -1,0 +1,116 @@
+"""Why a step of a path did not converge, in words for the person who gave the load."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Int
+
+from notchflex._jax import constant, jax
+from notchflex.solver.actuation import drawn_when_closed
+from notchflex.solver.programs.prepare import Prepared
+from notchflex.solver.programs.run import run
+
+if TYPE_CHECKING:  # for the type only: a path tells its reasons
+    from notchflex.results.path import EquilibriumPath
+
+# A stroke is followed up to the last good state before the last notch closes, which leaves it
+# open by less than this part of its height.
+_NEARLY_CLOSED = 1e-3
+# Axial stiffnesses, in forces that close a notch, each ten times the one before. Where nothing but
+# stretch lets a tendon be drawn so far, the second step changes its tension about ten times as much
+# as the first; where the shape fixes the tension, a tenth as much.
+_STIFFNESSES, _GROWS = (1e2, 1e3, 1e4), 3.0
+
+
+def why_not(path: EquilibriumPath, step: int) -> str:
+    """Why a step did not converge; empty where it did."""
+    if path.converged[step]:
+        return ""
+    if not path.run.tried[step]:
+        failed = int(np.argmin(path.converged))
+        return f"not tried, because step {failed + 1} of the path did not converge"
+    if path.run.converged[step] and not path.run.quantity("bend_possible")[step]:
+        return (
+            "a notch is bent by more than half a turn, so sharply that a fibre would have no "
+            "length left, or too far about several axes at once; take smaller loads"
+        )
+    if path.run.converged[step] and path.run.quantity("friction_holds")[step]:
+        return (
+            "the strain modes miss the moment of the loads by "
+            f"{100 * path.moment_error[step]:.0f} % of the largest: the robot is bent beyond "
+            "what this model is for; take smaller loads, or a refinement of 1, 2 or 3"
+        )
+    if path.run.converged[step]:
+        return (
+            "a tendon turns so sharply at an edge that its friction would hold any pull "
+            "(coefficient * tan(turning / 2) is 1 or more), where the friction law says nothing"
+        )
+    tension = ", ".join(f"{value:.4g}" for value in path.tension[step])
+    drawn = ", ".join(f"{value:.4g}" for value in path.stroke[step])
+    last = f"the last good state has tension {tension} N and stroke {drawn} mm"
+    opening = np.asarray(path.chain.rods.length).sum(axis=-1)
+    all_closed = (path.gap[step] < _NEARLY_CLOSED * opening).all()
+    if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
+        return (
+            "every notch closed: the robot can't shorten the tendon further, so this stroke "
+            f"fixes no tension; {last}; command a smaller stroke, or a tension, or give the "
+            "tendon a finite axial_stiffness"
+        )
+    held = _drawn_by_stretch_alone(path, step)
+    if len(held) == 1:
+        return (
+            f"the robot can't shorten tendon {held[0] + 1} by so much, so this stroke fixes no "
+            f"tension; {last}; command a smaller stroke, or a tension, or give the tendon a "
+            "finite axial_stiffness"
+        )
+    if len(held):
+        numbers = " and ".join(str(number + 1) for number in held)
+        return (
+            f"the strokes of tendons {numbers} contradict each other: no shape lets inextensible "
+            f"tendons be drawn so far at once, so they fix no tension; {last}; command other "
+            "strokes, or a tension, or give the tendons a finite axial_stiffness"
+        )
+    part = 100.0 * float(path.run.reached[step])
+    return (
+        f"no equilibrium found beyond {part:.3g} % of the way from the state before "
+        f"(imbalance {float(path.residual[step]):.2g}); {last}; take smaller steps, or the "
+        "robot has no equilibrium there"
+    )
+
+
+def _past_closing(path: EquilibriumPath, step: int) -> bool:
+    """Whether a stroke of a step is more than an inextensible tendon can lose."""
+    reach = drawn_when_closed(path.chain)
+    inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
+    return bool((inextensible & (path.load.stroke[step] >= reach)).any())
+
+
+def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:
+    """Return the inextensible tendons, from 0, that no shape of the robot lets be drawn so far.
+
+    Solved once more with tendons that stretch, their tension grows as their stiffness does.
+    """
+    chain = path.chain
+    inextensible = np.isinf(np.asarray(chain.axial_stiffness))
+    asked = inextensible & np.isfinite(path.load.stroke[step])
+    tensions: list[np.ndarray] = []
+    for forces in _STIFFNESSES if asked.any() else ():
+        stiffness = np.where(inextensible, forces * chain.closing_force, chain.axial_stiffness)
+        softer = Prepared(dataclasses.replace(chain, axial_stiffness=constant(stiffness)))
+        command = jax.tree.map(lambda leaf: np.asarray(leaf)[step : step + 1], path.commands)
+        start = jax.tree.map(lambda leaf: np.asarray(leaf)[step], path.run.solved)
+        came = run(softer, command, start, path.settings, each_from_start=True)
+        if not came.converged[0]:
+            return np.zeros(0, int)
+        tensions.append(came.quantity("tension")[0])
+    if not tensions:
+        return np.zeros(0, int)
+    least = 1e-3 * float(chain.closing_force)
+    first, second = np.diff(tensions, axis=0)
+    return np.flatnonzero(asked & (second > np.maximum(_GROWS * first, least)))
+
+
+__all__ = ["why_not"]

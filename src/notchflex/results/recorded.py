@@ -1,0 +1,67 @@
+"""A run as it was written down: its numbers are told again, and nothing is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from notchflex.loads.command import Command
+from notchflex.solver.continuation import Solved
+from notchflex.solver.derived.quantities import Quantities, Shape
+
+TOLD = (*Shape._fields, *Quantities._fields)
+"""Everything that a run tells of each state, by name."""
+
+BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
+"""What is asked of the state before the first one: work is summed up from there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """States of many loads, loads as leading axis, as `Run` has them.
+
+    Attributes:
+        solved: The last solved state at each load.
+        told: What is reported of each state, by the names of `TOLD`.
+        first: What is reported of the state before the first load, by the names of `BEFORE`.
+        held: Smallest eigenvalue of every stiffness, and the sign of its determinant.
+        residual: Largest scaled imbalance of the last attempt.
+        iterations: Newton iterations.
+        converged: Whether the load was reached.
+        tried: Whether it was tried at all.
+        reached: Part of the way from the load before that was reached.
+    """
+
+    solved: Solved
+    told: Mapping[str, np.ndarray]
+    first: Mapping[str, np.ndarray]
+    held: tuple[np.ndarray, np.ndarray]
+    residual: Float[np.ndarray, " s"]
+    iterations: Int[np.ndarray, " s"]
+    converged: Bool[np.ndarray, " s"]
+    tried: Bool[np.ndarray, " s"]
+    reached: Float[np.ndarray, " s"]
+
+    def quantity(self, name: str) -> np.ndarray:
+        """What is reported of each state, by its name in `Shape` or `Quantities`."""
+        return self.told[name]
+
+    def before(self, name: str) -> np.ndarray:
+        """A quantity of the state before the first load, by its name in `BEFORE`."""
+        return self.first[name]
+
+    def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest real part of the stiffness's eigenvalues and sign of the determinant."""
+        del commands  # they were counted when it was computed
+        return self.held
+
+    def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:
+        """Whether each state is stable."""
+        del commands
+        return (self.held[0] > 0.0) & (self.held[1] > 0.0)
+
+
+__all__ = ["BEFORE", "TOLD", "Recorded"]

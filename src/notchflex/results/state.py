@@ -1,0 +1,236 @@
+"""A state that can be saved and continued from: shape, tensions and memory."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import jax.tree_util as tree_util
+import numpy as np
+
+from notchflex._summary import Displayed, Summary
+from notchflex.errors import InputError
+from notchflex.loads.applied import in_frame, out_of_frame
+from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.flexure import LEVELS
+from notchflex.results.same_robot import mismatch
+from notchflex.robot import Robot
+from notchflex.solver.continuation import Solved, at_rest
+
+_MODES = ".point.unknowns.modes"
+_LOADS = ".applied"
+_FORMAT = "notchflex state 3"
+
+
+@dataclass(frozen=True, repr=False)
+class State(Displayed):
+    """Everything that the next load needs to know of the past.
+
+    Attributes:
+        robot: Name of the robot it belongs to.
+        solved: Unknowns, base tensions (N), memory of the contacts, stroke (mm) and loads, those as
+            of space.
+        level: For which loads its chain was assembled.
+        loaded: Whether loads other than the tendons' act in it.
+        refinement: How many more modes its chain has than for usual loads.
+        description: The robot it belongs to; None if that is not known.
+    """
+
+    robot: str
+    solved: Solved
+    level: str
+    loaded: bool
+    refinement: int
+    description: Robot | None = None
+
+    def save(self, path: str | FilePath) -> None:
+        """Write the state to a JSON file.
+
+        Args:
+            path: Where to; an existing file is replaced.
+
+        Raises:
+            InputError: The file cannot be written.
+        """
+        content = {
+            "format": _FORMAT,
+            "robot": self.robot,
+            "level": self.level,
+            "loaded": self.loaded,
+            "refinement": self.refinement,
+            "arrays": {name: array.tolist() for name, array in self.arrays.items()},
+        }
+        if self.description is not None:
+            from notchflex.robot.writing import robot_text
+
+            content["description"] = robot_text(self.description)
+        text = json.dumps(content, indent=1) + "\n"
+        try:
+            FilePath(path).write_text(text, encoding="utf-8")
+        except (OSError, ValueError) as error:  # ValueError: a null character in the name
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"the state cannot be written to {path}: {reason}") from None
+
+    def _summary(self) -> Summary:
+        from notchflex.results.summary import state_summary
+
+        return state_summary(self)
+
+    @property
+    def follows(self) -> bool:
+        """Whether any load in it turns with a body."""
+        applied = self.solved.applied
+        return applied is not None and bool(np.any(applied.following))
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Its numbers by name."""
+        leaves, _ = tree_util.tree_flatten_with_path(self.solved)
+        return {tree_util.keystr(key): np.asarray(leaf) for key, leaf in leaves}
+
+    @classmethod
+    def load(cls, path: str | FilePath) -> SavedState:
+        """Read a state back; it is fitted to a robot when it is continued from.
+
+        Args:
+            path: A file written by `save`.
+
+        Returns:
+            The state.
+
+        Raises:
+            InputError: The file is missing, is no state or is damaged.
+        """
+        if not str(path).strip():
+            raise InputError("the name of the state file is empty; give that of a saved state")
+        try:
+            content = json.loads(FilePath(path).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise InputError(f"there is no state file {path}") from None
+        except (OSError, ValueError, RecursionError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(
+                f"{path} cannot be read as a state: {reason}; give a file written by --save-state"
+            ) from None
+        if not isinstance(content, dict) or content.get("format") != _FORMAT:
+            raise InputError(f"{path} is no notchflex state; give a file written by --save-state")
+        robot, arrays = content.get("robot"), content.get("arrays")
+        if not isinstance(robot, str) or not isinstance(arrays, dict):
+            raise _damaged(path, "the name of its robot or its numbers are missing")
+        level, loaded = content.get("level"), content.get("loaded")
+        refinement = content.get("refinement")
+        if level not in LEVELS or not isinstance(loaded, bool) or not isinstance(refinement, int):
+            raise _damaged(path, "what loads it is for is missing")
+        description = content.get("description")
+        if description is not None:
+            from notchflex.robot.reading import robot_from_text
+
+            try:
+                description = robot_from_text(str(description))
+            except InputError:
+                raise _damaged(path, "the description of its robot cannot be read") from None
+        return SavedState(robot, arrays, level, loaded, refinement, str(path), description)
+
+
+@dataclass(frozen=True)
+class SavedState:
+    """A state as read from a file, not yet fitted to a robot.
+
+    Its `description` is None where an older version wrote the file: nothing then shows whether
+    the robot has changed since.
+    """
+
+    robot: str
+    arrays: Any
+    level: str
+    loaded: bool
+    refinement: int
+    source: str
+    description: Robot | None = None
+
+    @property
+    def follows(self) -> bool:
+        """Whether any load in it may turn with a body."""
+        return self.loaded
+
+    def fitted(self, chain: Chain) -> Solved:
+        """The state for a chain.
+
+        Raises:
+            InputError: It is damaged, or belongs to a robot of another make.
+        """
+        read: dict[str, np.ndarray] = {}
+        for name, numbers in self.arrays.items():
+            try:
+                array = np.asarray(numbers, float)
+            except (TypeError, ValueError, OverflowError):
+                raise _damaged(self.source, f"{name} is no table of numbers") from None
+            if not np.isfinite(array).all():
+                raise _damaged(self.source, f"{name} holds what is no finite number")
+            read[name] = array
+        wanted, _ = tree_util.tree_flatten_with_path(at_rest(chain))
+        for name in (tree_util.keystr(key) for key, _ in wanted):
+            if name not in read and not name.startswith(_LOADS):
+                raise _damaged(self.source, f"{name} is missing")
+        return _on_chain(read, chain, f"{self.source} holds a state of robot {self.robot!r}")
+
+
+def _damaged(source: str | FilePath, what: str) -> InputError:
+    return InputError(f"the state file {source} is damaged: {what}; save the state again")
+
+
+def check_robot(state: State | SavedState, robot: Robot) -> None:
+    """Check that a state belongs to a robot.
+
+    Raises:
+        InputError: It belongs to another one; the message names the values that differ.
+    """
+    if state.robot != robot.name:
+        raise InputError(
+            f"the state belongs to robot {state.robot!r}, this one is {robot.name!r}; "
+            "continue from a state of the same robot"
+        )
+    differs = "" if state.description is None else mismatch(robot, state.description)
+    if differs:
+        source = f"{state.source} holds" if isinstance(state, SavedState) else "this is"
+        raise InputError(
+            f"{source} a state of {robot.name!r} with other values: this robot has {differs}. "
+            "Continue with the values of the state, or start from rest."
+        )
+
+
+def fitted(state: State | SavedState | None, chain: Chain) -> Solved:
+    """What to start from: rest, or a state that must fit the chain."""
+    if state is None:
+        return at_rest(chain)
+    if isinstance(state, SavedState):
+        return state.fitted(chain)
+    return _on_chain(state.arrays, chain, f"the state belongs to robot {state.robot!r}")
+
+
+def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solved:
+    """A state on a chain that may have been assembled for more loads than that of the state."""
+    rest = at_rest(chain)
+    frame = chain.frame
+    if rest.applied is not None and frame is not None:  # a state holds loads as those of space
+        rest = rest._replace(applied=out_of_frame(rest.applied, frame))
+    leaves, structure = tree_util.tree_flatten_with_path(rest)
+    fitting = []
+    for key, leaf in leaves:
+        name = tree_util.keystr(key)
+        array = arrays.get(name, np.asarray(leaf))
+        if name == _MODES and array.ndim == leaf.ndim and array.shape[-1] < leaf.shape[-1]:
+            # The modes of every level are the first ones of the next.
+            array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
+        if array.shape != leaf.shape:
+            raise InputError(
+                f"{whose} with other notches or tendons than this robot; "
+                "continue from a state of the same robot"
+            )
+        fitting.append(array)
+    found: Solved = tree_util.tree_unflatten(structure, fitting)
+    if found.applied is not None and frame is not None:
+        found = found._replace(applied=in_frame(found.applied, frame))
+    return found

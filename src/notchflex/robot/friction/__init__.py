@@ -1,0 +1,1 @@
+"""Kinds of friction, one file each."""

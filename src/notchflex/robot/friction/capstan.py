@@ -1,0 +1,38 @@
+"""Capstan friction at the edges of the notches."""
+
+from dataclasses import KW_ONLY
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from notchflex.robot.kinds import Friction
+from notchflex.robot.part import Float, part, quantity
+
+
+@part
+class Capstan(Friction):
+    """Tension changes by at most exp(coefficient * turning angle) over a contact.
+
+    Args:
+        coefficient: Coefficient of friction.
+        wrap: Where a tendon on a wall arc turns: "geometric" is half the turning at either edge of
+            the notch; "whole-before" is all of it ahead of the notch (Pacheco 2021, eq. 10).
+
+    Raises:
+        InputError: A value is negative, not finite, of a wrong type or not known.
+
+    Example:
+        >>> Capstan(0.13).wrap
+        'geometric'
+    """
+
+    coefficient: Annotated[Float, quantity("", "coefficient of friction", at_least=0)]
+    wrap: Annotated[
+        Literal["geometric", "whole-before"],
+        Field(
+            description='"geometric" (half the turning at either edge of a notch) or '
+            '"whole-before" (all of it ahead of the notch: Pacheco 2021, eq. 10)'
+        ),
+    ] = "geometric"
+    _: KW_ONLY
+    kind: Literal["capstan"] = "capstan"

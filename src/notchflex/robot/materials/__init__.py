@@ -1,0 +1,1 @@
+"""Kinds of material, one file each."""

@@ -1,0 +1,71 @@
+"""The superelastic material of Pacheco 2021."""
+
+from dataclasses import KW_ONLY
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from notchflex.robot.kinds import Material
+from notchflex.robot.part import Float, ProblemError, part, quantity
+
+
+@part
+class Superelastic(Material):
+    """Three branches without memory: elastic, superelastic, plastic (Pacheco 2021, eq. 13).
+
+    The law is odd in strain: a notch bent the other way carries the opposite moment.
+
+    Args:
+        elastic_modulus: Modulus of the first branch [MPa].
+        superelastic_modulus: Modulus of the second branch [MPa].
+        transition_strain: Strain where the second branch begins.
+        plastic_strain: Strain where the third branch begins.
+        plastic_modulus: Modulus E_p of the third branch, sigma_p + E_p exp(beta / (eps - eps_p))
+            [MPa].
+        plastic_exponent: beta of the third branch, negative.
+        poisson_ratio: Poisson's ratio, for shear and torsion.
+        density: Density [kg/m3].
+        allowed_strain: Strain beyond which a simulation warns.
+
+    The third branch is not given in the paper; its defaults are those of the authors' code.
+
+    Raises:
+        InputError: A value is negative, not finite, of a wrong type or not known.
+
+    Example:
+        >>> Superelastic(10_000.0, 3_000.0, 0.028).plastic_strain
+        0.1
+    """
+
+    elastic_modulus: Annotated[Float, quantity("MPa", "modulus of the elastic branch", above=0)]
+    superelastic_modulus: Annotated[
+        Float, quantity("MPa", "modulus of the superelastic branch", above=0)
+    ]
+    transition_strain: Annotated[
+        Float, quantity("", "strain where the superelastic branch begins", above=0)
+    ]
+    plastic_strain: Annotated[
+        Float, quantity("", "strain where the plastic branch begins", above=0)
+    ] = 0.10
+    plastic_modulus: Annotated[Float, quantity("MPa", "modulus of the plastic branch", above=0)] = (
+        1000.0
+    )
+    plastic_exponent: Annotated[
+        Float, quantity("", "exponent of the plastic branch (beta)", below=0)
+    ] = -0.01
+    _: KW_ONLY
+    kind: Literal["superelastic"] = "superelastic"
+
+    @model_validator(mode="after")
+    def _branches_in_order(self) -> "Superelastic":
+        if self.plastic_strain <= self.transition_strain:
+            raise ProblemError(
+                [
+                    (
+                        "plastic_strain",
+                        f"is {self.plastic_strain}; it must be greater than the transition strain, "
+                        f"{self.transition_strain}.",
+                    )
+                ]
+            )
+        return self

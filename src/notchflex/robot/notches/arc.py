@@ -1,0 +1,86 @@
+"""The notch of Pacheco 2021 and York 2015: a cut that leaves an arc of the wall."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import KW_ONLY
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from notchflex.robot.kinds import Notch
+from notchflex.robot.part import Float, part, quantity
+from notchflex.robot.tube import Tube
+
+
+@part
+class ArcNotch(Notch):
+    """A notch whose remaining wall bends in one plane, with an arc of the tube as its section.
+
+    Args:
+        cut: "on-axis" (a laser on the axis: radial edges, an annular sector is left) or "off-axis"
+            (a saw or wire across the tube: a straight edge, an annular segment is left).
+            The two differ in stiffness by 34-51 % at equal depth, hence there is no default.
+        depth: Depth of the cut [mm], from the outer surface opposite the spine.
+        height: Height of the notch along the tube [mm].
+        uncut_length: Uncut length behind the notch, toward the tip [mm].
+        direction_deg: Side toward which the notch bends [deg].
+        precurvature_deg: Angle of the notch when nothing pulls [deg].
+        repeat: How many equal notches follow one another.
+
+    Raises:
+        InputError: A value is negative, not finite, of a wrong type or not known.
+
+    Example:
+        >>> ArcNotch("on-axis", depth=1.40, height=0.8, uncut_length=1.2, repeat=5).repeat
+        5
+    """
+
+    cut: Annotated[
+        Literal["on-axis", "off-axis"],
+        Field(
+            description='"on-axis" (laser on the axis: radial edges, an annular sector is left) or '
+            '"off-axis" (saw or wire across: straight edge, an annular segment is left)'
+        ),
+    ]
+    depth: Annotated[
+        Float, quantity("mm", "depth of the cut, from the surface opposite the spine", above=0)
+    ]
+    height: Annotated[Float, quantity("mm", "height of the notch along the tube", above=0)]
+    _: KW_ONLY
+    kind: Literal["arc"] = "arc"
+
+    def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
+        """Find a cut that goes through the tube, and a precurvature beyond any closing angle."""
+        if self.depth >= tube.outer_diameter:
+            yield (
+                "depth",
+                f"is {self.depth} mm; it must be greater than 0 and less than the outer diameter, "
+                f"{tube.outer_diameter} mm.",
+            )
+            return
+        if not self._open(tube):
+            closing = math.degrees(self.closing_angle(tube))
+            yield (
+                "precurvature_deg",
+                f"is {self.precurvature_deg} deg; a notch {self.height} mm high in this tube "
+                f"closes at {closing:.4g} deg; it must be less than that.",
+            )
+
+    def _open(self, tube: Tube) -> bool:
+        """Whether the lips are apart when nothing pulls."""
+        free = math.radians(self.precurvature_deg)
+        # The neutral axis lies between the tube axis and the spine: for most notches this tells,
+        # and no section need be worked out to make a robot.
+        if free < 0.5 * self.height / tube.outer_radius:
+            return True
+        return free < self.closing_angle(tube)
+
+    def closing_angle(self, tube: Tube) -> float:
+        """Return the angle at which the lips meet, from the straight notch [rad].
+
+        Pacheco 2021: h / (r_o + centroid).
+        """
+        from notchflex.mechanics.section import SECTION_OF_CUT  # it loads JAX
+
+        left = SECTION_OF_CUT[self.cut](tube.outer_radius, tube.inner_radius, self.depth)
+        return self.height / (tube.outer_radius + float(left.centroid))

@@ -1,0 +1,303 @@
+"""Names of values, such as `notch[2].depth`, and setting values by them (`--set`)."""
+
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple, cast
+
+from notchflex.errors import InputError
+from notchflex.robot.error_messages import fields_of, nearest, unknown_key
+from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
+from notchflex.robot.robot import Robot, from_table, remember_source, source_of, to_table
+from notchflex.robot.tendon import Tendon
+from notchflex.robot.tube import Tube
+
+_SECTIONS: dict[str, type] = {
+    "tube": Tube,
+    "notch": Notch,
+    "tendon": Tendon,
+    "material": Material,
+    "friction": Friction,
+}
+_PATH = re.compile(r"(?P<section>\w+)(?:\[(?P<index>\*|\d+)\])?(?:\.(?P<key>\w+))?")
+_EXAMPLES = "write it like material.elastic_modulus, notch[2].depth or notch[*].depth"
+
+# More digits than the number of any notch has.
+_DIGITS = 9
+
+
+class Changed(NamedTuple):
+    """A robot with new values, and the keys that a change of kind dropped."""
+
+    robot: Robot
+    dropped: tuple[str, ...]
+
+
+class Described(NamedTuple):
+    """A number of a robot: its unit ("" for none) and between what it must lie."""
+
+    unit: str
+    lower: float
+    upper: float
+
+
+class _Target(NamedTuple):
+    """A parsed path: `number` is None for the whole list and for sections that are no list."""
+
+    path: str
+    section: str
+    number: int | None
+    key: str
+
+
+def set_values(
+    robot: Robot, values: Mapping[str, object] | Iterable[tuple[str, object]]
+) -> Changed:
+    """Change values of a robot by their names; all are set before any is checked.
+
+    Kinds are changed first, then the values of all notches or tendons, then those of single ones,
+    so that the order of `values` does not matter.
+
+    Args:
+        robot: The robot to start from; it stays as it is.
+        values: New values by path (see `Robot.with_value`), in mm, N, MPa and deg.
+
+    Returns:
+        The new robot, and the paths of the values that a change of kind dropped.
+
+    Raises:
+        InputError: A path is not known or given twice, or a value is not allowed.
+    """
+    pairs: Iterable[tuple[str, object]] = (
+        cast("Mapping[str, object]", values).items() if isinstance(values, Mapping) else values
+    )
+    targets = [(_parse(path), value) for path, value in pairs]
+    targets.sort(key=lambda item: (item[0].key != "kind", item[0].number is not None))
+    table = to_table(robot)
+    dropped: list[str] = []
+    seen: set[tuple[str, int | None, str]] = set()
+    for target, value in targets:
+        if target[1:] in seen:
+            raise InputError(f"`{target.path}` is set twice; set it once.")
+        seen.add(target[1:])
+        if target.section == "name":
+            table["name"] = value
+        elif target.key == "kind":
+            dropped += _set_kind(table, target, value)
+        else:
+            _set_key(table, target, value)
+    return Changed(remember_source(from_table(table), source_of(robot)), tuple(dropped))
+
+
+def parse_assignment(text: str) -> tuple[str, object]:
+    """Read `PATH=VALUE` of the command line; the value is a number, or else text.
+
+    Args:
+        text: Such as `notch[2].depth=1.3` or `friction.wrap=geometric`.
+
+    Raises:
+        InputError: There is no `=`, no path or no value.
+
+    Example:
+        >>> parse_assignment("notch[2].depth=1.3")
+        ('notch[2].depth', 1.3)
+    """
+    path, equals, value = (piece.strip() for piece in text.partition("="))
+    if not (path and equals and value):
+        raise InputError(f"`{text}` sets nothing; {_EXAMPLES.replace('depth', 'depth=1.3', 1)}.")
+    return path, _value(value)
+
+
+def number_at(robot: Robot, path: str) -> float:
+    """The number of a robot that has a name, in the units of the robot file.
+
+    Args:
+        robot: The robot.
+        path: Its name, as for `Robot.with_value`.
+
+    Raises:
+        InputError: There is no such value, it is no number that may change little by little, or
+            several notches have unlike ones.
+    """
+    if not isinstance(path, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError(f"{path!r} is not the name of a value; {_EXAMPLES}.")
+    target = _parse(path)
+    found: set[object] = set()
+    allowed: dict[str, None] = {}
+    for one in _chosen(to_table(robot), target) if target.section != "name" else ():
+        keys = fields_of(_class_of(target.section, one))
+        allowed |= dict.fromkeys(keys)
+        if target.key in keys:
+            found.add(one.get(target.key, keys[target.key].default))
+    if not found:
+        near = nearest(target.key, allowed)
+        raise InputError(f"`{path}` is not the name of a number of this robot{near}; {_EXAMPLES}.")
+    if len(found) > 1:
+        raise InputError(f"`{path}` has unlike values in this robot; name one, such as [1].")
+    value = found.pop()
+    if not isinstance(value, float) or not math.isfinite(value):
+        raise InputError(
+            f"`{path}` is {value!r} in this robot, and no number that changes smoothly."
+        )
+    return value
+
+
+def described_at(robot: Robot, path: str) -> Described:
+    """Unit and limits of the number of a robot that has a name.
+
+    Args:
+        robot: The robot.
+        path: Its name, as for `Robot.with_value`.
+
+    Raises:
+        InputError: There is no such value.
+    """
+    target = _parse(path)
+    for one in _chosen(to_table(robot), target) if target.section != "name" else ():
+        field = fields_of(_class_of(target.section, one)).get(target.key)
+        if field is not None:
+            unit = str((field.json_schema_extra or {}).get("unit", ""))  # pyright: ignore
+            lower = [
+                getattr(one, key)
+                for one in field.metadata
+                for key in ("gt", "ge")
+                if hasattr(one, key)
+            ]
+            upper = [
+                getattr(one, key)
+                for one in field.metadata
+                for key in ("lt", "le")
+                if hasattr(one, key)
+            ]
+            return Described(unit, max(lower, default=-math.inf), min(upper, default=math.inf))
+    raise InputError(f"`{path}` is not the name of a number of this robot; {_EXAMPLES}.")
+
+
+def _value(text: str) -> object:
+    for read in (int, float, lambda one: tomllib.loads(f"x = {one}")["x"]):
+        try:
+            return read(text)
+        except (ValueError, RecursionError):
+            continue
+    return text
+
+
+def _parse(path: str) -> _Target:
+    """Split a path and check its section and whether a number may stand there."""
+    match = _PATH.fullmatch(path.strip())
+    if not match:
+        raise InputError(f"`{path}` is not the name of a value; {_EXAMPLES}.")
+    section, index, key = match["section"], match["index"], match["key"]
+    if section == "name" and index is None and key is None:
+        return _Target(path, "name", None, "")
+    if section not in _SECTIONS and key is None:
+        owners = [f"`{one}.{section}`" for one in _SECTIONS if section in _keys_of(one)]
+        near = nearest(section, ["name", *_SECTIONS])
+        meant = f" (did you mean {' or '.join(owners)}?)" if owners else near
+        raise InputError(f"`{path}` is not the name of a value{meant}; {_EXAMPLES}.")
+    if section not in _SECTIONS:
+        allowed = ["name", *_SECTIONS]
+        raise InputError(
+            f"`{path}` begins with `{section}`, which no robot has{nearest(section, allowed)}. "
+            f"Allowed: {', '.join(allowed)}."
+        )
+    if key is None:
+        raise InputError(f"`{path}` names no single value; {_EXAMPLES}.")
+    if index is not None and section not in ("notch", "tendon"):
+        raise InputError(f"`{path}` has a number, but there is one {section}: `{section}.{key}`.")
+    if index is not None and len(index) > _DIGITS:
+        raise InputError(f"there is no {section} of that number; {_EXAMPLES}.")
+    return _Target(path, section, None if index in (None, "*") else int(index), key)
+
+
+def _chosen(table: dict[str, Any], target: _Target) -> list[dict[str, Any]]:
+    """Find the tables that a path means; a single notch is first split from its group."""
+    tables = table[target.section]
+    if isinstance(tables, dict):
+        return [tables]
+    if target.number is None:
+        return tables
+    number = sum(one.get("repeat", 1) for one in tables)
+    if not 1 <= target.number <= number:
+        plural = {"notch": "notches", "tendon": "tendons"}[target.section]
+        raise InputError(
+            f"`{target.path}`: the robot has {number} {target.section if number == 1 else plural}; "
+            f"give a number from 1 to {number}."
+        )
+    before = target.number - 1  # how many stand before the chosen one, within its group in the end
+    group = 0
+    while before >= (count := tables[group].get("repeat", 1)):
+        before -= count
+        group += 1
+    if count > 1:
+        one = tables[group]
+        kind = cast("type[Notch]", _class_of("notch", one))  # nothing else is repeated
+        pieces = ((0, before), (before, 1), (before + 1, count - before - 1))
+        tables[group : group + 1] = [
+            kind.further_on(one, start) | {"repeat": number} for start, number in pieces if number
+        ]
+        group += 1 if before else 0
+    return [tables[group]]
+
+
+def _set_key(table: dict[str, Any], target: _Target, value: object) -> None:
+    """Set a key wherever the kind of part has it."""
+    if (target.section, target.key) == ("notch", "repeat"):
+        raise InputError(
+            f"`{target.path}` would change the number of notches; change `repeat` in the robot "
+            "file instead."
+        )
+    taken = False
+    allowed: dict[str, None] = {}
+    for one in _chosen(table, target):
+        keys = fields_of(_class_of(target.section, one))
+        allowed |= dict.fromkeys(keys)
+        if target.key in keys:
+            one[target.key] = value
+            taken = True
+    if not taken:
+        raise InputError(unknown_key(target.path, target.key, allowed))
+
+
+def _set_kind(table: dict[str, Any], target: _Target, value: object) -> list[str]:
+    """Change a kind: keep the keys that both kinds share, and return the paths of the others."""
+    base = _SECTIONS[target.section]
+    if target.section in ("tube", "tendon"):
+        raise InputError(unknown_key(target.path, "kind", fields_of(base)))
+    kinds = kinds_of(base)
+    if value not in kinds:
+        allowed = ", ".join(f'"{kind}"' for kind in kinds)
+        raise InputError(
+            f'`{target.path}` is "{value}"; allowed: {allowed}{nearest(str(value), kinds)}.'
+        )
+    new = fields_of(kinds[str(value)])
+    dropped: list[str] = []
+    for one in _chosen(table, target):
+        for key in [key for key in one if key not in new]:
+            dropped.append(target.path.removesuffix("kind") + key)
+            del one[key]
+        one["kind"] = value
+    return list(dict.fromkeys(dropped))
+
+
+def defaults_of(section: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the defaults of the keys of a part, which a file may leave out; not of its kind."""
+    keys = fields_of(_class_of(section, table))
+    return {
+        name: field.default
+        for name, field in keys.items()
+        if name != "kind" and not field.is_required()
+    }
+
+
+def _keys_of(section: str) -> set[str]:
+    """Return the keys that any kind of a part has."""
+    base = _SECTIONS[section]
+    classes = kinds_of(base).values() if issubclass(base, Notch | Material | Friction) else [base]
+    return {key for one in classes for key in fields_of(one)}
+
+
+def _class_of(section: str, table: Mapping[str, Any]) -> type:
+    base = _SECTIONS[section]
+    return kinds_of(base)[table["kind"]] if "kind" in table else base

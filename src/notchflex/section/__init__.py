@@ -1,8 +1,0 @@
-"""Cross-sections that cuts leave of a tube: area, moments, torsion, shear centre, edges."""
-
-from notchflex.section.cuts import SECTION_OF_CUT as SECTION_OF_CUT
-from notchflex.section.section import Section as Section
-from notchflex.section.sector import annular_sector as annular_sector
-from notchflex.section.segment import annular_segment as annular_segment
-from notchflex.section.two_walls import clamped_torsion_constant as clamped_torsion_constant
-from notchflex.section.two_walls import two_walls as two_walls

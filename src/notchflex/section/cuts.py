@@ -1,6 +1,0 @@
-"""Which section each cut of an asymmetric notch leaves."""
-
-from notchflex.section.sector import annular_sector
-from notchflex.section.segment import annular_segment
-
-SECTION_OF_CUT = {"on-axis": annular_sector, "off-axis": annular_segment}

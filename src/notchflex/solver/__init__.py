@@ -1,0 +1,1 @@
+"""Equilibrium of a loaded chain: residual, linear step, Newton's method, continuation."""

@@ -1,0 +1,87 @@
+"""How well the internal moment of the modes meets the moment that the loads ask for.
+
+The modes hold the balance only on average along a flexure. What is left between, the largest
+|M_internal - M_required| over the largest |M|, tells whether there are modes enough.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import jax, jnp
+from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.contact.spine import SpineLips
+from notchflex.mechanics.flexure import Rod, fibre_stretch, of_rod
+from notchflex.mechanics.flexure.rod_kinematics import node_poses, relative_pose, rod_end
+from notchflex.mechanics.motion import Motion
+from notchflex.mechanics.tendon.wall_arc import WallArc
+from notchflex.solver.element import Unknowns
+from notchflex.solver.residual import Evaluation
+
+# Moments below this part of the stiffest mode's stiffness (per rad).
+_NOTHING = 1e-12
+
+
+def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, ""]:
+    """Largest imbalance of bending moment at any node, over the largest moment."""
+    # Bending about x and y in space, about y in the plane.
+    bending = np.array([0, 1]) if chain.frame is None else np.array([0])
+    internal = at.flexure.resultants[..., bending]
+    required = _along_wall(chain, unknowns, at)
+    if at.wrenches is not None:
+        required = required + jax.vmap(_required)(chain.rods, unknowns.modes, at.wrenches.whole)
+    robots = jnp.any(chain.rods.idle == 0.0, axis=-1)
+    counts = (robots[:, None] & (chain.rods.length > 0.0))[..., None]
+    carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
+    error = jnp.max(jnp.abs(internal - required[..., bending]) * counts * carried)
+    largest = jnp.max(jnp.abs(required[..., bending]) * counts)
+    # Moments that bend nothing are rounding.
+    counts = largest > _NOTHING * jnp.max(chain.stiffness)
+    return jnp.where(counts, error / jnp.where(counts, largest, 1.0), 0.0)
+
+
+def _required(
+    rod: Rod, modes: Float[Array, " modes"], wrench: Float[Array, " w"]
+) -> Float[Array, "nodes w"]:
+    """Wrench on all that is beyond each node, about the node, along its section's axes."""
+    body, nodes = relative_pose(rod, modes), node_poses(rod, modes)
+    if rod.small is not None:
+        # A linear beam takes its moments on the free shape, under forces as the body has them.
+        is_small = rod.small > 0.0
+        shapes = (body, nodes), (_about_free_end(rod, modes), _free_nodes(rod))
+        body, nodes = jax.tree.map(lambda large, small: jnp.where(is_small, small, large), *shapes)
+
+    def at_node(node: Motion) -> Array:
+        across = node.rotation.T @ body.rotation
+        offset = (body.translation - node.translation) @ node.rotation
+        return Motion(across, offset).wrench(wrench)
+
+    return jax.vmap(at_node)(nodes)
+
+
+def _about_free_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
+    """Pose of the distal body, turned by the modes but not displaced with the rod's end."""
+    end = Motion(rod_end(rod, modes).rotation, rod.curve_offset)
+    start = Motion(rod.start_rotation, rod.start_offset)
+    return start.then(end).then(Motion(rod.end_rotation, rod.end_offset))
+
+
+def _free_nodes(rod: Rod) -> Motion:
+    """Poses of the sections at the nodes of the free rod, in the frame of the proximal body."""
+    start = Motion(rod.start_rotation, rod.start_offset)
+    return jax.vmap(start.then)(Motion(rod.node_rotation, rod.node_offset))
+
+
+def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, "n nodes w"]:
+    """What tendons and lips that act along the wall ask of every section."""
+    acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
+    for group, span in zip(chain.groups, at.spans, strict=True):
+        if isinstance(group, WallArc):
+            weights = of_rod(chain.rods, fibre_stretch(group.across))
+            acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
+    for group, force in zip(chain.lips, unknowns.lip_force, strict=True):
+        if isinstance(group, SpineLips):
+            lip = of_rod(chain.rods, fibre_stretch(chain.rods.lip))
+            acting = acting + (force * group.closes) * lip
+    return jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)

@@ -1,0 +1,1 @@
+"""Compiled programs: their arguments, how they are made, kept, and run."""

@@ -1,0 +1,125 @@
+"""How a solved state changes with all that it was found from: derivatives by one linear step.
+
+Newton's iteration itself is not differentiated. Where it has arrived, one more of its steps is
+nothing; but its derivative, with the linear system held still, is the derivative of the solution
+(implicit function theorem), forward and backward, and along a path through the memory.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from jaxtyping import Array, Bool, Float, Int
+
+from notchflex._jax import jax, jnp
+from notchflex.loads.command import Command
+from notchflex.mechanics.chain import Chain
+from notchflex.solver.actuation import stroke
+from notchflex.solver.block_elimination import linear_step
+from notchflex.solver.continuation import Solved, on_the_way
+from notchflex.solver.element import Memory
+from notchflex.solver.newton import Point
+from notchflex.solver.residual import evaluate
+
+
+class Way(NamedTuple):
+    """How a solved state was come to from the one before, told by `Advance`.
+
+    Attributes:
+        between: The state before the last part of the load.
+        part_before: Part of the way at which it is.
+        parts: How many parts the load was cut into.
+        reached: Whether the load was reached.
+    """
+
+    between: Solved
+    part_before: Float[Array, ""]
+    parts: Int[Array, ""]
+    reached: Bool[Array, ""]
+
+
+# A load and another before it: from rest, loads on the bodies come on before the tendons.
+_PARTS_FOLLOWED = 2
+
+
+def answering(chain: Chain, command: Command, last: Solved, solved: Solved, way: Way) -> Solved:
+    """A solved state with its derivatives by chain, command and the state before.
+
+    Contacts remember: where loads on the bodies came on before the tendons, the derivatives go
+    through both parts of the way. Of more parts, and where tendons alone are pulled in more than
+    one, only the last states are known; with friction the derivatives are then NaN.
+
+    Args:
+        chain: The chain.
+        command: The load.
+        last: The state before, whose memory the contacts had.
+        solved: The state that was found.
+        way: How it was found.
+
+    Returns:
+        The same state.
+    """
+    if not (chain.friction.remembers and chain.loaded):
+        whole = (way.parts <= 1) | (not chain.friction.remembers)
+        return _answering_part(chain, command, last, solved, way.reached & whole)
+    known = way.reached & (way.parts <= _PARTS_FOLLOWED)
+    halfway = on_the_way(chain, command, last, _still(way.part_before))
+    items = (halfway, way.between, way.parts > 1), (command, solved, jnp.array(True))
+
+    def follow(before: Solved, item: tuple[Command, Solved, Array]) -> tuple[Solved, None]:
+        towards, found, taken = item
+
+        def answer() -> Solved:
+            return _answering_part(chain, towards, before, found, known)
+
+        return jax.lax.cond(taken, answer, lambda: before), None
+
+    both = jax.tree.map(lambda *leaves: jnp.stack(leaves), *items)
+    return jax.lax.scan(follow, last, both)[0]
+
+
+def _answering_part(
+    chain: Chain, command: Command, last: Solved, solved: Solved, reached: Bool[Array, ""]
+) -> Solved:
+    """The same of a load, or a part of one, that was solved in one go."""
+    point = _still(solved.point)
+    at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
+    step = linear_step(chain, command, point.unknowns, last.memory, point.base_tension, at)
+    moved = Point(step.unknowns, step.base_tension)
+    point = jax.tree.map(lambda value, by: value + by, point, moved)
+    at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
+    memory = Memory(
+        log_ratio=point.unknowns.log_ratio,
+        slid=tuple(span.slid for span in at.spans),
+        bound=tuple(span.bound for span in at.spans),
+    )
+    drawn = stroke(chain, point.base_tension, at.base)
+    answer = Solved(point, memory, drawn, command.applied)
+    return jax.tree.map(
+        lambda value, varied: _varying(value, varied, reached), _still(solved), answer
+    )
+
+
+def _still(tree: Any) -> Any:
+    return jax.tree.map(jax.lax.stop_gradient, tree)
+
+
+def _varying(value: Array, varied: Array, known: Bool[Array, ""]) -> Array:
+    """A value that changes as another does; its derivative is NaN where it is not known."""
+    return value + _change_alone(known, varied)
+
+
+@jax.custom_jvp
+def _change_alone(known: Array, varied: Array) -> Array:
+    """Nothing, with the derivative of a value."""
+    del known
+    return jnp.zeros_like(varied)
+
+
+@_change_alone.defjvp
+def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
+    known, varied = primals
+    return jnp.zeros_like(varied), tangents[1] * jnp.where(known, 1.0, jnp.nan)
+
+
+__all__ = ["Way", "answering"]

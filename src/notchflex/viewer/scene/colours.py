@@ -1,0 +1,124 @@
+"""What colours mean in the viewer: strain of a notch, what a contact does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plotting.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+)
+from notchflex.results import Equilibrium
+
+Colour = tuple[int, int, int]
+
+
+def rgb(code: str) -> Colour:
+    """Return a colour code such as `#0072B2` as three numbers from 0 to 255.
+
+    Example:
+        >>> rgb("#0072B2")
+        (0, 114, 178)
+    """
+    return int(code[1:3], 16), int(code[3:5], 16), int(code[5:7], 16)
+
+
+METAL: Colour = (176, 182, 190)
+TENDON = rgb(ORANGE)
+CLOSED = rgb(BLACK)
+BEYOND: Colour = (214, 0, 147)
+"""A strain beyond the allowed one, outside the scale of the others."""
+LOAD = {"force": PURPLE, "moment": SKY}
+CONTACT = {0: GREEN, 1: BLUE, -1: VERMILLION}
+"""Colour of a friction contact by its state: sticks, slips toward the base, toward the tip."""
+UNKNOWN = GREY
+SLACK = 1e-9
+"""A tendon with less tension [N] at the base is slack."""
+SMOOTH = 1e-9
+"""A contact whose log tension ratio is bound to less than this has no friction."""
+
+# From no strain to the allowed one, dark to light as far as an eye without red and green sees it.
+_SCALE = np.array([(60, 80, 160), (80, 160, 190), (240, 215, 90), (230, 130, 40), (190, 20, 20)])
+STEPS = 64
+"""How many colours of strain there are; a notch is painted anew only when its colour changes."""
+
+
+def is_beyond(part: float) -> bool:
+    """Whether a strain, as a part of the allowed one, is larger than that."""
+    return abs(part) > 1.0
+
+
+def of_strain(part: float | None) -> Colour:
+    """Return the colour of a strain.
+
+    Args:
+        part: The strain as a part of the allowed one; None where no strain is allowed or forbidden.
+    """
+    if part is None or not np.isfinite(part):
+        return METAL
+    if is_beyond(part):
+        return BEYOND
+    place = round(min(abs(part), 1.0) * STEPS) / STEPS * (len(_SCALE) - 1)
+    columns = [np.interp(place, np.arange(len(_SCALE)), column) for column in _SCALE.T]
+    red, green, blue = (round(float(value)) for value in columns)
+    return red, green, blue
+
+
+def of_contacts(state: Equilibrium, tendon: int) -> list[str]:
+    """Return the colours of the contacts of a tendon (from 0), base to tip.
+
+    A contact that cannot hold any tension back, or a slack tendon's, neither sticks nor slips.
+    """
+    found = np.asarray(state.contact_state, float)[tendon]
+    bound = np.asarray(state.contact_bound, float)[tendon]
+    slack = float(state.tension[tendon]) < SLACK
+    return [
+        UNKNOWN if slack or not holds > SMOOTH else CONTACT[int(one)]
+        for one, holds in zip(found, bound, strict=True)
+        if np.isfinite(one) and np.isfinite(holds)
+    ]
+
+
+def linear(codes: Sequence[str]) -> NDArray[np.uint8]:
+    """Return colour codes as linear light from 0 to 255, (count, 3).
+
+    viser takes the colours of many like things at once for linear light, and all others as sRGB.
+
+    Example:
+        >>> linear(["#0072B2", "#FFFFFF"]).tolist()
+        [[0, 43, 114], [255, 255, 255]]
+    """
+    part = np.array([rgb(code) for code in codes], float).reshape(-1, 3) / 255.0
+    light = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * light).astype(np.uint8)
+
+
+def css(colour: Colour) -> str:
+    """Return a colour as a page writes it."""
+    return "#" + "".join(f"{part:02x}" for part in colour)
+
+
+__all__ = [
+    "BEYOND",
+    "CLOSED",
+    "CONTACT",
+    "LOAD",
+    "METAL",
+    "TENDON",
+    "UNKNOWN",
+    "css",
+    "is_beyond",
+    "linear",
+    "of_contacts",
+    "of_strain",
+    "rgb",
+]

@@ -1,0 +1,100 @@
+"""Tendons, and marks for what happens at their contacts and at the notches.
+
+Marks lie outside the tube, beside what they mark: the wall would hide them where it is.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plotting.shapes.bent import Bent
+from notchflex.results import EquilibriumPath
+from notchflex.viewer.scene.colours import CLOSED, TENDON, UNKNOWN, linear, of_contacts
+
+if TYPE_CHECKING:
+    from notchflex.viewer.scene.scene.shown import Shown
+
+# All as parts of the outer radius of the tube: thickness of tendons, radius of marks, and how far
+# their centres are from the tube axis.
+_TENDON, _CONTACT, _LIPS = 0.09, 0.13, 0.2
+_CONTACT_AT, _LIPS_AT = 1.2, 1.55
+
+
+class Marks:
+    """Tendons and marks of a robot in a scene of viser.
+
+    Args:
+        scene: The scene.
+        root: The node on which they hang.
+        rest: The robot as nothing loads it.
+    """
+
+    def __init__(self, scene: Any, root: str, rest: Bent) -> None:
+        """Send them."""
+        import trimesh
+
+        self._outer = outer = rest.robot.tube.outer_radius
+        ball = trimesh.creation.icosphere(subdivisions=2, radius=_CONTACT * outer)
+        tendons = range(rest.robot.number_of_tendons)
+        self._tendons = [
+            scene.add_line_segments(
+                f"{root}/tendon_{number + 1}",
+                _segments(rest.tendon(number)),
+                TENDON,
+                thickness=_TENDON * outer,
+            )
+            for number in tendons
+        ]
+        places = [self._beside(rest, number) for number in tendons]
+        self._contacts = [
+            scene.add_batched_meshes_simple(
+                f"{root}/contacts_{number + 1}",
+                ball.vertices,
+                ball.faces,
+                batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1)),
+                batched_positions=place,
+                batched_colors=linear([UNKNOWN] * len(place)),
+                lod="off",
+            )
+            for number, place in enumerate(places)
+        ]
+        self._closed = [
+            scene.add_icosphere(f"{root}/closed_{number + 1}", _LIPS * outer, color=CLOSED)
+            for number in range(len(rest.flexures))
+        ]
+
+    def _beside(self, shape: Bent, tendon: int) -> NDArray[np.float32]:
+        """Places of the marks of the contacts of a tendon (from 0)."""
+        return shape.contacts(tendon, _CONTACT_AT * self._outer).astype(np.float32)
+
+    def move(self, path: EquilibriumPath, shape: Bent, shown: Shown) -> None:
+        """Move them to a new state.
+
+        Args:
+            path: The state, as a path of one step.
+            shape: The robot in that state.
+            shown: What is shown.
+        """
+        for number, (line, balls) in enumerate(zip(self._tendons, self._contacts, strict=True)):
+            line.visible, balls.visible = shown.tendons, shown.contacts
+            if shown.tendons:
+                line.points = _segments(shape.tendon(number)).astype(np.float32)
+            if shown.contacts:
+                balls.batched_positions = self._beside(shape, number)
+                codes = of_contacts(path[0], number)
+                balls.batched_colors = linear(codes)
+        for number, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
+            ball.visible = bool(closed)
+            if closed:
+                ball.position = shape.lips(number, _LIPS_AT * self._outer)
+
+
+def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points in a row as the straight pieces between them, (pieces, 2, 3)."""
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+__all__ = ["Marks"]

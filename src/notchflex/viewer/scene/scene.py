@@ -1,0 +1,263 @@
+"""The robot in the browser's space: solids that were sent once and are moved from then on.
+
+Everything hangs on one node that is turned as the tube points; below it all is in the frame of the
+base, in mm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plotting.shapes.acting import Acting, acting_at
+from notchflex.plotting.shapes.bent import HELD, Bent, bent_at
+from notchflex.plotting.shapes.twist import rotation_of
+from notchflex.results import EquilibriumPath
+from notchflex.robot import Robot
+from notchflex.viewer.controls import POINTING, Controls
+from notchflex.viewer.reach import GRAVITY, Reach, round_up
+from notchflex.viewer.scene.camera import Eye, first_eye, framed, quaternions
+from notchflex.viewer.scene.colours import LOAD, METAL, linear, of_strain
+from notchflex.viewer.scene.marks import Marks
+from notchflex.viewer.scene.skins import PIECES, Skin, at_rest, skins
+from notchflex.viewer.scene.solids import body_solids
+
+if TYPE_CHECKING:
+    import viser
+
+# As a part of the outer radius of the tube.
+_FRAME = 2.2
+# As parts of the length of the robot.
+_ARROW, _SHORTEST = 0.35, 0.06
+_SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
+SEE_THROUGH = 0.35
+# Where lamps stand, and how bright they are.
+_LIGHTS = (((0.6, -1.0, 0.8), 1.6), ((-1.0, -0.3, 0.5), 0.7), ((0.3, 1.0, 0.4), 0.7))
+ROOT = "/robot"
+
+
+@dataclass
+class Shown:
+    """What a person wants to see."""
+
+    tendons: bool = True
+    contacts: bool = True
+    frames: bool = True
+    loads: bool = True
+    see_through: bool = False
+
+
+class Scene:
+    """A robot in the scene of a viser server.
+
+    Args:
+        server: The server; what its scene holds under `/robot` is replaced.
+        robot: The robot.
+        reach: How far its sliders go, for the length of arrows.
+        shown: What is shown.
+    """
+
+    def __init__(self, server: viser.ViserServer, robot: Robot, reach: Reach, shown: Shown) -> None:
+        """Send the solids."""
+        self.server, self.robot, self.reach, self.shown = server, robot, reach, shown
+        self.rest = at_rest(robot)
+        self.length = float(np.linalg.norm(np.diff(self.rest.position, axis=0), axis=1).sum())
+        self.length += float(self.rest.body_length[-1])
+        with server.atomic():
+            self._build()
+
+    def _build(self) -> None:
+        """Add every node once."""
+        scene, rest = self.server.scene, self.rest
+        # Without the picture of a room around it: a browser without a graphics card needs half a
+        # minute to take that in, and shadows cost it more than all the rest.
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_hemisphere(
+            "/lights/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.2
+        )
+        for number, (place, intensity) in enumerate(_LIGHTS):
+            scene.add_light_directional(
+                f"/lights/lamp_{number}", intensity=intensity, position=place
+            )
+        outer = self.robot.tube.outer_radius
+        self._root = scene.add_frame(ROOT, show_axes=False)
+        self._bodies = [
+            _solid(scene, f"{ROOT}/body_{number}", mesh.vertices, mesh.faces)
+            for number, mesh in enumerate(body_solids(rest))
+        ]
+        self._skins: list[Skin] = skins(rest)
+        self._skins_of: dict[str, list[Skin]] = {}
+        self._flexures = [
+            scene.add_mesh_simple(
+                f"{ROOT}/flexure_{number + 1}",
+                skin.at(sections),
+                skin.faces,
+                color=METAL,
+                flat_shading=True,
+            )
+            for number, (skin, sections) in enumerate(zip(self._skins, rest.flexures, strict=True))
+        ]
+        self._see_through = False
+        self._colours: list[Any] = [METAL] * len(self._flexures)
+        self._marks = Marks(scene, ROOT, rest)
+        long, thin = _FRAME * outer, 0.05 * outer
+        self._base_frame = scene.add_frame(f"{ROOT}/base", axes_length=long, axes_radius=thin)
+        self._tip_frame = scene.add_frame(f"{ROOT}/tip", axes_length=long, axes_radius=thin)
+        self._arrows = scene.add_arrows(
+            f"{ROOT}/loads",
+            np.zeros((1, 2, 3)),
+            linear([LOAD["force"]]),
+            shaft_radius=0.12 * outer,
+            head_radius=0.32 * outer,
+            head_length=0.8 * outer,
+            visible=False,
+        )
+        self._labels = [
+            scene.add_label(f"{ROOT}/load_{number}", "", visible=False, anchor="bottom-center")
+            for number in range(2)
+        ]
+        self._grid_cell = round_up(0.05 * self.length)
+        self._grid = scene.add_grid(
+            "/grid",
+            width=3.0 * self.length,
+            height=3.0 * self.length,
+            cell_size=self._grid_cell,
+            section_size=5.0 * self._grid_cell,
+            shadow_opacity=0.0,
+        )
+
+    @property
+    def grid_cell(self) -> float:
+        """Width of a cell of the grid on the floor, mm."""
+        return self._grid_cell
+
+    def update(self, path: EquilibriumPath, controls: Controls) -> Bent:
+        """Move everything to a new state.
+
+        Args:
+            path: The state, as a path of one step.
+            controls: What was set.
+
+        Returns:
+            The robot in that state.
+        """
+        shape = bent_at(path, 0, PIECES)
+        held = shape.position[:1] - [0.0, 0.0, HELD * self.robot.tube.outer_radius]
+        self._seen = np.concatenate([held, shape.position, shape.tip[None]])
+        with self.server.atomic():
+            self._turn(controls.pointing)
+            self._dress(path, shape)
+            self._move(shape)
+            self._paint(path)
+            self._marks.move(path, shape, self.shown)
+            self._move_loads(path, shape)
+            self._base_frame.visible = self._tip_frame.visible = self.shown.frames
+        return shape
+
+    def _turn(self, pointing: str) -> None:
+        self._pose = rotation_of(np.array(POINTING[pointing]))
+        self._root.wxyz = quaternions(self._pose[None])[0]
+        outer = self.robot.tube.outer_radius
+        lowest = {"up": HELD * outer, "sideways": 0.35 * self.length, "down": 1.1 * self.length}
+        self._grid.position = (0.0, 0.0, -lowest[pointing])
+
+    def _dress(self, path: EquilibriumPath, shape: Bent) -> None:
+        """Take other triangles for the flexures where other loads ask for more sections of them."""
+        if len(self._skins[0].across.T) == len(shape.flexures[0].area):
+            return
+        level = path.chain.level
+        if level not in self._skins_of:
+            self._skins_of[level] = skins(at_rest(self.robot, level))
+        self._skins = self._skins_of[level]
+        for node, skin, sections in zip(self._flexures, self._skins, shape.flexures, strict=True):
+            corners = skin.at(sections).astype(np.float32)
+            more = len(corners) > len(node.vertices)
+            # Never a triangle without its corners, not even between two messages.
+            if more:
+                node.vertices = corners
+            node.faces = skin.faces.astype(np.uint32)
+            if not more:
+                node.vertices = corners
+
+    def _move(self, shape: Bent) -> None:
+        turned = quaternions(shape.rotation)
+        for node, place, turn in zip(self._bodies, shape.position, turned, strict=True):
+            node.position, node.wxyz = place, turn
+        if self._see_through != self.shown.see_through:
+            self._see_through = self.shown.see_through
+            for node in self._bodies:
+                node.opacity = SEE_THROUGH if self._see_through else None
+        self._tip_frame.position, self._tip_frame.wxyz = shape.tip, turned[-1]
+        for node, skin, sections in zip(self._flexures, self._skins, shape.flexures, strict=True):
+            node.vertices = skin.at(sections).astype(np.float32)
+
+    def _paint(self, path: EquilibriumPath) -> None:
+        allowed = self.robot.material.allowed_strain
+        for number, strain in enumerate(path.peak_strain[0]):
+            colour = of_strain(None if allowed is None else float(strain) / allowed)
+            if colour != self._colours[number]:
+                self._flexures[number].color = self._colours[number] = colour
+
+    def _move_loads(self, path: EquilibriumPath, shape: Bent) -> None:
+        loads = acting_at(path, 0, shape) if self.shown.loads else []
+        self._arrows.visible = bool(loads)
+        for label in self._labels[len(loads) :]:
+            label.visible = False
+        if not loads:
+            return
+        ends = np.stack([np.stack([one.point, one.point + self._arrow(one)]) for one in loads])
+        self._arrows.colors = linear([LOAD[one.name] for one in loads])
+        self._arrows.points = ends.astype(np.float32)
+        for label, one, (_, end) in zip(self._labels, loads, ends, strict=False):
+            label.text, label.position, label.visible = one.label, end, True
+
+    def _arrow(self, one: Acting) -> NDArray[np.float64]:
+        most = max(self.reach.force, GRAVITY * self.reach.mass)
+        size = max(one.size / most, _SHORTEST / _ARROW) * _ARROW * self.length
+        return size * one.vector / one.size
+
+    def eye(self, pointing: str, side: bool = False, aspect: float = 1.0) -> Eye:
+        """Return where a camera should stand, with room for the robot to bend.
+
+        Args:
+            pointing: Where the tube points, a key of `POINTING`.
+            side: Look at right angles on the plane in which the robot bends; else a little from
+                above.
+            aspect: Width of the picture by its height.
+        """
+        turn = rotation_of(np.array(POINTING[pointing]))
+        return first_eye(self.robot.notches[0].direction_deg, self.length, turn, side, aspect)
+
+    def picture_eye(self, toward: NDArray[np.float64], fov: float, aspect: float) -> Eye:
+        """Return where a camera must stand to see the robot as it is bent now, and all of it.
+
+        Args:
+            toward: Direction from the robot to the camera.
+            fov: Angle of view from the lower to the upper edge, rad.
+            aspect: Width of the picture by its height.
+        """
+        outer = 1.3 * self.robot.tube.outer_radius
+        box = outer * np.array(list(np.ndindex(2, 2, 2))) * 2.0 - outer
+        points = (self._seen[:, None] + box).reshape(-1, 3)
+        return framed(points @ self._pose.T, toward, aspect, fov, room=1.1)
+
+    def remove(self) -> None:
+        """Take everything away again."""
+        self._root.remove()
+        self._grid.remove()
+
+
+def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
+    """A solid with its sharp edges sharp and its round faces round."""
+    import trimesh
+
+    whole = trimesh.Trimesh(vertices, faces, process=False)
+    shaded = trimesh.graph.smooth_shade(whole, angle=_SMOOTH)
+    return scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
+
+
+__all__ = ["Scene", "Shown"]

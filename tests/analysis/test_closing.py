@@ -1,0 +1,90 @@
+"""When notches close: a tension at which the solver fails costs a trial, not the answer."""
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.analysis.closing_loads.search import closing_tensions
+
+YORK = nf.load_robot("york2015")
+
+
+@pytest.mark.parametrize("modulus", [40000.0, 30000.0])
+def test_every_notch_of_york_closes(modulus):
+    """One unconverged solve made the whole search NaN, shown as "never"."""
+    robot = YORK.with_value("material.elastic_modulus", modulus)
+    found = nf.closing(robot)
+    assert list(found.status) == ["closes"] * 5
+    tensions = found.tension[:, None] * (1.0 + np.array([-1e-9, 1e-9]))
+    path = nf.solve_each(robot, [nf.Load(tension=float(one)) for one in tensions.ravel()])
+    assert path.converged.all()
+    closed = path.closed[:, :].reshape(5, 2, 5)
+    assert [closed[number, :, number].tolist() for number in range(5)] == [[False, True]] * 5
+
+
+@pytest.mark.parametrize("notch", range(5))
+def test_the_solver_passes_where_lips_just_meet(notch):
+    """A gap that was a rounding error held up every step at itself, over 2e-8 N of tension."""
+    tension = nf.closing(YORK).tension[notch] + np.linspace(-3e-8, 3e-8, 41)
+    path = nf.solve_each(YORK, [nf.Load(tension=float(one)) for one in tension])
+    assert path.converged.all()
+    assert path.iterations.max() <= 12  # 730 and more
+
+
+def overlap_of(roots, failing):
+    """Overlaps that rise through zero at given tensions, with a kink, and NaN where it fails."""
+
+    def overlap(tension):
+        rise = tension - roots
+        value = np.where(rise > 0.0, 5.0 * rise, 0.2 * rise)
+        bad = np.zeros(len(tension), bool)
+        for low, high in failing:
+            bad |= (tension >= low) & (tension <= high)
+        return np.where(bad, np.nan, value)
+
+    return overlap
+
+
+@pytest.mark.parametrize(
+    "failing",
+    [
+        [],
+        [(0.9, 1.05)],  # just below some roots
+        [(1.0001, 1.02), (2.5, 2.9)],
+        [(4.0, 1e9)],  # the robot bears no more
+        [(1.1001, 1e9)],  # it fails as soon as the last notch has closed
+    ],
+)
+def test_failures_beside_a_closing_cost_a_trial(failing):
+    roots = np.array([0.3, 0.85, 1.0999999])
+    tension, status = closing_tensions(overlap_of(roots, failing), np.array([0.2, 4.5, 1.0]))
+    assert list(status) == ["closes"] * 3
+    assert tension == pytest.approx(roots, rel=1e-10)
+
+
+def test_what_is_not_found_is_told_from_never():
+    roots = np.array([1.0, 1000.0, 2.0, 1000.0])
+    own = np.array([False, False, False, True])
+
+    def overlap(tension):
+        # The third fails around its root, the last from 20 N on.
+        value = overlap_of(roots, [])(tension)
+        around = (np.abs(tension - 2.0) < 0.5) & (roots == 2.0)
+        return np.where(around | (own & (tension > 20.0)), np.nan, value)
+
+    tension, status = closing_tensions(overlap, np.ones(4))
+    assert list(status) == ["closes", "never", "not found", "not found"]
+    assert np.isfinite(tension).tolist() == [True, False, False, False]
+
+
+def test_a_robot_whose_solver_always_fails_has_no_closing_found():
+    tension, status = closing_tensions(lambda tension: np.full(len(tension), np.nan), np.ones(2))
+    assert list(status) == ["not found"] * 2
+    assert np.isnan(tension).all()
+
+
+def test_slots_that_never_close_and_those_that_do():
+    found = nf.closing(nf.load_robot("gao2017"))
+    assert found.status[0] == "never"
+    assert found.status[1] == "closes"
+    assert (np.isfinite(found.tension) == (found.status == "closes")).all()

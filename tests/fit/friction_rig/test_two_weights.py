@@ -1,0 +1,91 @@
+"""Liu's eq. 21 and its inverse: the printed form, the force balance, limits, slopes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import notchflex as nf
+from notchflex.fit import coefficient_from_weights, weight_held
+from notchflex.fit.friction_rig.two_weights import slopes_of_coefficient
+
+turns = st.floats(0.01, 1.9)
+
+
+@given(mu=st.floats(0.0, 0.7), first=turns, second=turns, weight=st.floats(1.0, 5000.0))
+def test_round_trip(mu, first, second, weight):
+    held = weight_held(weight, mu, first, second)
+    found = coefficient_from_weights(weight, held, first, second)
+    # A weight is told to 2e-16 of it; turns of 0.6 deg magnify that by 1 / (b1 + b2) = 100.
+    np.testing.assert_allclose(found, mu, rtol=0.0, atol=1e-12)
+
+
+@given(mu=st.floats(0.01, 0.7), first=turns, second=turns)
+def test_it_is_the_printed_formula(mu, first, second):
+    m1, m2 = 100.0, float(weight_held(100.0, mu, first, second))
+    total, apart = m1 + m2, m1 - m2
+    half = np.sin(0.5 * (first + second))
+    root = np.sqrt(total**2 * half**2 - apart**2 * np.sin(first) * np.sin(second))
+    printed = (total * half - root) / (2.0 * apart * np.sin(0.5 * first) * np.sin(0.5 * second))
+    found = coefficient_from_weights(m1, m2, first, second)
+    # The printed form loses digits where its two parts are nearly the same.
+    lost = total * half / (2.0 * apart * np.sin(0.5 * first) * np.sin(0.5 * second))
+    np.testing.assert_allclose(found, printed, atol=1e-14 * lost + 1e-13)
+
+
+def test_forces_on_the_string_balance_at_both_edges():
+    mu, first, second = 0.23, 1.1, 0.4
+    low, high = float(weight_held(1.0, mu, first, second)), 1.0
+    between = high
+    for turn in (first, second):  # Coulomb's law, the pressure on the bisector
+        sine, cosine = np.sin(0.5 * turn), np.cos(0.5 * turn)
+        behind = between * (cosine - mu * sine) / (cosine + mu * sine)
+        assert (between - behind) * cosine == pytest.approx(mu * (between + behind) * sine)
+        between = behind
+    assert between == pytest.approx(low, rel=1e-14)
+
+
+def test_limits():
+    assert coefficient_from_weights(100.0, 100.0, 1.0, 1.2) == 0.0
+    # one edge alone: mu = q / tan(turn / 2)
+    one = coefficient_from_weights(100.0, 80.0, 1.0, 0.0)
+    assert one == pytest.approx(20.0 / 180.0 / np.tan(0.5))
+    # small turns: a capstan over the sum of them
+    mu = coefficient_from_weights(1.0, np.exp(-0.3 * 2e-3), 1e-3, 1e-3)
+    assert mu == pytest.approx(0.3, rel=1e-6)
+
+
+def test_slopes():
+    values = np.array([[200.0, 50.0], [150.0, 30.0], [1.5, 0.6], [1.2, 0.0]])
+    slopes = slopes_of_coefficient(coefficient_from_weights(*values), *values)
+    for place in range(4):
+        step = 1e-6 * max(values[place].max(), 1.0)
+        up, down = values.copy(), values.copy()
+        up[place], down[place] = up[place] + step, down[place] + (0.0 if place == 3 else -step)
+        width = (up - down)[place]
+        found = (coefficient_from_weights(*up) - coefficient_from_weights(*down)) / width
+        np.testing.assert_allclose(slopes[place], found, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("reading", "words"),
+    [
+        ((100.0, 110.0, 1.0, 1.0), "reading 2: weight 2 is larger than weight 1"),
+        ((100.0, 90.0, 0.0, 0.0), "reading 2: the string does not turn .* no friction could hold"),
+        ((100.0, 100.0, 0.0, 0.0), "reading 2: the string does not turn .* tells nothing"),
+        ((0.0, 0.0, 1.0, 1.0), "reading 2: both weights must be above 0"),
+        ((100.0, 90.0, 3.2, 1.0), "reading 2: a string turns over an edge by 0 to less than 180"),
+        ((100.0, 90.0, -0.1, 1.0), "reading 2: a string turns"),
+    ],
+)
+def test_readings_that_cannot_be(reading, words):
+    both = zip((100.0, 90.0, 1.0, 1.0), reading, strict=True)
+    with pytest.raises(nf.InputError, match=words):
+        coefficient_from_weights(*both)
+
+
+def test_an_edge_that_holds_any_pull_is_refused():
+    with pytest.raises(nf.InputError, match="would hold any pull"):
+        weight_held(100.0, 0.8, 2.0, 0.1)

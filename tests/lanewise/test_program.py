@@ -1,0 +1,220 @@
+"""Programs of the small compiler against what JAX makes of the same functions."""
+
+import numpy as np
+import pytest
+
+from lanewise import Program, UnknownHereError, machine_code, source
+from notchflex._jax import jax, jnp
+
+# Fewer than a vector's lanes, as many, more, and several vectors.
+SIZES = (1, 2, 3, 8, 13, 27, 40)
+ROUNDING = 1e-13
+
+
+def given(size):
+    return np.random.default_rng(size).normal(size=6 * size + 4)
+
+
+def program(function, given, long, by_row=None):
+    written, tree = source(function, given, long, by_row)
+    code = machine_code(written.text)
+    return Program(code, written.sizes, written.room, by_row), tree
+
+
+def single(function, *arrays, long):
+    made, tree = program(function, arrays, long)
+    leaves = jax.tree.leaves(tree)
+    return [one.reshape(leaf.shape) for one, leaf in zip(made([*arrays]), leaves, strict=True)]
+
+
+def check(function, *arrays, long):
+    """One by one and as rows of a batch, the program finds what JAX finds."""
+    wanted = [np.asarray(one, float) for one in jax.tree.leaves(jax.jit(function)(*arrays))]
+    for own, want in zip(single(function, *arrays, long=long), wanted, strict=True):
+        np.testing.assert_allclose(own, want, rtol=ROUNDING, atol=ROUNDING)
+    rows = [np.stack([array * (1.0 + 0.1 * row) for row in range(11)]) for array in arrays]
+    wanted = jax.tree.leaves(jax.jit(jax.vmap(function))(*rows))
+    made, _ = program(function, arrays, long, [True] * len(arrays))
+    for own, want in zip(made(rows), wanted, strict=True):
+        want = np.asarray(want, float).reshape(11, -1)
+        np.testing.assert_allclose(own, want, rtol=ROUNDING, atol=ROUNDING)
+
+
+def parted(vector, size):
+    return vector[: 6 * size].reshape(size, 3, 2), vector[6 * size :]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_products_and_choices_lane_by_lane(size):
+    def function(vector):
+        table, few = parted(vector, size)
+        products = jnp.einsum("nij,nkj->nik", table, table)
+        chosen = jnp.where(products > 0.3, products, few[0] - 2.0 * products)
+        return chosen, jnp.sqrt(jnp.abs(products)), few[1] * table[:, 1], few[:2] / few[2]
+
+    check(function, given(size), long=(size, size + 1))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_what_goes_from_lane_to_lane(size):
+    def function(vector):
+        table, few = parted(vector, size)
+        along = jnp.cumsum(table[:, 0], axis=0)
+        back = jnp.cumsum(table[::-1, 1, 0])[::-1]
+        shifted = jnp.concatenate([few[:1], along[:-1, 0]]) * back
+        pairs = table[0 : size // 2 * 2 : 2] - table[1 : size // 2 * 2 : 2]
+        joined = jnp.concatenate([pairs, table[size // 2 * 2 :]]) * 3.0
+        woven = jnp.stack([table[:, 0], table[:, 1]], axis=1).reshape(2 * size, 2) + 1.0
+        return along, back, shifted, joined, woven
+
+    check(function, given(size), long=(size, size + 1))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_sums_and_extremes(size):
+    def function(vector):
+        table, few = parted(vector, size)
+        flat = jnp.concatenate([table.ravel(), few])
+        large = table > 0.0
+        return (
+            table.sum(axis=0),
+            table.max(axis=(0, 2)),
+            table.min(),
+            table.prod(axis=1),
+            jnp.max(jnp.abs(flat)),
+            jnp.linalg.norm(flat),
+            large.any(axis=0),
+            large.all(axis=1),
+            (1.0 * large).sum(),
+            jnp.einsum("nij,nk->ijk", table, table[:, 0]),
+            jnp.argmax(table, axis=1),
+            jnp.argmin(table[:, 0, 0]),
+        )
+
+    check(function, given(size), long=(size, size + 1))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_loops_and_conditions(size):
+    def function(vector):
+        table, few = parted(vector, size)
+
+        def grown(state):
+            count, row, other = state
+            return count + 1, other + 0.5 * row, row + 0.1 * jnp.max(other)
+
+        def going(state):
+            return (state[0] < 5) & (jnp.sum(jnp.abs(state[1])) < 40.0)
+
+        looped = jax.lax.while_loop(going, grown, (0, table[:, 0, 0], table[:, 1, 1]))
+
+        def step(carry, item):
+            place, row = item
+
+            def yes():
+                found = jax.lax.while_loop(
+                    lambda state: state[0] < place,
+                    lambda state: (state[0] + 1.0, 0.9 * state[1] + table[:, 0, 1]),
+                    (0.0, carry[:size]),
+                )
+                return jnp.concatenate([found[1], carry[size:]]), found[0]
+
+            def no():
+                return carry, jnp.sum(row)
+
+            moved, told = jax.lax.cond(row[0, 0] > 0.0, yes, no)
+            return moved, jnp.concatenate([moved, told[None]])
+
+        start = jnp.concatenate([table[:, 2, 0], few])
+        places = 1.0 * jnp.minimum(jnp.arange(size), 2)
+        return looped, jax.lax.scan(step, start, (places, table), reverse=size % 2 == 0)
+
+    check(function, given(size), long=(size, size + 1))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_swapping_what_is_carried(size):
+    def function(vector):
+        table, _ = parted(vector, size)
+
+        def swapped(_, state):
+            first, second, last = state
+            return second, first, jnp.concatenate([second[1:], last[:1]])
+
+        start = (table[:, 0, 0], table[:, 1, 0], table[:, 2, 0])
+        return jax.lax.fori_loop(0, 3, swapped, start)
+
+    check(function, given(size), long=(size, size + 1))
+
+
+@pytest.mark.parametrize("size", [3, 13])
+def test_picking_and_putting(size):
+    def function(vector):
+        table, few = parted(vector, size)
+        places = jnp.clip(jnp.abs(3.0 * table[:, :2, 0]), 0, 2).astype(int)
+        picked = jax.vmap(lambda row, at: row[at])(table, places)
+        put = table.at[:, 1].set(few[0]).at[:, 0].add(2.0)
+        return picked, put, table[:, np.array([2, 0])], jnp.pad(table, ((1, 0), (0, 0), (0, 2)))
+
+    check(function, given(size), long=(size, size + 1))
+
+
+def test_whole_numbers_and_functions_of_angles():
+    def function(values):
+        whole = jnp.round(3.0 * values).astype(int)
+        bits = jax.lax.shift_left(whole + 1023, 2) ^ 5
+        return (
+            -whole,
+            bits,
+            jnp.sign(values),
+            values**3,
+            values**-2,
+            jnp.clip(values, -0.5, 0.5),
+            jnp.exp(values),
+            jnp.log(jnp.abs(values)),
+            jnp.tan(values),
+            jnp.arctan2(values, values[::-1]),
+            jnp.arctanh(0.3 * values),
+            jnp.isfinite(values / 0.0),
+            jnp.maximum(values, jnp.nan),
+        )
+
+    check(function, 0.3 * given(1), long=())
+
+
+def test_rows_of_their_own_and_what_all_share():
+    size = 5
+
+    def function(shared, own):
+        return shared.reshape(size, 2) * own[:size, None] + jnp.cumsum(shared[:size])[:, None]
+
+    shared, own = np.arange(10.0), np.random.default_rng(0).normal(size=(19, 7))
+    made, _ = program(function, [shared, own[0]], (size,), (False, True))
+    (found,) = made([shared, own])
+    wanted = jax.vmap(function, in_axes=(None, 0))(shared, own)
+    np.testing.assert_allclose(found, np.asarray(wanted).reshape(19, -1), rtol=ROUNDING)
+    (none,) = made([shared, own[:0]])
+    assert none.shape == (0, 10)
+
+
+def test_what_is_not_known_is_said():
+    with pytest.raises(UnknownHereError, match="sort"):
+        program(jnp.sort, [np.ones(4)], (4,))
+    with pytest.raises(UnknownHereError, match="long"):
+        program(lambda v: jnp.sin(v[:, None] * v[None, :] + 1.0), [np.ones(700)], ())
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_lanes_picked_in_any_order(size):
+    """Every second lane, shifted ones, and a few of several rows put together."""
+
+    def function(vector):
+        table, _ = parted(vector, size)
+        rows = jnp.sin(table[:, :, 0]) * table[:, :, 1]
+        even, odd = rows[::2], rows[1::2]
+        joined = even[: len(odd)] * odd
+        mixed = jnp.concatenate([rows[size // 2 :], rows[: size // 2, ::-1]])
+        around = rows[(7 * np.arange(size)) % size]
+        return joined, mixed * rows, around - rows, rows[1:] / (2.0 + rows[:-1])
+
+    check(function, given(size), long=(size, size + 1))

@@ -1,0 +1,82 @@
+"""Loads from Python: every form that is taken, and what is refused with a sentence."""
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.errors import InputError
+from notchflex.loads.conversion import load_path
+
+NAN = np.nan
+
+
+@pytest.mark.parametrize(
+    ("tension", "entries"),
+    [
+        (2, [2.0, NAN]),
+        (np.array(1.0), [1.0, NAN]),
+        (np.float32(1.5), [1.5, NAN]),
+        ([None, 1.0], [NAN, 1.0]),
+        (np.array([1.0, 2.0]), [1.0, 2.0]),
+        (np.array([None, 2.0]), [NAN, 2.0]),
+        ((), [NAN, NAN]),
+    ],
+)
+def test_forms_of_a_tension(tension, entries):
+    np.testing.assert_array_equal(load_path(nf.Load(tension=tension), 2).tension, [entries])
+
+
+HUGE = pytest.param(10**5000, id="huge")  # more digits than Python writes
+
+
+@pytest.mark.parametrize("value", ["1", b"1", True, np.True_, 10**400, HUGE, 1j, [[1.0]], {}, NAN])
+@pytest.mark.parametrize("what", ["tension", "stroke"])
+def test_what_is_no_number_is_refused(what, value):
+    with pytest.raises(InputError, match=what):
+        load_path(nf.Load(**{what: value}), 1)
+
+
+@pytest.mark.parametrize("value", [None, 0, "abc", [0, 0], [0, 0, NAN], [0, 0, 10**400]])
+def test_base_rotation_is_three_numbers(value):
+    with pytest.raises(InputError, match="base_rotation needs three finite numbers"):
+        load_path(nf.Load(tension=1.0, base_rotation=value), 1)
+    with pytest.raises(InputError, match="base_rotation needs three finite numbers"):
+        nf.LoadPath([[1.0]], [[NAN]], value)
+
+
+@pytest.mark.parametrize("loads", [None, 1.0, "1", [1.0], []])
+def test_what_is_no_load_is_refused(loads):
+    with pytest.raises(InputError, match="load"):
+        load_path(loads, 1)
+
+
+@pytest.mark.parametrize("value", [None, "1", b"1", True, [["a"]], [[1.0], [1.0, 2.0]], 10**400])
+def test_load_paths_are_numbers(value):
+    with pytest.raises(InputError, match="tension of a load path must be numbers"):
+        nf.LoadPath(value, [[NAN]])
+
+
+@pytest.mark.parametrize("make", [nf.pull, nf.stroke_path])
+@pytest.mark.parametrize("wrong", [2.5, "5", True, None, 0, -1])
+def test_steps_and_tendon_are_whole_numbers(make, wrong):
+    with pytest.raises(InputError, match="step"):
+        make(0, 3, wrong)
+    with pytest.raises(InputError, match="tendon"):
+        make(0, 3, tendon=wrong)
+    assert len(make(0, 3, np.int64(5))) == 5
+
+
+@pytest.mark.parametrize("end", [None, "3", True, 10**400, NAN, np.inf])
+def test_ends_of_a_ramp_are_finite_numbers(end):
+    with pytest.raises(InputError, match="tension"):
+        nf.pull(0, end)
+
+
+def test_paths_of_different_tendons_follow_each_other():
+    both = nf.pull(0, 1, 2).then(nf.stroke_path(0, 0.5, 2, tendon=2))
+    np.testing.assert_array_equal(both.tension, [[0, NAN], [1, NAN], [NAN, NAN], [NAN, NAN]])
+    np.testing.assert_array_equal(both.stroke[2:], [[NAN, 0.0], [NAN, 0.5]])
+    back = nf.pull(0, 1, 2, tendon=2).then(nf.pull(0, 1, 2))
+    np.testing.assert_array_equal(back.tension[2:], [[0, NAN], [1, NAN]])
+    with pytest.raises(InputError, match=r"another notchflex\.LoadPath; got Load"):
+        both.then(nf.Load(tension=1.0))

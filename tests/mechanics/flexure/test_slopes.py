@@ -1,0 +1,46 @@
+"""The slopes of a rod's pose, written out in mechanics/flexure/rod_kinematics.py, against JAX's derivatives of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex._jax import jax, jnp
+from notchflex.mechanics.chain import assemble
+from notchflex.mechanics.flexure import Rod, pull_change, relative_pose
+from notchflex.mechanics.flexure.rod_kinematics import bent, twist_slope
+from notchflex.mechanics.motion import unskew
+
+SMALL = nf.StripNotch(3.5, 1.5, 6.9, deflection="small", repeat=7)
+
+
+def twist(shape: Rod, modes: jax.Array) -> jax.Array:
+    pose = relative_pose(shape, modes)
+    slope = jax.jacfwd(lambda varied: relative_pose(shape, varied))(modes)
+    turned = jnp.einsum("ji,jkm->ikm", pose.rotation, slope.rotation)
+    turn = jax.vmap(unskew, -1, -1)(turned)
+    return jnp.concatenate([turn, pose.rotation.T @ slope.translation])
+
+
+def robot(name: str) -> nf.Robot:
+    if name != "small strips":
+        return nf.load_robot(name)
+    return nf.load_robot("liu2022").replace(notch=(SMALL,))
+
+
+@pytest.mark.parametrize("flat", [True, False])
+@pytest.mark.parametrize("name", ["pacheco2021-a", "gao2017", "liu2022", "small strips"])
+def test_slopes_are_the_derivatives_of_the_pose(name: str, flat: bool, margin) -> None:
+    chain = assemble(robot(name), "plane" if flat else "space", loaded=True, flat=flat)
+    numbers = np.random.default_rng(5)
+    for number in (0, 1):  # the first of either kind
+        shape = jax.tree.map(lambda leaf, j=number: leaf[j], chain.rods)
+        modes = jnp.array(0.15 * numbers.normal(size=shape.modes))
+        wrench = jnp.array(numbers.normal(size=shape.basis.shape[-2]))
+        own = bent(shape, modes)
+        turns_and_moves = twist_slope(shape, modes, own) - twist(shape, modes)
+        margin.within("twist", turns_and_moves, 1e-13)
+        wanted = jax.jacfwd(lambda varied, s=shape, w=wrench: twist(s, varied).T @ w)(modes)
+        change = pull_change(shape, modes, own, wrench) - wanted
+        margin.within("change of the pull, relative", change / np.abs(wanted).max(), 1e-13)

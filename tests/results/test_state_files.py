@@ -1,0 +1,67 @@
+"""State files: what cannot be written or read back is told in one sentence."""
+
+import json
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.errors import InputError
+from notchflex.mechanics.chain import assemble
+from notchflex.results.state import State
+from notchflex.solver.continuation import at_rest
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return assemble(nf.load_robot("pacheco2021-a"))
+
+
+@pytest.fixture
+def file(tmp_path, chain):
+    path = tmp_path / "state.json"
+    State("wrist", at_rest(chain), "tendons", loaded=False, refinement=0).save(path)
+    return path
+
+
+def test_a_saved_state_is_read_back(file, chain):
+    assert State.load(file).robot == "wrist"
+    State.load(file).fitted(chain)
+
+
+@pytest.mark.parametrize("name", ["missing/state.json", ".", "null\0"])
+def test_states_that_cannot_be_written(tmp_path, chain, name):
+    with pytest.raises(InputError, match="the state cannot be written to"):
+        State("wrist", at_rest(chain), "tendons", loaded=False, refinement=0).save(tmp_path / name)
+
+
+@pytest.mark.parametrize("wrong", ["drop", "nan", "text", "huge", "null"])
+def test_damaged_arrays_are_not_blamed_on_the_robot(file, chain, wrong):
+    content = json.loads(file.read_text())
+    name = next(iter(content["arrays"]))
+    if wrong == "drop":
+        del content["arrays"][name]
+    else:
+        damage = {"nan": np.nan, "text": "a", "huge": 10**400, "null": None}[wrong]
+        content["arrays"][name] = np.full(
+            np.shape(content["arrays"][name]), damage, object
+        ).tolist()
+    file.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"state\.json is damaged"):
+        State.load(file).fitted(chain)
+
+
+@pytest.mark.parametrize("key", ["robot", "arrays"])
+def test_missing_parts_are_damage(file, key):
+    content = json.loads(file.read_text())
+    del content[key]
+    file.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"state\.json is damaged"):
+        State.load(file)
+
+
+def test_another_robot_is_told(file):
+    robot = nf.load_robot("pacheco2021-a")
+    two = assemble(robot.replace(tendon=robot.tendon * 2))
+    with pytest.raises(InputError, match="other notches or tendons"):
+        State.load(file).fitted(two)

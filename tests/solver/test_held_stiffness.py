@@ -1,0 +1,92 @@
+"""The stiffness put together flexure by flexure against dense differentiation of the balance."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.loads.command import command
+from notchflex.solver.held_stiffness import held_stiffness
+from oracles.held_stiffness import held_stiffness as dense
+
+WRIST = nf.load_robot("pacheco2021-a")
+PULLED = [nf.Load(tension=value) for value in (0.5, 1.9, 2.2, 1.8, 0.4)]
+
+
+def pushed(
+    robot: nf.Robot, *forces: tuple[float, float, float], tension: float = 0.0
+) -> nf.EquilibriumPath:
+    pull = (tension,) + (0.0,) * (robot.number_of_tendons - 1)
+    return nf.simulate(robot, [nf.Load(tension=pull, tip_force=one) for one in forces])
+
+
+def two_by_stroke() -> nf.EquilibriumPath:
+    load = nf.Load(tension=(1.0, None, 0.2, None), stroke=(None, 0.3, None, 0.0))
+    return nf.simulate(nf.load_robot("two-axis-wrist"), load)
+
+
+CASES = {
+    "wrist, pulled and let go": lambda: nf.simulate(WRIST, PULLED),
+    "wrist by stroke": lambda: nf.simulate(WRIST, [nf.Load(stroke=s) for s in (1.0, 2.5, 1.2)]),
+    "wrist in space": lambda: pushed(WRIST, (0.02, 0.0, 0.0), (0.02, 0.03, 0.0), tension=0.8),
+    "strips": lambda: nf.simulate(nf.load_robot("liu2022"), nf.pull(2.0, 6.0, steps=2).release()),
+    "U-links": lambda: nf.simulate(nf.load_robot("gao2017"), nf.pull(4.0, 8.0, steps=2).release()),
+    "U-links, buckled": lambda: pushed(
+        nf.load_robot("gao2017"), *((0.0, 0.0, -push) for push in (0.5, 1.0, 2.0, 3.0))
+    ),
+    "four tendons, two by stroke": two_by_stroke,
+}
+
+
+def by_the_oracle(path: nf.EquilibriumPath) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and sign of the determinant of every state."""
+    loads = command(path.load, path.robot, path.chain)
+    own = np.flatnonzero(np.asarray(path.chain.rods.idle).ravel() == 0.0)
+    compiled = jax.jit(dense)
+    found, signs = [], []
+    for step in range(len(path)):
+        one = jax.tree.map(
+            lambda leaf, step=step: jnp.asarray(leaf)[step], (loads, path.run.solved)
+        )
+        stiffness, sign = compiled(path.chain, *one)
+        found.append(np.asarray(stiffness)[own[:, None], own])
+        signs.append(float(sign))
+    return np.array(found), np.array(signs)
+
+
+def held(path: nf.EquilibriumPath) -> np.ndarray:
+    loads = command(path.load, path.robot, path.chain)
+    pieces = held_stiffness(path.prepared, loads, path.run.solved)
+    return np.concatenate([one.stiffness for one in pieces])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_as_by_dense_differentiation(name, margin):
+    path = CASES[name]()
+    assert path.converged.all(), path.reason
+    expected, sign = by_the_oracle(path)
+    scale = np.abs(expected).max(axis=(1, 2), keepdims=True)
+    margin.within("stiffness", (held(path) - expected) / scale, 1e-10)
+    smallest = np.linalg.eigvals(expected).real.min(axis=-1)
+    # Sliding along alike notches makes eigenvectors nearly parallel: the eigenvalues of such a
+    # state are known to the root of the rounding error.
+    normal = np.abs(expected - expected.swapaxes(1, 2)).max(axis=(1, 2)) < 1e4
+    allowed = np.where(normal, 1e-9, 2e-3)
+    margin.within("eigenvalue", (path.smallest_eigenvalue / smallest - 1.0) / allowed, 1.0)
+    assert path.determinant_sign.tolist() == sign.tolist()
+    assert path.stable.tolist() == ((smallest > 0.0) & (sign > 0.0)).tolist()
+
+
+def test_a_slender_robot_under_compression_is_unstable():
+    stable = CASES["U-links, buckled"]().stable
+    assert stable[0]
+    assert not stable[-1]
+
+
+def test_stability_costs_no_eigenvalues_where_the_symmetric_part_tells_it(monkeypatch):
+    path = CASES["strips"]()
+    monkeypatch.setattr(np.linalg, "eigvals", None)
+    assert path.stable.all()

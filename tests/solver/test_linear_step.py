@@ -1,0 +1,69 @@
+"""Newton's condensed step against the dense step of JAX's derivative of the whole balance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from jax.flatten_util import ravel_pytree
+
+import notchflex as nf
+from notchflex._jax import jax
+from notchflex.analysis.solve import prepared_for
+from notchflex.loads.command import command
+from notchflex.loads.conversion import load_path
+from notchflex.solver.actuation import command_residual
+from notchflex.solver.block_elimination import linear_step
+from notchflex.solver.newton import Point
+from notchflex.solver.residual import evaluate
+
+TIP = {"tip_force": (0.02, 0.0, -0.01), "tip_moment": (0.0, 0.05, 0.0)}
+SIDE = {"tip_force": (0.02, 0.01, -0.01), "following": True, "gravity": (1.0, 2.0, 3.0)}
+CASES = {
+    "wrist": ("pacheco2021-a", nf.Load(tension=1.5), 0.05),
+    "wrist by stroke": ("pacheco2021-a", nf.Load(stroke=1.0), 0.05),
+    "wrist, loaded": ("pacheco2021-a", nf.Load(tension=1.0, **TIP), 0.05),
+    "wrist in space": ("pacheco2021-a", nf.Load(tension=1.0, **SIDE), 0.05),
+    "strips": ("liu2022", nf.Load(tension=5.0), 0.02),
+    "wrist in space, held": ("pacheco2021-a", nf.Load(tension=1.0, tip_force=(0, 0.02, 0)), 0.05),
+    "links, following": ("gao2017", nf.Load(tension=6.0, following=True, **TIP), 0.01),
+    "links, loaded": ("gao2017", nf.Load(tension=6.0, **TIP), 0.01),
+    "two axes": ("two-axis-wrist", nf.Load(tension=[0.5, None, 0.2], stroke=[None, 0.1]), 0.05),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_it_is_the_dense_step(case: str, margin) -> None:
+    name, load, size = CASES[case]
+    robot = nf.load_robot(name)
+    if case.startswith("wrist in space"):
+        robot = robot.with_value("material.density", 6450.0)
+    path = load_path(load, robot.number_of_tendons)
+    ready = prepared_for(robot, path)
+    wanted = jax.tree.map(lambda leaf: leaf[0], command(path, robot, ready.chain))
+    # Any state will do, also one far from balance, as long as all forces are there.
+    numbers, rest = np.random.default_rng(3), ready.rest
+    flat, point_of = ravel_pytree(rest.point)
+    at = point_of(flat + size * numbers.normal(size=flat.shape))
+    at = at._replace(base_tension=1.0 + numbers.random(ready.chain.tendons))
+    where, _ = ravel_pytree(at)
+
+    def imbalance(varied: jax.Array) -> jax.Array:
+        point: Point = point_of(varied)
+        found = evaluate(
+            ready.chain, point.unknowns, rest.memory, point.base_tension, wanted.applied
+        )
+        demand = command_residual(ready.chain, wanted, point.base_tension, found.base)
+        return ravel_pytree((found.residual, demand))[0]
+
+    def condensed(point: Point) -> jax.Array:
+        found = evaluate(
+            ready.chain, point.unknowns, rest.memory, point.base_tension, wanted.applied
+        )
+        step = linear_step(
+            ready.chain, wanted, point.unknowns, rest.memory, point.base_tension, found
+        )
+        return ravel_pytree(Point(step.unknowns, step.base_tension))[0]
+
+    dense = np.linalg.solve(jax.jit(jax.jacfwd(imbalance))(where), -jax.jit(imbalance)(where))
+    step = jax.jit(condensed)(at)
+    margin.within("relative", (step - dense) / np.abs(dense).max(), 1e-8)
