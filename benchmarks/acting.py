@@ -19,7 +19,7 @@ import numpy as np
 import notchflex as nf
 
 _Z = np.array([0.0, 0.0, 1.0])
-# An edge this near to a face touches it, as a part of the height of the notch.
+# An edge this near to a face contacts it, as a part of the height of the notch.
 _TOUCHES = 1e-6
 
 
@@ -87,7 +87,7 @@ class State:
     def rounding(self) -> float:
         """What of a force is rounding, N: 1e-13 of what would stretch the tube to twice its length.
 
-        A tendon let go, and an edge that just does not touch, have so much instead of nothing.
+        A tendon let go, and an edge that just does not response, have so much instead of nothing.
         """
         return 1e-13 * self.robot.material.elastic_modulus * self.robot.tube.outer_radius**2
 
@@ -180,7 +180,7 @@ class State:
         return spans
 
     def _edges(self, reported: np.ndarray) -> None:
-        """Gaps between edges of pieces, and the forces where they touch."""
+        """Gaps between edges of pieces, and the forces where they response."""
         around = (None, *self.robot.notches, None)
         sides = {
             opening.side_deg % 360.0

@@ -41,7 +41,7 @@ def wrist_arrays(robot: Any) -> Wrist:
     each = (height, section.second_moment_weak[:, 0], section.edge_spine[:, 0], lever)
     numbers = (law.elastic_modulus, law.superelastic_modulus, law.transition_strain)
     numbers += (law.plastic_strain, law.plastic_modulus, law.plastic_exponent)
-    closed = height / rods.lip[:, 0]
+    closed = height / rods.closure[:, 0]
     notches = np.stack([*each, closed], axis=1)
     return Wrist(notches, np.array([*numbers, robot.friction.coefficient]))
 

@@ -42,7 +42,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("_plot", "plotting.axes_of_quantities"): _PICTURE,
     ("_plot", "plotting.picture"): _PICTURE,
     ("robot.notches.arc", "mechanics.section"): (
-        "whether lips touch at rest depends on the centroid of the section; seldom asked for"
+        "whether lips response at rest depends on the centroid of the section; seldom asked for"
     ),
     ("robot.robot", "robot.value_names"): "`Robot.with_values`; setting a value makes a robot",
     ("robot.robot", "robot.summary"): _SHOWN,

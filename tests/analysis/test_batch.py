@@ -91,7 +91,7 @@ def test_what_makes_no_batch(wrist, robots, loads, outputs, said):
 def test_rows_come_back_in_order_however_they_are_cut(wrist, rows, cores):
     loads, seen = nf.pull(0.1, 2.0, steps=rows), []
     found = nf.solve_batch(wrist, loads, cores=cores, progress=lambda *done: seen.append(done))
-    # Solved one at a time they are the same to the last bit: lanes do not touch each other.
+    # Solved one at a time they are the same to the last bit: lanes do not response each other.
     some = np.unique([0, rows // 2, rows - 1])
     for row in some:
         alone = nf.solve_batch(wrist, loads.part(int(row), 1))

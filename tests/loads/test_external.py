@@ -8,7 +8,7 @@ import notchflex as nf
 from notchflex._jax import jax
 from notchflex.errors import InputError
 from notchflex.loads.applied import (
-    Applied,
+    BodyLoads,
     applied,
     bending_normal,
     body_wrench,
@@ -26,14 +26,14 @@ LENGTH = np.array([ROBOT.tube.base_length, *(notch.uncut_length for notch in ROB
 RNG = np.random.default_rng(4)
 
 
-def sums(load, *, robot=ROBOT, mass=None, centre=None) -> Applied:
+def sums(load, *, robot=ROBOT, mass=None, centre=None) -> BodyLoads:
     mass = np.zeros(BODIES) if mass is None else mass
     centre = np.zeros((BODIES, 3)) if centre is None else centre
     return applied(load_path(load, robot.number_of_tendons), robot, mass, centre, LENGTH)
 
 
-def of_body(every: Applied, body: int, step: int = 0) -> Applied:
-    return Applied(*(np.asarray(field)[step, body] for field in every))
+def of_body(every: BodyLoads, body: int, step: int = 0) -> BodyLoads:
+    return BodyLoads(*(np.asarray(field)[step, body] for field in every))
 
 
 def by_hand(force, moment, point, *, body_in_world):

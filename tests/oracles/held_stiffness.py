@@ -9,9 +9,9 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual
-from notchflex.solver.continuation import Solved
-from notchflex.solver.element import Memory, at_bound
-from notchflex.solver.newton import Point
+from notchflex.solver.continuation import SolverState
+from notchflex.solver.element import Memory, bound_side
+from notchflex.solver.newton import Iterate
 from notchflex.solver.residual import evaluate
 
 # Closed lips and tendons drawn by stroke are held by springs this much stiffer than the notches:
@@ -22,7 +22,7 @@ _SLIP = 1e-3
 
 
 def held_stiffness(
-    chain: Chain, command: Command, solved: Solved
+    chain: Chain, command: Command, solved: SolverState
 ) -> tuple[Float[Array, "modes modes"], Float[Array, ""]]:
     """Stiffness of the whole robot against its modes, and the sign of a determinant.
 
@@ -47,13 +47,13 @@ def held_stiffness(
     flat, point_of = ravel_pytree(point)
     here = evaluate(chain, point.unknowns, solved.memory, point.base_tension, solved.applied)
     slid = tuple(
-        span.slid - _SLIP * at_bound(ratio, span.bound)
+        span.slid - _SLIP * bound_side(ratio, span.bound)
         for span, ratio in zip(here.spans, point.unknowns.log_ratio, strict=True)
     )
     memory = Memory(point.unknowns.log_ratio, slid, tuple(span.bound for span in here.spans))
 
     def imbalance(flat: Array) -> Array:
-        varied: Point = point_of(flat)
+        varied: Iterate = point_of(flat)
         at = evaluate(chain, varied.unknowns, memory, varied.base_tension, solved.applied)
         demand = command_residual(chain, command, varied.base_tension, at.base)
         residual = at.residual
@@ -62,17 +62,18 @@ def held_stiffness(
 
     matrix = jax.jacfwd(imbalance)(flat)
     natural_gap = chain.rods.length.sum(-1)
-    give = 1.0 / (_HOLDING_STIFFNESS * chain.lip_stiffness * natural_gap)
+    give = 1.0 / (_HOLDING_STIFFNESS * chain.contact_stiffness * natural_gap)
     softened = [jnp.zeros(modes)]
     softened += [
-        jnp.broadcast_to(give[:, None], group.closes.shape).ravel() for group in chain.lips
+        jnp.broadcast_to(give[:, None], group.has_contact.shape).ravel()
+        for group in chain.contact_pairs
     ]
     on_diagonal = jnp.concatenate(softened)
     rows = jnp.arange(len(on_diagonal))
     matrix = matrix.at[rows, rows].add(on_diagonal)
     drawn = len(flat) - chain.tendons + jnp.arange(chain.tendons)
     if command.by_stroke is not None:
-        soft = command.by_stroke / (_HOLDING_STIFFNESS * chain.drawn_stiffness)
+        soft = command.by_stroke / (_HOLDING_STIFFNESS * chain.stroke_stiffness)
         matrix = matrix.at[drawn, drawn].add(soft)
     others = matrix[modes:, modes:]
     stiffness = matrix[:modes, :modes] - matrix[:modes, modes:] @ jnp.linalg.solve(

@@ -40,7 +40,7 @@ class Notch:
     gap_tension: np.ndarray
     beyond: np.ndarray
     lip_gap: float
-    lip_force: float
+    contact_force: float
 
 
 def turned(point: np.ndarray, angle: float) -> np.ndarray:
@@ -60,10 +60,12 @@ def solve_notch(strip: Strip, tension: np.ndarray, slides: np.ndarray, closed: b
         strip: The strip.
         tension: Tension of both cables where they reach this notch, N.
         slides: +1 for a cable that slides toward the base, -1 toward the tip.
-        closed: Whether the lips touch on the side of the first cable; else they carry no force.
+        closed: Whether the lips response on the side of the first cable; else they carry no force.
     """
 
-    def loads(end: np.ndarray, lip_force: float, part: float) -> tuple[np.ndarray, float, Notch]:
+    def loads(
+        end: np.ndarray, contact_force: float, part: float
+    ) -> tuple[np.ndarray, float, Notch]:
         """Force and moment about the strip's free end, which lies at x, z and has turned."""
         origin = end[:2] - turned(np.array([0.5 * strip.length, 0.0]), end[2])
         enters = origin + turned(strip.leaves, end[2])
@@ -78,12 +80,12 @@ def solve_notch(strip: Strip, tension: np.ndarray, slides: np.ndarray, closed: b
         pull = part * tension * ratio[0]
         direction = np.tile([0.0, -1.0], (2, 1)) if strip.dead else along
         edge = origin + turned(np.array([strip.lip, 0.0]), end[2])
-        forces = np.array([*(pull[:, None] * direction), [0.0, lip_force]])
+        forces = np.array([*(pull[:, None] * direction), [0.0, contact_force]])
         couple = sum(
             moment(point - end[:2], force)
             for point, force in zip([*enters, edge], forces, strict=True)
         )
-        found = Notch(float(end[2]), pull, pull * ratio[1], float(edge[1]), float(lip_force))
+        found = Notch(float(end[2]), pull, pull * ratio[1], float(edge[1]), float(contact_force))
         return forces.sum(axis=0), couple, found
 
     def misses(unknown: np.ndarray, part: float) -> np.ndarray:
@@ -96,7 +98,7 @@ def solve_notch(strip: Strip, tension: np.ndarray, slides: np.ndarray, closed: b
 
         clamp = [-0.5 * strip.length, strip.height, 0.0]
         way = solve_ivp(slope, (0.0, strip.length), clamp, method="DOP853", rtol=1e-11, atol=1e-12)
-        return np.array([*(way.y[:, -1] - end), found.lip_gap if closed else found.lip_force])
+        return np.array([*(way.y[:, -1] - end), found.lip_gap if closed else found.contact_force])
 
     guess = np.array([0.5 * strip.length, strip.height, 0.0, 0.0])
     for part in np.linspace(0.2, 1.0, 5):

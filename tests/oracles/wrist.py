@@ -87,7 +87,7 @@ class Wrist:
 
     @cached_property
     def closing_angle(self) -> np.ndarray:
-        """Angle at which the lips of a notch touch [rad]."""
+        """Angle at which the lips of a notch response [rad]."""
         return np.array(self.height) / (self.outer_diameter / 2 + self.centroid)
 
     def with_(self, **changes: object) -> Wrist:

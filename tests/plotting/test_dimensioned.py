@@ -172,7 +172,7 @@ def test_drawing_is_written(tmp_path, suffix):
 
 
 def test_depth_from_a_calliper_on_radial_edges():
-    """The formula of docs/your_own_wrist.md: the jaws touch the inner corners."""
+    """The formula of docs/your_own_wrist.md: the jaws response the inner corners."""
     view = view_of(nf.load_robot("pacheco2021-a"))
     thickness = 0.81 + view.cuts[0].edge[1, 1]
     assert thickness == pytest.approx(0.300, abs=5e-4)

@@ -93,9 +93,9 @@ def test_notches_close_where_they_are_open(links, strips):
     radii = [2.995, 5.0]
     for shape, radius in zip((links, strips), radii, strict=True):
         side = outline(shape, 0.0)
-        for lip in side.lips:
+        for lip in side.contact_pairs:
             assert abs(lip[0]) == pytest.approx(radius)
-    assert outline(links, 0.0).lips[0][0] < 0.0 < outline(links, 0.0).lips[1][0]
+    assert outline(links, 0.0).contact_pairs[0][0] < 0.0 < outline(links, 0.0).contact_pairs[1][0]
 
 
 def test_walls_in_space_are_half_round_where_slots_alternate(links):

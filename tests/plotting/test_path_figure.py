@@ -295,7 +295,7 @@ def test_bent_notch_is_an_arc_of_the_right_length():
     # the lips of a closed notch meet
     first, second = shape.bodies[0][1], shape.bodies[1][0]
     assert np.linalg.norm(first - second) < 2e-3
-    np.testing.assert_allclose(shape.lips[0], first, atol=2e-3)
+    np.testing.assert_allclose(shape.contact_pairs[0], first, atol=2e-3)
 
 
 def test_picture_does_not_turn_with_the_base():

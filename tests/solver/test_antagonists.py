@@ -8,8 +8,8 @@ import pytest
 import notchflex as nf
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import assemble
-from notchflex.solver.actuation import command_residual, drawn_when_closed
-from notchflex.solver.residual import Base
+from notchflex.solver.actuation import closing_stroke, command_residual
+from notchflex.solver.residual import BaseReaction
 
 STIFF = 4000.0  # N, E A of the elastic cables
 
@@ -149,7 +149,7 @@ def test_a_missed_stroke_is_an_imbalance_beside_any_tension() -> None:
     """A difference of tensions and strokes would round the stroke away."""
     chain = assemble(_notch("straight", "wall-arc", nf.Frictionless()))
     command = Command(np.array([0.05, 0.0]), np.array([True, True]), None)
-    base = Base(drawn=np.array([0.05 - 1e-6, -1e-6]), stretch=np.zeros(2), load=None)
+    base = BaseReaction(drawn=np.array([0.05 - 1e-6, -1e-6]), stretch=np.zeros(2), load=None)
     for tension in (1.0, 1e8, 1e16):
         missed = command_residual(chain, command, np.full(2, tension), base)
         np.testing.assert_allclose(missed, -1e-6, rtol=1e-9)
@@ -157,7 +157,7 @@ def test_a_missed_stroke_is_an_imbalance_beside_any_tension() -> None:
 
 def test_stroke_that_closes_every_notch() -> None:
     robot = _notch("wall-arc", "wall-arc", nf.Frictionless())
-    reach = drawn_when_closed(assemble(robot))
+    reach = closing_stroke(assemble(robot))
     closing = nf.solve(robot, nf.Load(tension=(10.0, 0.0)))
     assert closing.closed.all()
     assert abs(reach[0] - closing.stroke[0]) < 1e-9

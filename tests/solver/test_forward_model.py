@@ -13,7 +13,7 @@ from notchflex.analysis.derivatives.adjoint import gradient
 from notchflex.analysis.derivatives.forward_model import ForwardModel
 from notchflex.analysis.derivatives.tangent import Change, PathTangents
 from notchflex.mechanics.chain import assemble
-from notchflex.solver.programs.prepare import Prepared
+from notchflex.solver.programs.prepare import PreparedChain
 
 LOOP = nf.pull(0.3, 1.2, steps=3).release()
 
@@ -22,7 +22,7 @@ def changes(path: nf.EquilibriumPath) -> Change:
     """A change of all loads and of the whole chain."""
     random = np.random.default_rng(0)
     long = path.prepared.long
-    packed, _ = path.prepared.long_commands(path.commands)
+    packed, _ = path.prepared.padded_commands(path.commands)
     chain = np.where(np.isfinite(long.vector), long.vector, 0.0)
     move = 1e-3 * random.standard_normal(len(chain)) * chain
     return Change(1e-3 * random.standard_normal(packed.shape), move)
@@ -94,7 +94,7 @@ def test_other_laws_make_the_chain_that_is_assembled_anew(name):
     values = {"material.elastic_modulus": 7e3, "friction.coefficient": 0.21}
     model = ForwardModel(robot, nf.pull(1.0, 1.0, steps=1))
     other = robot.with_values(values)
-    found, expected = model._prepared(other), Prepared(assemble(other))
+    found, expected = model._prepared(other), PreparedChain(assemble(other))
     np.testing.assert_array_equal(found.vector, expected.vector)
     own = found.places({name: getattr(found.chain, name) for name in ("law", "friction")})
     np.testing.assert_array_equal(found.long.vector[own], expected.long.vector[own])

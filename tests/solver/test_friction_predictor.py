@@ -9,7 +9,7 @@ from notchflex import load_robot
 from notchflex._jax import jnp
 from notchflex.mechanics.chain import assemble
 from notchflex.solver.element import Memory
-from notchflex.solver.friction_predictor import played
+from notchflex.solver.friction_predictor import predict_log_ratios
 
 
 def marched(before: float, now: float, remembered: np.ndarray, limits: np.ndarray) -> np.ndarray:
@@ -31,7 +31,7 @@ def test_guess_is_that_of_a_march_along_the_tendon(part: float, seed: int) -> No
     limits = rng.uniform(0.0, 0.1, shape) * (rng.uniform(size=shape) > 0.2)
     remembered = limits * np.clip(rng.normal(size=shape), -1.0, 1.0)
     memory = Memory((jnp.array(remembered),), (jnp.zeros(shape),), (jnp.array(limits),))
-    (guess,) = played(chain, jnp.array([2.0]), jnp.array([2.0 * part]), memory)
+    (guess,) = predict_log_ratios(chain, jnp.array([2.0]), jnp.array([2.0 * part]), memory)
     expected = marched(2.0, 2.0 * part, remembered, limits)
     assert np.asarray(guess) == pytest.approx(expected, abs=1e-13)
 
@@ -41,7 +41,7 @@ def test_slack_tendons_slide_everywhere(before: float, now: float) -> None:
     chain = assemble(load_robot("gao2017"))
     limits = np.full((chain.flexures, 1, 2), 0.05)
     memory = Memory((jnp.zeros(limits.shape),), (jnp.zeros(limits.shape),), (jnp.array(limits),))
-    (guess,) = played(chain, jnp.array([before]), jnp.array([now]), memory)
+    (guess,) = predict_log_ratios(chain, jnp.array([before]), jnp.array([now]), memory)
     assert np.array_equal(guess, np.sign(now - before) * limits)
 
 
@@ -49,6 +49,6 @@ def test_contacts_that_nothing_drives_stand_just_within_their_bound() -> None:
     chain = assemble(load_robot("gao2017"))
     limits = np.full((chain.flexures, 1, 2), 0.05)
     memory = Memory((jnp.array(limits),), (jnp.zeros(limits.shape),), (jnp.array(limits),))
-    (guess,) = played(chain, jnp.array([2.0]), jnp.array([2.0]), memory)
+    (guess,) = predict_log_ratios(chain, jnp.array([2.0]), jnp.array([2.0]), memory)
     assert (np.asarray(guess) < limits).all()
     assert np.asarray(guess) == pytest.approx(limits, rel=1e-12)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.loads.command import command
+from notchflex.loads.make_commands import make_commands
 from notchflex.solver.held_stiffness import held_stiffness
 from oracles.held_stiffness import held_stiffness as dense
 
@@ -43,8 +43,8 @@ CASES = {
 
 def by_the_oracle(path: nf.EquilibriumPath) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and sign of the determinant of every state."""
-    loads = command(path.load, path.robot, path.chain)
-    own = np.flatnonzero(np.asarray(path.chain.rods.idle).ravel() == 0.0)
+    loads = make_commands(path.load, path.robot, path.chain)
+    own = np.flatnonzero(np.asarray(path.chain.rods.padding_mask).ravel() == 0.0)
     compiled = jax.jit(dense)
     found, signs = [], []
     for step in range(len(path)):
@@ -58,7 +58,7 @@ def by_the_oracle(path: nf.EquilibriumPath) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held(path: nf.EquilibriumPath) -> np.ndarray:
-    loads = command(path.load, path.robot, path.chain)
+    loads = make_commands(path.load, path.robot, path.chain)
     pieces = held_stiffness(path.prepared, loads, path.run.solved)
     return np.concatenate([one.stiffness for one in pieces])
 

@@ -8,12 +8,12 @@ from jax.flatten_util import ravel_pytree
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.analysis.solve import prepared_for
-from notchflex.loads.command import command
+from notchflex.analysis.solve import prepare_for
 from notchflex.loads.conversion import load_path
+from notchflex.loads.make_commands import make_commands
 from notchflex.solver.actuation import command_residual
 from notchflex.solver.block_elimination import linear_step
-from notchflex.solver.newton import Point
+from notchflex.solver.newton import Iterate
 from notchflex.solver.residual import evaluate
 
 TIP = {"tip_force": (0.02, 0.0, -0.01), "tip_moment": (0.0, 0.05, 0.0)}
@@ -38,8 +38,8 @@ def test_it_is_the_dense_step(case: str, margin) -> None:
     if case.startswith("wrist in space"):
         robot = robot.with_value("material.density", 6450.0)
     path = load_path(load, robot.number_of_tendons)
-    ready = prepared_for(robot, path)
-    wanted = jax.tree.map(lambda leaf: leaf[0], command(path, robot, ready.chain))
+    ready = prepare_for(robot, path)
+    wanted = jax.tree.map(lambda leaf: leaf[0], make_commands(path, robot, ready.chain))
     # Any state will do, also one far from balance, as long as all forces are there.
     numbers, rest = np.random.default_rng(3), ready.rest
     flat, point_of = ravel_pytree(rest.point)
@@ -48,21 +48,21 @@ def test_it_is_the_dense_step(case: str, margin) -> None:
     where, _ = ravel_pytree(at)
 
     def imbalance(varied: jax.Array) -> jax.Array:
-        point: Point = point_of(varied)
+        point: Iterate = point_of(varied)
         found = evaluate(
             ready.chain, point.unknowns, rest.memory, point.base_tension, wanted.applied
         )
         demand = command_residual(ready.chain, wanted, point.base_tension, found.base)
         return ravel_pytree((found.residual, demand))[0]
 
-    def condensed(point: Point) -> jax.Array:
+    def condensed(point: Iterate) -> jax.Array:
         found = evaluate(
             ready.chain, point.unknowns, rest.memory, point.base_tension, wanted.applied
         )
         step = linear_step(
             ready.chain, wanted, point.unknowns, rest.memory, point.base_tension, found
         )
-        return ravel_pytree(Point(step.unknowns, step.base_tension))[0]
+        return ravel_pytree(Iterate(step.unknowns, step.base_tension))[0]
 
     dense = np.linalg.solve(jax.jit(jax.jacfwd(imbalance))(where), -jax.jit(imbalance)(where))
     step = jax.jit(condensed)(at)

@@ -132,7 +132,7 @@ def test_wrists_of_one_to_forty_notches_share_four_programs(wrist: nf.Robot) -> 
     for notches in (1, 3, 7, 8, 15, 16, 24, 31, 32, 40):
         longer = wrist.replace(notch=wrist.notches[:1] * notches, tendon=(nf.Tendon(0.7),))
         state = nf.solve(longer, nf.Load(tension=0.3)).raise_if_failed()
-        programs.add(state.path.prepared.long.known_form)
+        programs.add(state.path.prepared.long.static_structure)
         alone = nf.solve_batch(longer, [nf.Load(tension=0.3)])  # a program without added flexures
         assert state.total_angle == pytest.approx(alone["total_angle"][0], abs=1e-12)
     assert len(programs) <= 4
@@ -229,9 +229,9 @@ def test_modes_that_fill_up_are_no_modes_of_the_robot() -> None:
     chain = path.chain
     real = [
         stiffness[np.ix_(idle == 0.0, idle == 0.0)]
-        for stiffness, idle in zip(chain.elastic, chain.rods.idle, strict=True)
+        for stiffness, idle in zip(chain.elastic, chain.rods.padding_mask, strict=True)
     ]
-    assert (np.asarray(chain.rods.idle) > 0.0).any()
+    assert (np.asarray(chain.rods.padding_mask) > 0.0).any()
     smallest = min(np.linalg.eigvalsh(stiffness).min() for stiffness in real)
     assert smallest > 2.0
     assert path.smallest_eigenvalue[0] == pytest.approx(smallest, rel=1e-9)

@@ -87,7 +87,9 @@ def test_closed_lips_carry_what_the_strip_does_not(step, margin):
     assert closed or wanted.lip_gap > 0.0
     margin.within("angles", path.notch_angle[step] - wanted.angle, FAR_ANGLE, "rad")
     margin.within("lips", path.gap[step] - wanted.lip_gap, GAP, "mm")
-    margin.within("force of the lips", path.contact_force[step] - wanted.lip_force, LIP_FORCE, "N")
+    margin.within(
+        "force of the lips", path.contact_force[step] - wanted.contact_force, LIP_FORCE, "N"
+    )
 
 
 def test_friction_beyond_its_law_is_told(margin):

@@ -19,20 +19,20 @@ from lanewise import WIDTH
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.batch_rows import followed_row
-from notchflex.analysis.outputs import DEFAULT_OUTPUTS, known_outputs
-from notchflex.analysis.solve import prepared_for
+from notchflex.analysis.outputs import DEFAULT_OUTPUTS, check_outputs
+from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import command, filled
 from notchflex.loads.conversion import load_path
-from notchflex.loads.load_path import joined_paths
-from notchflex.loads.validation import shown, whole
+from notchflex.loads.load_path import join_paths
+from notchflex.loads.make_commands import make_commands, pad_commands
+from notchflex.loads.validation import short_repr, whole
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import Prepared, lengthened
-from notchflex.solver.programs.pytree_layout import Form
-from notchflex.solver.programs.static_structure import KnownForm
+from notchflex.solver.programs.prepare import PreparedChain, pad_prepared
+from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.programs.threads import number_of_cores, on_cores
 
 # Rows of a piece at most, by how many rows there are.
@@ -164,12 +164,12 @@ def simulate_batch(
         given = [loads] if isinstance(loads, LoadPath) else list(loads)
     except TypeError:
         raise InputError.WRONG_TYPE(
-            f"simulate_batch needs a notchflex.LoadPath, or some in order; got {shown(loads)}"
+            f"simulate_batch needs a notchflex.LoadPath, or some in order; got {short_repr(loads)}"
         ) from None
     paths = [load_path(one, tendons) for one in given]
     if not paths or len({len(path) for path in paths}) > 1:
         raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
-    joined = paths[0] if len(paths) == 1 else joined_paths(paths)
+    joined = paths[0] if len(paths) == 1 else join_paths(paths)
     rows = len(paths)
     return Batch(_simulate(every, joined, rows, outputs, settings, refinement, cores, progress))
 
@@ -181,7 +181,7 @@ def _robots(robots: Any) -> list[Robot]:
         every = []
     if not every or not all(isinstance(robot, Robot) for robot in every):
         raise InputError.WRONG_TYPE(
-            f"a batch needs a notchflex.Robot, or some of them; got {shown(robots)}"
+            f"a batch needs a notchflex.Robot, or some of them; got {short_repr(robots)}"
         )
     return every
 
@@ -197,7 +197,7 @@ def _simulate(
     progress: Callable[[int, int], None] | None,
 ) -> dict[str, np.ndarray]:
     """Follow paths, given one after the other as a long one, each from rest."""
-    asked = known_outputs(outputs)
+    asked = check_outputs(outputs)
     threads = number_of_cores() if cores is None else whole(cores, "cores")
     if threads < 1:
         raise InputError.OUT_OF_RANGE(f"cores must be 1 or more, or None for all; got {threads}")
@@ -248,20 +248,20 @@ class _Table:
     """Rows of a batch whose robots have one form.
 
     Attributes:
-        chain_form: Form of what is not known of the robots.
+        chain_layout: PytreeLayout of what is not known of the robots.
         rows: Which rows of the batch these are.
         chains: A row per robot, or one for all.
         commands: A row per path, or one for all, then the steps.
-        command_form: Form of one of them.
+        command_layout: PytreeLayout of one of them.
         flexures: How many flexures are the robot's own, by row, or one number for all.
         outputs: What is asked.
     """
 
-    chain_form: KnownForm
+    chain_layout: StaticStructure
     rows: np.ndarray
     chains: Float[np.ndarray, "k chain"]
-    commands: Float[np.ndarray, "k s command"]
-    command_form: Form
+    commands: Float[np.ndarray, "k s make_commands"]
+    command_layout: PytreeLayout
     flexures: Int[np.ndarray, " k"]
     outputs: tuple[str, ...]
 
@@ -280,7 +280,7 @@ class _Table:
             commands = np.repeat(self.commands, index.stop - index.start, axis=0)
         one_robot = len(self.chains) == 1
         chains = self.chains[0] if one_robot else self.chains[index]
-        forms = (self.chain_form, self.command_form, self.outputs)
+        forms = (self.chain_layout, self.command_layout, self.outputs)
         by_row = (not one_robot, True, False)
         came = followed_row.rows(by_row, chains, commands, numbers, *forms)
         own = self.flexures[index] if len(self.flexures) > 1 else self.flexures
@@ -310,29 +310,31 @@ def _tables(
     outputs: tuple[str, ...],
     refinement: int,
 ) -> list[_Table]:
-    """The rows of a batch by the form of their robots, shorter ones filled up to the longest."""
+    """The rows of a batch by the form of their robots, shorter ones pad_commands up to the longest."""
     steps = len(joined) // paths
     # The modes that any of the loads asks for, so that rows share a program.
-    every = [prepared_for(robot, joined, None, refinement) for robot in robots]
+    every = [prepare_for(robot, joined, None, refinement) for robot in robots]
     flexures = max(ready.chain.flexures for ready in every)
     edges = max(ready.chain.contacts.shape[1] for ready in every)
     by_stroke = not np.isnan(joined.stroke).all()
-    tables: dict[tuple[Form, Form], list[tuple[int, Prepared, int, np.ndarray]]] = {}
+    tables: dict[
+        tuple[PytreeLayout, PytreeLayout], list[tuple[int, PreparedChain, int, np.ndarray]]
+    ] = {}
     for row, (robot, own) in enumerate(zip(robots, every, strict=True)):
         part = joined if len(robots) == 1 or paths == 1 else joined.part(row * steps, steps)
-        commands = filled(command(part, robot, own.chain), flexures, by_stroke)
-        ready = lengthened(own, flexures, edges)
-        form = ready.command_form(commands)
+        commands = pad_commands(make_commands(part, robot, own.chain), flexures, by_stroke)
+        ready = pad_prepared(own, flexures, edges)
+        form = ready.command_layout(commands)
         packed = form.pack(commands, leading=1).reshape(-1, steps, form.size)
         entry = (row, ready, own.chain.flexures, packed)
-        tables.setdefault((ready.chain_form, form), []).append(entry)
+        tables.setdefault((ready.chain_layout, form), []).append(entry)
     made = []
     for (_, form), entries in tables.items():
         numbers, robots_of_one, own, commands = zip(*entries, strict=True)
         rows = np.arange(count) if len(robots) == 1 else np.array(numbers)
         whole = np.stack([ready.vector for ready in robots_of_one])
         own_chains = [ready.chain for ready in robots_of_one]
-        known = KnownForm.of(robots_of_one[0].chain_form, own_chains, whole)
+        known = StaticStructure.of(robots_of_one[0].chain_layout, own_chains, whole)
         commands = np.concatenate(commands)
         chains = known.pack(whole)
         made.append(_Table(known, rows, chains, commands, form, np.array(own), outputs))

@@ -16,7 +16,7 @@ from notchflex.mechanics.flexure import relative_pose
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.tendon.wall_arc import WallArc
 from notchflex.robot import Robot
-from notchflex.solver.programs.prepare import prepared
+from notchflex.solver.programs.prepare import prepare
 from notchflex.solver.residual import body_poses
 
 
@@ -52,7 +52,7 @@ def bodies_from_angles(
         )
     if not np.isfinite(angles).all():
         raise InputError.NOT_FINITE("a notch angle is not finite; give angles in rad")
-    position, rotation = _bodies(prepared(robot, flat=False).chain, angles)
+    position, rotation = _bodies(prepare(robot, flat=False).chain, angles)
     return np.asarray(position), np.asarray(rotation)
 
 

@@ -82,7 +82,7 @@ def _description(notch: Notch, robot: Robot) -> dict[str, Any]:
         "area_mm2": float(section.area[weakest]),
         "second_moment_mm4": float(section.second_moment_weak[weakest]),
     }
-    if float(one.lip_closes) > 0.0:  # opposite a spine
+    if float(one.has_closure) > 0.0:  # opposite a spine
         values["centroid_mm"] = robot.tube.outer_radius - float(section.edge_spine[weakest])
     return named_values(notch) | values
 

@@ -10,9 +10,9 @@ from jaxtyping import Array
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex.errors import InputError
-from notchflex.loads.validation import shown
+from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import Solved, advance
+from notchflex.solver.continuation import SolverState, solve_load_step
 from notchflex.solver.derived.quantities import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import Settings
@@ -23,7 +23,7 @@ OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *_OF_STAT
 """What can be asked of a batch or of a function that can be differentiated."""
 
 
-def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
+def check_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     """The names of outputs, checked.
 
     Raises:
@@ -32,7 +32,7 @@ def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     wrong = [name for name in names if name not in OUTPUTS]
     if wrong or not names:
-        said = f"there is no output {shown(wrong[0])}" if wrong else "no output is asked"
+        said = f"there is no output {short_repr(wrong[0])}" if wrong else "no output is asked"
         raise InputError.UNKNOWN_NAME(f"{said}; there are {', '.join(OUTPUTS)}")
     return names
 
@@ -40,7 +40,7 @@ def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 def followed(
     chain: Chain,
     commands: Any,
-    start: Solved,
+    start: SolverState,
     settings: Settings,
     outputs: tuple[str, ...],
 ) -> dict[str, Array]:
@@ -61,9 +61,9 @@ def followed(
         By name, loads as leading axis; after a load that failed the last good state.
     """
 
-    def step(state: tuple[Solved, Array], command: Any) -> tuple[Any, dict[str, Array]]:
+    def step(state: tuple[SolverState, Array], command: Any) -> tuple[Any, dict[str, Array]]:
         last, alive = state
-        came = advance(chain, command, last, settings)
+        came = solve_load_step(chain, command, last, settings)
         solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), came.solved, last)
         reached = alive & came.converged
         told = _told(chain, solved, outputs)
@@ -75,18 +75,18 @@ def followed(
     return jax.lax.scan(step, (start, jnp.array(True)), commands)[1]
 
 
-def _told(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
+def _told(chain: Chain, solved: SolverState, outputs: tuple[str, ...]) -> dict[str, Array]:
     """What is asked of a state, and whether it may be believed."""
     state = SolvedState(chain, solved)
     told = {name: state.quantity(name) for name in outputs if name in _OF_STATE}
     return told | {"_holds": believable(state.quantity)}
 
 
-def reported(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
+def reported(chain: Chain, solved: SolverState, outputs: tuple[str, ...]) -> dict[str, Array]:
     """Return quantities of a solved state by name, in the frame of the base."""
     told = _told(chain, solved, outputs)
     del told["_holds"]
     return told
 
 
-__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "followed", "known_outputs", "reported"]
+__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "followed", "check_outputs", "reported"]

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.applied import follows, is_planar, is_unloaded
-from notchflex.loads.command import command
 from notchflex.loads.conversion import load_path
-from notchflex.loads.validation import robot_given
+from notchflex.loads.make_commands import make_commands
+from notchflex.loads.validation import check_is_robot
 from notchflex.mechanics.chain import tendons_in_plane
 from notchflex.mechanics.flexure import LEVELS, MOST_REFINEMENT
 from notchflex.results.equilibrium import Equilibrium
@@ -17,7 +17,7 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.results.state import SavedState, State, check_robot, fitted
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import Prepared, prepared
+from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run
 
 
@@ -52,12 +52,12 @@ def simulate(
         >>> bool(path.total_angle[3] == path.total_angle[2] > path.total_angle[1])
         True
     """
-    load = load_path(loads, robot_given(robot).number_of_tendons)
+    load = load_path(loads, check_is_robot(robot).number_of_tendons)
     if from_state is not None:
         check_robot(from_state, robot)
-    ready = prepared_for(robot, load, from_state, refinement)
+    ready = prepare_for(robot, load, from_state, refinement)
     start = None if from_state is None else fitted(from_state, ready.chain)
-    commands = command(load, robot, ready.chain)
+    commands = make_commands(load, robot, ready.chain)
     came = run(ready, commands, start, settings or DEFAULT, each_from_start=False)
     return EquilibriumPath(robot, load, ready, came, settings=settings or DEFAULT)
 
@@ -111,7 +111,7 @@ def solve_each(
         refinement: More strain modes, as for `simulate`.
 
     Returns:
-        The states, one per load; a failure of one does not touch the others.
+        The states, one per load; a failure of one does not response the others.
 
     Raises:
         InputError: Invalid loads.
@@ -122,9 +122,9 @@ def solve_each(
         >>> path.converged.tolist()
         [True, True, True]
     """
-    load = load_path(loads, robot_given(robot).number_of_tendons)
-    ready = prepared_for(robot, load, refinement=refinement)
-    commands = command(load, robot, ready.chain)
+    load = load_path(loads, check_is_robot(robot).number_of_tendons)
+    ready = prepare_for(robot, load, refinement=refinement)
+    commands = make_commands(load, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=True)
     return EquilibriumPath(
         robot, load, ready, came, each_from_rest=True, settings=settings or DEFAULT
@@ -139,12 +139,12 @@ def check_refinement(refinement: int) -> None:
         )
 
 
-def prepared_for(
+def prepare_for(
     robot: Robot,
     load: LoadPath,
     from_state: State | SavedState | None = None,
     refinement: int = 0,
-) -> Prepared:
+) -> PreparedChain:
     """The robot with modes enough for all loads of a path, and for the state before it."""
     check_refinement(refinement)
     if from_state is not None and from_state.refinement != refinement:
@@ -160,7 +160,7 @@ def prepared_for(
     if from_state is not None:
         level = max(level, from_state.level, key=LEVELS.index)
     turning = loaded and (follows(load) or (from_state is not None and from_state.follows))
-    return prepared(robot, level, loaded=loaded, follows=turning, refinement=refinement)
+    return prepare(robot, level, loaded=loaded, follows=turning, refinement=refinement)
 
 
 __all__ = ["simulate", "solve", "solve_each"]

@@ -28,7 +28,7 @@ from notchflex.robot import Robot
 _ROUNDING = 1e-12
 
 
-class Applied(NamedTuple):
+class BodyLoads(NamedTuple):
     """External loads on the bodies, base first; loads as leading axis. Units N, N mm.
 
     Attributes:
@@ -52,7 +52,7 @@ def applied(
     body_centre: Float[np.ndarray, "bodies 3"],
     body_length: Float[np.ndarray, " bodies"],
     frame: Float[np.ndarray, "3 3"] | None = None,
-) -> Applied:
+) -> BodyLoads:
     """Sum up what acts from outside on each body.
 
     Args:
@@ -76,18 +76,18 @@ def applied(
         tip = float(body_length[-1])
         sums.append(_sums(external, axes, body_mass, body_centre, tip))
     if len(load_path) == 1:
-        return Applied(*(constant(field[None]) for field in sums[0]))
+        return BodyLoads(*(constant(field[None]) for field in sums[0]))
     # Loads that stay the same over many steps are summed up once.
     every = (np.array(field)[load_path.which] for field in zip(*sums, strict=True))
-    return Applied(*map(constant, every))
+    return BodyLoads(*map(constant, every))
 
 
-def in_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
+def in_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
     """Loads of space as those of the plane that x and z of a frame span."""
     turn = np.asarray(frame)
     arm = turn.T @ np.asarray(loads.dead_arm) @ turn
     following = [np.asarray(loads.following)[..., part] @ turn for part in (_FIRST, _LAST)]
-    return Applied(
+    return BodyLoads(
         dead_force=constant((np.asarray(loads.dead_force) @ turn)[..., IN_PLANE]),
         dead_moment=constant((np.asarray(loads.dead_moment) @ turn)[..., 1:2]),
         dead_arm=constant(arm[..., IN_PLANE, :][..., IN_PLANE]),
@@ -95,13 +95,13 @@ def in_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
     )
 
 
-def out_of_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
+def out_of_frame(loads: BodyLoads, frame: Float[Array, "3 3"]) -> BodyLoads:
     """Loads of the plane that x and z of a frame span as those of space."""
     turn = np.asarray(frame)
     plane, about = turn[:, IN_PLANE], turn[:, 1]
     following = np.asarray(loads.following) @ np.eye(6)[PLANE]
     turned = [following[..., part] @ turn.T for part in (_FIRST, _LAST)]
-    return Applied(
+    return BodyLoads(
         dead_force=constant(np.asarray(loads.dead_force) @ plane.T),
         dead_moment=constant(np.asarray(loads.dead_moment) * about),
         dead_arm=constant(plane @ np.asarray(loads.dead_arm) @ plane.T),
@@ -112,7 +112,7 @@ def out_of_frame(loads: Applied, frame: Float[Array, "3 3"]) -> Applied:
 _FIRST, _LAST = slice(0, 3), slice(3, 6)
 
 
-def body_wrench(rotation: Float[Array, "d d"], one: Applied) -> Float[Array, " w"]:
+def body_wrench(rotation: Float[Array, "d d"], one: BodyLoads) -> Float[Array, " w"]:
     """Wrench (moment, force) of the loads on one body, about its origin, in its frame.
 
     Args:
@@ -123,7 +123,7 @@ def body_wrench(rotation: Float[Array, "d d"], one: Applied) -> Float[Array, " w
         The wrench, N mm and N; plain or traced numbers as given.
 
     Example:
-        >>> at_side = Applied(np.eye(3)[2], np.zeros(3), np.outer([2.0, 0, 0], [0, 0, 1.0]), 0.0)
+        >>> at_side = BodyLoads(np.eye(3)[2], np.zeros(3), np.outer([2.0, 0, 0], [0, 0, 1.0]), 0.0)
         >>> body_wrench(np.eye(3), at_side).tolist()
         [0.0, -2.0, 0.0, 0.0, 0.0, 1.0]
     """
@@ -308,4 +308,4 @@ def _sums(
     return table[:, :d], table[:, d:moments], arm, table[:, arms_end:]
 
 
-__all__ = ["Applied", "applied", "body_wrench", "follows", "is_planar", "is_unloaded"]
+__all__ = ["BodyLoads", "applied", "body_wrench", "follows", "is_planar", "is_unloaded"]

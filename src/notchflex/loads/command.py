@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import constant, jax, jnp
-from notchflex.loads.applied import Applied, applied
+from notchflex.loads.applied import BodyLoads, applied
 from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.chain import Chain
 from notchflex.robot import Robot
@@ -25,7 +25,7 @@ class Command(NamedTuple):
 
     value: Float[Array, " t"]
     by_stroke: Bool[Array, " t"] | None
-    applied: Applied | None
+    applied: BodyLoads | None
 
     def either(self, by_stroke: Array, by_tension: Array) -> Array:
         """Of two values per tendon the one that belongs to what is demanded of it."""
@@ -36,12 +36,12 @@ class Command(NamedTuple):
         )
 
 
-def tensions_alone(value: Float[np.ndarray, "s t"]) -> Command:
+def tension_commands(value: Float[np.ndarray, "s t"]) -> Command:
     """Tensions of every tendon (N), loads as leading axis, and nothing else."""
     return Command(constant(value), None, None)
 
 
-def filled(commands: Command, flexures: int, by_stroke: bool) -> Command:
+def pad_commands(commands: Command, flexures: int, by_stroke: bool) -> Command:
     """Loads, as leading axis, for a chain with more flexures that carry none.
 
     Args:
@@ -60,7 +60,7 @@ def filled(commands: Command, flexures: int, by_stroke: bool) -> Command:
     return Command(commands.value, drawn, others)
 
 
-def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
+def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     """The loads as the solver takes them; a tendon that is not commanded is pulled with 0 N."""
     no_stroke = np.isnan(load.stroke)
     drawn, value = None, np.where(np.isnan(load.tension), 0.0, load.tension)
@@ -79,4 +79,4 @@ def command(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     return Command(constant(value), drawn, others)
 
 
-__all__ = ["Command", "command", "filled", "tensions_alone"]
+__all__ = ["Command", "make_commands", "pad_commands", "tension_commands"]

@@ -12,7 +12,7 @@ import numpy as np
 from notchflex.errors import InputError
 from notchflex.loads.load import BASE_TURN, NO_TURN, Load
 from notchflex.loads.load_path import LoadPath
-from notchflex.loads.validation import number, shown, vector
+from notchflex.loads.validation import number, short_repr, vector
 
 _FORM = "a number, or one entry per tendon with None where nothing is commanded"
 
@@ -55,7 +55,7 @@ def _several(loads: Any) -> list[Load]:
         every = list(loads)
     except TypeError:
         raise InputError.WRONG_TYPE(
-            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {shown(loads)}"
+            f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {short_repr(loads)}"
         ) from None
     if not every:
         raise InputError.NO_DATA("there are no loads; give at least one")
@@ -86,7 +86,7 @@ def _entries(value: Any, tendons: int, what: str) -> list[float]:
             continue
         entries[i] = number(entry, what, _FORM)
         if not isfinite(entries[i]):
-            raise InputError.NOT_FINITE(f"{what} must be finite; got {shown(entry)}")
+            raise InputError.NOT_FINITE(f"{what} must be finite; got {short_repr(entry)}")
     return entries
 
 

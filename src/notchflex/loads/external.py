@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from notchflex.errors import InputError
-from notchflex.loads.validation import number, shown, truth, vector, whole
+from notchflex.loads.validation import number, short_repr, truth, vector, whole
 
 # Standard gravity in the world, m/s^2: what a mass hangs by where no gravity is given.
 HANGING = (0.0, 0.0, -9.81)
@@ -147,7 +147,7 @@ def _body_forces(value: Any) -> tuple[BodyForce, ...]:
     several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     if not several or not all(isinstance(one, BodyForce) for one in value):
         raise InputError.WRONG_TYPE(
-            f"body_forces must be a list of notchflex.BodyForce(body, force); got {shown(value)}"
+            f"body_forces must be a list of notchflex.BodyForce(body, force); got {short_repr(value)}"
         )
     return tuple(value)
 

@@ -15,7 +15,7 @@ from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
 from notchflex.loads.external import EXTERNAL, NOTHING, BodyForce, ExternalLoad
 from notchflex.loads.load import BASE_TURN, Load
-from notchflex.loads.validation import shown, table, vector
+from notchflex.loads.validation import short_repr, table, vector
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,7 +157,7 @@ class LoadPath(Displayed):
         """
         if not isinstance(following, LoadPath):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError.WRONG_TYPE(
-                f"a load path goes on with another notchflex.LoadPath; got {shown(following)}"
+                f"a load path goes on with another notchflex.LoadPath; got {short_repr(following)}"
             )
         count = max(self.tension.shape[1], following.tension.shape[1])
         first, second = self.for_tendons(count), following.for_tendons(count)
@@ -240,7 +240,7 @@ class LoadPath(Displayed):
         )
 
 
-def joined_paths(paths: Sequence[LoadPath]) -> LoadPath:
+def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
     """Paths for equally many tendons one after the other, as one.
 
     Raises:
@@ -274,7 +274,7 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     except TypeError:
         raise InputError.WRONG_TYPE(
             "external of a load path must hold one ExternalLoad per step; "
-            f"got {shown(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
+            f"got {short_repr(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
         ) from None
     if given and len(given) != steps:
         raise InputError.WRONG_SHAPE(
@@ -286,4 +286,4 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
     return given or (NOTHING,) * steps
 
 
-__all__ = ["LoadPath", "joined_paths"]
+__all__ = ["LoadPath", "join_paths"]

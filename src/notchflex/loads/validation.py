@@ -26,7 +26,7 @@ def number(value: Any, what: str, form: str = "a number") -> float:
             raise TypeError
         return float(value)
     except (TypeError, ValueError, OverflowError):
-        raise InputError.WRONG_TYPE(f"{what} must be {form}; got {shown(value)}") from None
+        raise InputError.WRONG_TYPE(f"{what} must be {form}; got {short_repr(value)}") from None
 
 
 def whole(value: Any, what: str) -> int:
@@ -40,7 +40,9 @@ def whole(value: Any, what: str) -> int:
             raise TypeError
         return operator.index(value)
     except TypeError:
-        raise InputError.WRONG_TYPE(f"{what} must be a whole number; got {shown(value)}") from None
+        raise InputError.WRONG_TYPE(
+            f"{what} must be a whole number; got {short_repr(value)}"
+        ) from None
 
 
 def truth(value: Any, what: str) -> bool:
@@ -51,7 +53,7 @@ def truth(value: Any, what: str) -> bool:
     """
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise InputError.WRONG_TYPE(f"{what} must be True or False; got {shown(value)}")
+    raise InputError.WRONG_TYPE(f"{what} must be True or False; got {short_repr(value)}")
 
 
 def vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
@@ -80,7 +82,7 @@ def vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
             numbers = []
     if len(numbers) != 3 or not all(isfinite(one) for one in numbers):
         raise InputError.NOT_FINITE(
-            f"{what} needs three finite numbers ({form}); got {shown(value)}"
+            f"{what} needs three finite numbers ({form}); got {short_repr(value)}"
         )
     return numbers[0], numbers[1], numbers[2]
 
@@ -103,11 +105,11 @@ def table(value: Any, what: str) -> np.ndarray:
         return np.asarray(value, float)
     except (TypeError, ValueError, OverflowError):
         raise InputError.WRONG_TYPE(
-            f"{what} of a load path must be numbers, steps by tendons; got {shown(value)}"
+            f"{what} of a load path must be numbers, steps by tendons; got {short_repr(value)}"
         ) from None
 
 
-def robot_given(value: Any) -> Robot:
+def check_is_robot(value: Any) -> Robot:
     """A robot.
 
     Raises:
@@ -115,12 +117,12 @@ def robot_given(value: Any) -> Robot:
     """
     if not isinstance(value, Robot):
         raise InputError.WRONG_TYPE(
-            f'a notchflex.Robot is needed, such as load_robot("pacheco2021-a"); got {shown(value)}'
+            f'a notchflex.Robot is needed, such as load_robot("pacheco2021-a"); got {short_repr(value)}'
         )
     return value
 
 
-def shown(value: Any) -> str:
+def short_repr(value: Any) -> str:
     """A value as Python writes it, cut short."""
     try:
         text = " ".join(repr(value).split())
@@ -129,4 +131,4 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-__all__ = ["number", "robot_given", "shown", "table", "truth", "vector", "whole"]
+__all__ = ["number", "check_is_robot", "short_repr", "table", "truth", "vector", "whole"]

@@ -16,7 +16,7 @@ from notchflex._summary import Displayed, Summary
 from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.applied import out_of_frame
-from notchflex.loads.command import Command, command
+from notchflex.loads.make_commands import Command, make_commands
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.motion import rotation_about
 from notchflex.results.equilibrium import Equilibrium
@@ -26,10 +26,10 @@ from notchflex.results.reason import why_not
 from notchflex.results.recorded import Recorded
 from notchflex.results.state import State
 from notchflex.robot import Robot
-from notchflex.solver.continuation import Solved
+from notchflex.solver.continuation import SolverState
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import Prepared
-from notchflex.solver.programs.run import Run
+from notchflex.solver.programs.prepare import PreparedChain
+from notchflex.solver.programs.run import SolverRun
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,8 +57,8 @@ class EquilibriumPath(PathQuantities, Displayed):
 
     robot: Robot
     load: LoadPath
-    prepared: Prepared
-    run: Run | Recorded
+    prepared: PreparedChain
+    run: SolverRun | Recorded
     each_from_rest: bool = False
     settings: Settings = DEFAULT
 
@@ -148,7 +148,7 @@ class EquilibriumPath(PathQuantities, Displayed):
     @cached_property
     def commands(self) -> Command:
         """The loads as the solver takes them."""
-        return command(self.load, self.robot, self.chain)
+        return make_commands(self.load, self.robot, self.chain)
 
     @cached_property
     def stability(self) -> tuple[np.ndarray, np.ndarray]:
@@ -158,7 +158,9 @@ class EquilibriumPath(PathQuantities, Displayed):
 
     def state_at(self, step: int) -> State:
         """State after a step (or the last good one before it), to save or continue from."""
-        solved: Solved = tree_util.tree_map(lambda leaf: np.asarray(leaf)[step], self.run.solved)
+        solved: SolverState = tree_util.tree_map(
+            lambda leaf: np.asarray(leaf)[step], self.run.solved
+        )
         chain = self.chain
         if solved.applied is not None and chain.frame is not None:
             solved = solved._replace(applied=out_of_frame(solved.applied, chain.frame))

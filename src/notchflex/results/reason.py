@@ -10,8 +10,8 @@ from jaxtyping import Int
 
 from notchflex._jax import constant, jax
 from notchflex.errors import Failure
-from notchflex.solver.actuation import drawn_when_closed
-from notchflex.solver.programs.prepare import Prepared
+from notchflex.solver.actuation import closing_stroke
+from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import run
 
 if TYPE_CHECKING:  # for the type only: a path tells its reasons
@@ -60,7 +60,7 @@ def _said(failure: Failure, last: str = "", **values: object) -> tuple[Failure, 
 
 def _past_closing(path: EquilibriumPath, step: int) -> bool:
     """Whether a stroke of a step is more than an inextensible tendon can lose."""
-    reach = drawn_when_closed(path.chain)
+    reach = closing_stroke(path.chain)
     inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
     return bool((inextensible & (path.load.stroke[step] >= reach)).any())
 
@@ -76,7 +76,7 @@ def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray,
     tensions: list[np.ndarray] = []
     for forces in _STIFFNESSES if asked.any() else ():
         stiffness = np.where(inextensible, forces * chain.closing_force, chain.axial_stiffness)
-        softer = Prepared(dataclasses.replace(chain, axial_stiffness=constant(stiffness)))
+        softer = PreparedChain(dataclasses.replace(chain, axial_stiffness=constant(stiffness)))
         command = jax.tree.map(lambda leaf: np.asarray(leaf)[step : step + 1], path.commands)
         start = jax.tree.map(lambda leaf: np.asarray(leaf)[step], path.run.solved)
         came = run(softer, command, start, path.settings, each_from_start=True)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from notchflex.loads.command import Command
-from notchflex.solver.continuation import Solved
+from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.quantities import STATE, Shape
 
 TOLD = (*Shape._fields, *STATE)
@@ -21,7 +21,7 @@ BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """States of many loads, loads as leading axis, as `Run` has them.
+    """States of many loads, loads as leading axis, as `SolverRun` has them.
 
     Attributes:
         solved: The last solved state at each load.
@@ -35,7 +35,7 @@ class Recorded:
         reached: Part of the way from the load before that was reached.
     """
 
-    solved: Solved
+    solved: SolverState
     told: Mapping[str, np.ndarray]
     first: Mapping[str, np.ndarray]
     held: tuple[np.ndarray, np.ndarray]

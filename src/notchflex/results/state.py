@@ -17,7 +17,7 @@ from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.results.same_robot import mismatch
 from notchflex.robot import Robot
-from notchflex.solver.continuation import Solved, at_rest
+from notchflex.solver.continuation import SolverState, at_rest
 
 _MODES = ".point.unknowns.modes"
 _LOADS = ".applied"
@@ -39,7 +39,7 @@ class State(Displayed):
     """
 
     robot: str
-    solved: Solved
+    solved: SolverState
     level: str
     loaded: bool
     refinement: int
@@ -161,7 +161,7 @@ class SavedState:
         """Whether any load in it may turn with a body."""
         return self.loaded
 
-    def fitted(self, chain: Chain) -> Solved:
+    def fitted(self, chain: Chain) -> SolverState:
         """The state for a chain.
 
         Raises:
@@ -209,7 +209,7 @@ def check_robot(state: State | SavedState, robot: Robot) -> None:
         )
 
 
-def fitted(state: State | SavedState | None, chain: Chain) -> Solved:
+def fitted(state: State | SavedState | None, chain: Chain) -> SolverState:
     """What to start from: rest, or a state that must fit the chain."""
     if state is None:
         return at_rest(chain)
@@ -218,7 +218,7 @@ def fitted(state: State | SavedState | None, chain: Chain) -> Solved:
     return _on_chain(state.arrays, chain, f"the state belongs to robot {state.robot!r}")
 
 
-def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solved:
+def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> SolverState:
     """A state on a chain that may have been assembled for more loads than that of the state."""
     rest = at_rest(chain)
     frame = chain.frame
@@ -238,7 +238,7 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solved
                 "continue from a state of the same robot"
             )
         fitting.append(array)
-    found: Solved = tree_util.tree_unflatten(structure, fitting)
+    found: SolverState = tree_util.tree_unflatten(structure, fitting)
     if found.applied is not None and frame is not None:
         found = found._replace(applied=in_frame(found.applied, frame))
     return found

@@ -11,16 +11,18 @@ from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.contact import closing_travel
 from notchflex.mechanics.flexure import fibre_stretch, of_rod
 from notchflex.mechanics.tendon.wall_arc import WallArc
-from notchflex.solver.residual import Base
+from notchflex.solver.residual import BaseReaction
 
 
-def stroke(chain: Chain, base_tension: Float[Array, " t"], base: Base) -> Float[Array, " t"]:
+def stroke(
+    chain: Chain, base_tension: Float[Array, " t"], base: BaseReaction
+) -> Float[Array, " t"]:
     """Tendon drawn out at the base since the free robot (mm), with the file's stiffness."""
     stretch = base.stretch + base_tension * chain.free_length
-    return base.drawn + stretch / chain.axial_stiffness
+    return base.released_length + stretch / chain.axial_stiffness
 
 
-def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
+def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
     """Stroke at which every notch is closed (mm), infinite where that is not known beforehand.
 
     Where every notch closes against its spine, a tendon on the wall shortens by the notch's
@@ -42,14 +44,14 @@ def drawn_when_closed(chain: Chain) -> Float[np.ndarray, " t"]:
 
 
 def command_residual(
-    chain: Chain, command: Command, base_tension: Float[Array, " t"], base: Base
+    chain: Chain, command: Command, base_tension: Float[Array, " t"], base: BaseReaction
 ) -> Float[Array, " t"]:
     """How far the tendons are from what is demanded, scaled to be comparable with angles.
 
     A tendon drawn by stroke is slack where the robot has set free more than is drawn:
     tension >= 0, stroke set free >= stroke demanded, product 0.
     """
-    scale = chain.drawn_stiffness
+    scale = chain.stroke_stiffness
     missing = stroke(chain, base_tension, base) - command.value
     # Told apart, not subtracted from one another: beside a large tension the rest would be lost.
     by_stroke = jnp.where(base_tension >= scale * missing, missing, base_tension / scale)
@@ -62,7 +64,7 @@ def command_residual(
 _MOST_CLOSING_FORCES = 1e5
 
 
-def bearable(
+def tension_is_bounded(
     chain: Chain, command: Command, base_tension: Float[Array, " t"]
 ) -> Bool[Array, ""] | bool:
     """Whether tensions that were found for strokes are far from what any robot can bear.

@@ -28,14 +28,14 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual
 from notchflex.solver.element import Memory, Unknowns
-from notchflex.solver.layout import Layout, layout
-from notchflex.solver.linearisation import blocks
+from notchflex.solver.linearisation import linearise
 from notchflex.solver.residual import Evaluation
+from notchflex.solver.row_layout import RowLayout, row_layout
 
 _HELD, _TIED = 1e-9, 1e-7
 
 
-class Step(NamedTuple):
+class NewtonStep(NamedTuple):
     """A linear step.
 
     Attributes:
@@ -54,7 +54,7 @@ def linear_step(
     memory: Memory,
     base_tension: Float[Array, " t"],
     at: Evaluation,
-) -> Step:
+) -> NewtonStep:
     """Solve the linearised balance for the step that would meet it.
 
     Args:
@@ -71,14 +71,14 @@ def linear_step(
     Returns:
         The step.
     """
-    form = layout(chain, by_stroke=command.by_stroke is not None)
+    form = row_layout(chain, by_stroke=command.by_stroke is not None)
     here = (chain, unknowns, memory, command.applied, at)
-    rows = blocks(*jax.tree.map(jax.lax.stop_gradient, here), form=form)
+    rows = linearise(*jax.tree.map(jax.lax.stop_gradient, here), form=form)
     imbalance = jax.vmap(lambda tree: ravel_pytree(tree)[0])(at.residual)
     own = form.unknowns
     # Own unknowns as functions of 1, what is carried, and what comes back: du = answer @ (1, c, b).
     right = jnp.concatenate([imbalance[..., None], rows.residual[..., own:]], axis=-1)
-    answer = -eliminated(rows.residual[..., :own], right)
+    answer = -gauss_jordan(rows.residual[..., :own], right)
 
     def answered(row: Array) -> Array:
         unasked = jnp.pad(row[..., own:], ((0, 0), (0, 0), (1, 0)))
@@ -93,7 +93,7 @@ def linear_step(
     known = _from_base(passed, jnp.asarray(leave) @ tension_step)
     steps = jnp.einsum("nuz,nz->nu", answer, known)
     _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
-    return Step(jax.vmap(unknowns_of)(steps), tension_step)
+    return NewtonStep(jax.vmap(unknowns_of)(steps), tension_step)
 
 
 def _drawn(
@@ -107,25 +107,25 @@ def _drawn(
     order = chain.tendon_order
     assert command.by_stroke is not None
 
-    def demand(tension: Array, drawn: Array, stretch: Array) -> Array:
-        base = at.base._replace(drawn=drawn, stretch=stretch)
+    def demand(tension: Array, released_length: Array, stretch: Array) -> Array:
+        base = at.base._replace(released_length=released_length, stretch=stretch)
         return command_residual(chain, command, tension, base)
 
-    here = (base_tension, at.base.drawn, at.base.stretch)
+    here = (base_tension, at.base.released_length, at.base.stretch)
     slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, here))
     back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
     # Rows in the order of the robot's tendons.
-    drawn, stretch = jnp.stack([back[:, place] for place in np.argsort(order)], axis=1)
-    by_base = slopes[1] @ drawn + slopes[2] @ stretch
+    released_length, stretch = jnp.stack([back[:, place] for place in np.argsort(order)], axis=1)
+    by_base = slopes[1] @ released_length + slopes[2] @ stretch
     matrix = slopes[0] + by_base[:, 1:]
     # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; a
     # small entry keeps such a step finite.
     tied = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _TIED)
     missing = demand(*here) + by_base[:, 0]
-    return -eliminated(matrix + _HELD * jnp.diag(tied.astype(float)), missing[:, None])[:, 0]
+    return -gauss_jordan(matrix + _HELD * jnp.diag(tied.astype(float)), missing[:, None])[:, 0]
 
 
-def _leaving(chain: Chain, form: Layout) -> Float[np.ndarray, "c t"]:
+def _leaving(chain: Chain, form: RowLayout) -> Float[np.ndarray, "c t"]:
     """What is carried to the first flexure, per unit of base tension: the tension itself."""
     order, carried = chain.tendon_order, form.carried
     leave = np.zeros((carried, chain.tendons))
@@ -134,7 +134,7 @@ def _leaving(chain: Chain, form: Layout) -> Float[np.ndarray, "c t"]:
 
 
 def _from_tip(
-    onward: Float[Array, "n c z"], behind: Float[Array, "n b z"], form: Layout
+    onward: Float[Array, "n c z"], behind: Float[Array, "n b z"], form: RowLayout
 ) -> tuple[tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]], Float[Array, "b 1+c"]]:
     """Eliminate what passes between neighbours, one after the other from the tip on.
 
@@ -156,7 +156,7 @@ def _from_tip(
         onward, behind = item
         by_back = onward[:, own:]
         right = _more(onward[:, :own], by_back @ back[:, 0])
-        carried_on = eliminated(one - by_back @ back[:, 1:], right)
+        carried_on = gauss_jordan(one - by_back @ back[:, 1:], right)
         returned = _more(back[:, 1:] @ carried_on, back[:, 0])
         return behind[:, :own] + behind[:, own:] @ returned, (carried_on, returned)
 
@@ -183,7 +183,7 @@ def _from_base(
     return jax.lax.scan(follow, carried, passed)[1]
 
 
-def eliminated(
+def gauss_jordan(
     matrix: Float[Array, "*n u u"], right: Float[Array, "*n u r"]
 ) -> Float[Array, "*n u r"]:
     """Solutions of small systems, by Gauss and Jordan.

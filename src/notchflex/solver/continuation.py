@@ -9,15 +9,15 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import constant, jax, jnp
-from notchflex.loads.applied import Applied
+from notchflex.loads.applied import BodyLoads
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.element import Memory, Unknowns
-from notchflex.solver.friction_predictor import played
-from notchflex.solver.newton import NewtonResult, Point, Settings, newton
+from notchflex.solver.friction_predictor import predict_log_ratios
+from notchflex.solver.newton import Iterate, NewtonResult, Settings, newton
 
 
-class Solved(NamedTuple):
+class SolverState(NamedTuple):
     """A solved state and all that the next one needs: the state that can be saved.
 
     Attributes:
@@ -27,13 +27,13 @@ class Solved(NamedTuple):
         applied: Other loads on the bodies; None for a chain assembled for tendons alone.
     """
 
-    point: Point
+    point: Iterate
     memory: Memory
     stroke: Float[Array, " t"]
-    applied: Applied | None
+    applied: BodyLoads | None
 
 
-class Advance(NamedTuple):
+class LoadStepResult(NamedTuple):
     """What came of one load.
 
     Attributes:
@@ -47,13 +47,13 @@ class Advance(NamedTuple):
         part_before: Part of the way at which that state is.
     """
 
-    solved: Solved
+    solved: SolverState
     residual: Float[Array, ""]
     iterations: Int[Array, ""]
     converged: Bool[Array, ""]
     reached: Float[Array, ""]
     parts: Int[Array, ""]
-    between: Solved
+    between: SolverState
     part_before: Float[Array, ""]
 
 
@@ -64,34 +64,36 @@ _ON_THE_WAY, _AT_MOST = 1e3, 1e-10
 _LOADS_ON = 0.5
 
 
-def at_rest(chain: Chain) -> Solved:
+def at_rest(chain: Chain) -> SolverState:
     """The free robot with slack tendons that have not yet slid."""
     none = tuple(constant(np.zeros((*group.present.shape, 2))) for group in chain.groups)
     unknowns = Unknowns(
         modes=constant(np.zeros(chain.stiffness.shape)),
-        lip_force=tuple(constant(np.zeros(group.closes.shape)) for group in chain.lips),
+        contact_force=tuple(
+            constant(np.zeros(group.has_contact.shape)) for group in chain.contact_pairs
+        ),
         log_ratio=none,
     )
     slack = constant(np.zeros(chain.tendons))
-    return Solved(Point(unknowns, slack), Memory(none, none, none), slack, unloaded(chain))
+    return SolverState(Iterate(unknowns, slack), Memory(none, none, none), slack, unloaded(chain))
 
 
-def unloaded(chain: Chain) -> Applied | None:
+def unloaded(chain: Chain) -> BodyLoads | None:
     """No loads on any body, as a chain takes them."""
     if not chain.loaded:
         return None
     bodies = chain.flexures + 1
     d, a = (3, 3) if chain.frame is None else (2, 1)
     shapes = ((d,), (a,), (d, d), (a + d,))
-    return Applied(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
+    return BodyLoads(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
 
 
-def advance(
+def solve_load_step(
     chain: Chain,
     command: Command,
-    last: Solved,
+    last: SolverState,
     settings: Settings,
-) -> Advance:
+) -> LoadStepResult:
     """Follow a load from a solved state.
 
     The whole way is tried first. Where Newton's method fails, the way is halved until it
@@ -111,18 +113,18 @@ def advance(
     """
     loads_first = _loads_first(chain, last)
 
-    def attempt(solved: Solved, part: Array) -> tuple[NewtonResult, Command]:
-        wanted = on_the_way(chain, command, last, part)
+    def attempt(solved: SolverState, part: Array) -> tuple[NewtonResult, Command]:
+        wanted = interpolate_command(chain, command, last, part)
         tension = wanted.either(solved.point.base_tension, wanted.value)
-        guess = played(chain, solved.point.base_tension, tension, solved.memory)
-        start = Point(solved.point.unknowns._replace(log_ratio=guess), tension)
+        guess = predict_log_ratios(chain, solved.point.base_tension, tension, solved.memory)
+        start = Iterate(solved.point.unknowns._replace(log_ratio=guess), tension)
         before = solved.point.base_tension
         enough = jnp.minimum(_ON_THE_WAY * settings.tolerance, _AT_MOST)
         enough = jnp.where(part < 1.0, enough, 0.0)
         found = newton(chain, wanted, solved.memory, before, start, settings, enough)
         return found, wanted
 
-    def going(state: tuple[Advance, Array, Array]) -> Bool[Array, ""]:
+    def going(state: tuple[LoadStepResult, Array, Array]) -> Bool[Array, ""]:
         advanced, part, tries = state
         return (
             ~advanced.converged
@@ -131,7 +133,7 @@ def advance(
             & (advanced.iterations < settings.max_all_iterations)
         )
 
-    def follow(state: tuple[Advance, Array, Array]) -> tuple[Advance, Array, Array]:
+    def follow(state: tuple[LoadStepResult, Array, Array]) -> tuple[LoadStepResult, Array, Array]:
         advanced, part, tries = state
         stop = jnp.where(loads_first & (advanced.reached < _LOADS_ON), _LOADS_ON, 1.0)
         aim = jnp.minimum(advanced.reached + part, stop)
@@ -140,9 +142,9 @@ def advance(
         solved = jax.tree.map(
             lambda old, new: jnp.where(found.converged, new, old),
             advanced.solved,
-            Solved(found.point, remembered, found.stroke, wanted.applied),
+            SolverState(found.point, remembered, found.stroke, wanted.applied),
         )
-        advanced = Advance(
+        advanced = LoadStepResult(
             solved=solved,
             residual=found.residual,
             iterations=advanced.iterations + found.iterations,
@@ -158,7 +160,7 @@ def advance(
         )
         return advanced, jnp.where(found.converged, 2.0 * part, 0.5 * part), tries + 1
 
-    start = Advance(
+    start = LoadStepResult(
         solved=last,
         residual=jnp.array(jnp.inf),
         iterations=jnp.zeros((), int),
@@ -172,7 +174,9 @@ def advance(
     return advanced
 
 
-def on_the_way(chain: Chain, command: Command, last: Solved, part: Float[Array, ""]) -> Command:
+def interpolate_command(
+    chain: Chain, command: Command, last: SolverState, part: Float[Array, ""]
+) -> Command:
     """The command at a part of the way from a solved state; exactly the wanted one at its end."""
     loads_first = _loads_first(chain, last)
     from_here = command.either(last.stroke, last.point.base_tension)
@@ -186,7 +190,7 @@ def on_the_way(chain: Chain, command: Command, last: Solved, part: Float[Array, 
     )
 
 
-def _loads_first(chain: Chain, last: Solved) -> Bool[Array, ""]:
+def _loads_first(chain: Chain, last: SolverState) -> Bool[Array, ""]:
     """Whether other loads come on before the tendons."""
     slack = jnp.all(last.point.base_tension == 0.0)
     return slack if chain.loaded else jnp.array(False)

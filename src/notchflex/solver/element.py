@@ -16,7 +16,7 @@ from notchflex.mechanics.chain import Chain
 # The memory law x = clip(x + rate (slip - (x - x_prev) / stiction)). The rate is how strongly slip
 # drives the logarithm while Newton searches, and drops out at the solution; the stiction only
 # keeps the equation regular where a slack tendon makes the tension ratio meaningless. Both are
-# per slip in heights of the notch, so that a robot of another size is solved alike.
+# per slip in notch_heights of the notch, so that a robot of another size is solved alike.
 RATE = 8.0
 STICTION = 1e15
 
@@ -26,13 +26,13 @@ class Unknowns(NamedTuple):
 
     Attributes:
         modes: Amplitudes of the strain modes.
-        lip_force: Contact forces of the lips, N, for each kind of lips.
+        contact_force: Contact forces of the lips, N, for each kind of lips.
         log_ratio: ln(tension on the base side / tip side) at both edges of the gap, for each
             group of tendons.
     """
 
     modes: Float[Array, "*n modes"]
-    lip_force: tuple[Float[Array, "*n l"], ...]
+    contact_force: tuple[Float[Array, "*n l"], ...]
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
 
 
@@ -50,12 +50,12 @@ class Memory(NamedTuple):
     bound: tuple[Float[Array, "*n t 2"], ...]
 
 
-def heights(chain: Chain) -> Float[Array, " n"]:
+def notch_heights(chain: Chain) -> Float[Array, " n"]:
     """Length of every flexure, mm: the scale of lengths."""
     return jnp.sum(chain.rods.length, axis=-1)
 
 
-def driven(
+def trial_log_ratio(
     chain: Chain,
     log_ratio: Float[Array, "n t 2"],
     slid: Float[Array, "n t 2"],
@@ -63,36 +63,39 @@ def driven(
     k: int,
 ) -> Float[Array, "n t 2"]:
     """Log ratios as slip drives them, before their bound stops them, of the k-th group."""
-    slip = (slid - memory.slid[k]) / heights(chain)[:, None, None]
+    slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
     return log_ratio + RATE * (slip - (log_ratio - memory.log_ratio[k]) / STICTION)
 
 
-def between(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
+def clip_symmetric(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
     """Clip to +-limit; at a tie the limit is followed, so that a contact at rest can slide."""
     return jnp.where(value >= limit, limit, jnp.where(value <= -limit, -limit, value))
 
 
-def at_bound(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
+def bound_side(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
     """+1 where a log ratio lies on its upper bound, -1 on its lower, 0 inside."""
     near = 1e-9
     return jnp.where(value >= limit - near, 1, jnp.where(value <= -limit + near, -1, 0))
 
 
-def pressed(
+def is_active(
     stiffness: Float[Array, " n"],
-    closes: Float[Array, "n l"],
+    has_contact: Float[Array, "n l"],
     force: Float[Array, "n l"],
     gap: Float[Array, "n l"],
 ) -> Bool[Array, "n l"]:
     """Which lips press, by Signorini's condition: force >= 0, gap >= 0, product 0."""
-    return (force - stiffness[:, None] * gap > 0.0) & (closes > 0.0)
+    return (force - stiffness[:, None] * gap > 0.0) & (has_contact > 0.0)
 
 
 def signorini(
-    chain: Chain, closes: Float[Array, "n l"], force: Float[Array, "n l"], gap: Float[Array, "n l"]
+    chain: Chain,
+    has_contact: Float[Array, "n l"],
+    force: Float[Array, "n l"],
+    gap: Float[Array, "n l"],
 ) -> Float[Array, "n l"]:
     """What is left of Signorini's condition as one equation, scaled to be a part of a height."""
-    stiffness = chain.lip_stiffness
-    by_force = force / (stiffness * heights(chain))[:, None]
-    by_gap = gap / heights(chain)[:, None]
-    return jnp.where(pressed(stiffness, closes, force, gap), by_gap, by_force)
+    stiffness = chain.contact_stiffness
+    by_force = force / (stiffness * notch_heights(chain))[:, None]
+    by_gap = gap / notch_heights(chain)[:, None]
+    return jnp.where(is_active(stiffness, has_contact, force, gap), by_gap, by_force)

@@ -22,7 +22,7 @@ from notchflex.solver.element import Memory
 _SLACK = 1e-100
 
 
-def played(
+def predict_log_ratios(
     chain: Chain,
     before: Float[Array, " t"],
     now: Float[Array, " t"],

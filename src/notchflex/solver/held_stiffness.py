@@ -20,16 +20,16 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual
-from notchflex.solver.continuation import Solved
-from notchflex.solver.element import Memory, at_bound
-from notchflex.solver.layout import Layout, layout
-from notchflex.solver.linearisation import Blocks, blocks
-from notchflex.solver.programs.capacity import lengthen
+from notchflex.solver.continuation import SolverState
+from notchflex.solver.element import Memory, bound_side
+from notchflex.solver.linearisation import LinearisedRows, linearise
+from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.prepare import Prepared
-from notchflex.solver.programs.pytree_layout import Form, lane_sizes
-from notchflex.solver.programs.static_structure import KnownForm
+from notchflex.solver.programs.prepare import PreparedChain
+from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
+from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.residual import evaluate
+from notchflex.solver.row_layout import RowLayout, row_layout
 
 # Closed lips and tendons drawn by stroke are held by springs this much stiffer than the notches:
 # they only stiffen; without it their forces would be multipliers and the stiffness not defined.
@@ -40,7 +40,7 @@ _SLIP = 1e-3
 _PIECE = 16
 
 
-class Held(NamedTuple):
+class HeldStiffness(NamedTuple):
     """Stiffness of some states.
 
     Attributes:
@@ -52,7 +52,9 @@ class Held(NamedTuple):
     sign: Float[np.ndarray, " s"]
 
 
-def held_stiffness(prepared: Prepared, commands: Command, solved: Solved) -> Iterator[Held]:
+def held_stiffness(
+    prepared: PreparedChain, commands: Command, solved: SolverState
+) -> Iterator[HeldStiffness]:
     """Find the stiffness of the whole robot in every state, some states at a time.
 
     Args:
@@ -65,18 +67,18 @@ def held_stiffness(prepared: Prepared, commands: Command, solved: Solved) -> Ite
         The stiffness of the next states; NaN where a state is none.
     """
     long = prepared.long
-    loads, command_form = prepared.long_commands(commands)
+    loads, command_layout = prepared.padded_commands(commands)
     packed = np.asarray(prepared.state.pack(solved, leading=1))
-    states = lengthen(packed, prepared.state, long.state)
-    form = layout(prepared.chain, by_stroke=commands.by_stroke is not None)
-    forms = (long.known_form, command_form, long.state)
+    states = pad_rows(packed, prepared.state, long.state)
+    form = row_layout(prepared.chain, by_stroke=commands.by_stroke is not None)
+    forms = (long.static_structure, command_layout, long.state)
     for start in range(0, len(loads), _PIECE):
         some = slice(start, start + _PIECE)
-        given = (np.zeros(1), long.known_vector, loads[some], states[some])
+        given = (np.zeros(1), long.dynamic_vector, loads[some], states[some])
         *rows, slopes = _rows.along((False, False, True, True), *given, *forms)
-        rows = Blocks(*(one[:, : prepared.chain.flexures] for one in rows))
-        drawn = None if commands.by_stroke is None else np.asarray(commands.by_stroke)[some]
-        matrix = _whole(prepared.chain, form, rows, slopes, drawn)
+        rows = LinearisedRows(*(one[:, : prepared.chain.flexures] for one in rows))
+        by_stroke = None if commands.by_stroke is None else np.asarray(commands.by_stroke)[some]
+        matrix = _whole(prepared.chain, form, rows, slopes, by_stroke)
         yield _condensed(prepared.chain, form, matrix)
 
 
@@ -86,42 +88,46 @@ def _rows(
     vector: Float[Array, " chain"],
     load: Float[Array, " command"],
     state: Float[Array, " state"],
-    chain_form: KnownForm,
-    command_form: Form,
-    state_form: Form,
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
 ) -> tuple[Array, tuple[Array, ...]]:
     """Rows of all flexures of a state, and slopes of what is demanded of the tendons.
 
     Nothing is carried from state to state.
     """
-    solved = state_form.unpack(state)
-    rows, slopes = _linearised(chain_form.unpack(vector), command_form.unpack(load), solved)
+    solved = state_layout.unpack(state)
+    rows, slopes = _linearised(chain_layout.unpack(vector), command_layout.unpack(load), solved)
     return carried, (*rows, slopes)
 
 
-def _linearised(chain: Chain, command: Command, solved: Solved) -> tuple[Blocks, Array]:
+def _linearised(
+    chain: Chain, command: Command, solved: SolverState
+) -> tuple[LinearisedRows, Array]:
     unknowns, tension = solved.point.unknowns, solved.point.base_tension
     at = evaluate(chain, unknowns, solved.memory, tension, solved.applied)
     slid = tuple(
-        span.slid - _SLIP * at_bound(ratio, span.bound)
+        span.slid - _SLIP * bound_side(ratio, span.bound)
         for span, ratio in zip(at.spans, unknowns.log_ratio, strict=True)
     )
     memory = Memory(unknowns.log_ratio, slid, tuple(span.bound for span in at.spans))
-    form = layout(chain, by_stroke=command.by_stroke is not None)
-    rows = blocks(chain, unknowns, memory, solved.applied, at, form)
+    form = row_layout(chain, by_stroke=command.by_stroke is not None)
+    rows = linearise(chain, unknowns, memory, solved.applied, at, form)
 
-    def demand(tension: Array, drawn: Array, stretch: Array) -> Array:
-        base = at.base._replace(drawn=drawn, stretch=stretch)
+    def demand(tension: Array, released_length: Array, stretch: Array) -> Array:
+        base = at.base._replace(released_length=released_length, stretch=stretch)
         return command_residual(chain, command, tension, base)
 
-    slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(tension, at.base.drawn, at.base.stretch)
+    slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(
+        tension, at.base.released_length, at.base.stretch
+    )
     return rows, jnp.stack(slopes)
 
 
 def _whole(
     chain: Chain,
-    form: Layout,
-    rows: Blocks,
+    form: RowLayout,
+    rows: LinearisedRows,
     slopes: Float[np.ndarray, "s 3 t t"],
     by_stroke: np.ndarray | None,
 ) -> Float[np.ndarray, "s m m"]:
@@ -158,8 +164,8 @@ def _whole(
         back = put(by_own, number) + by_carried @ carried[number] + by_back @ back
     on_diagonal = np.zeros((flexures, own))
     natural_gap = np.asarray(chain.rods.length).sum(-1)
-    give = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.lip_stiffness) * natural_gap)
-    on_diagonal[:, form.modes : form.modes + sum(form.lips)] = give[:, None]
+    give = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
+    on_diagonal[:, form.modes : form.modes + sum(form.contact_pairs)] = give[:, None]
     every = np.arange(flexures * own)
     matrix[:, every, every] += on_diagonal.ravel()
     if by_stroke is not None:
@@ -169,15 +175,15 @@ def _whole(
         )
         matrix[:, tensions] = slopes[:, 1] @ lengths[0] + slopes[:, 2] @ lengths[1]
         matrix[:, tensions[:, None], tensions] += slopes[:, 0]
-        soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.drawn_stiffness))
+        soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
         matrix[:, tensions, tensions] += soft
     return matrix
 
 
-def _condensed(chain: Chain, form: Layout, matrix: Float[np.ndarray, "s m m"]) -> Held:
+def _condensed(chain: Chain, form: RowLayout, matrix: Float[np.ndarray, "s m m"]) -> HeldStiffness:
     """What is left of the system after all but the robot's own modes is eliminated."""
     # Modes that only fill up the arrays are none of the robot's.
-    idle = np.asarray(chain.rods.idle) > 0.0
+    idle = np.asarray(chain.rods.padding_mask) > 0.0
     of_flexures = np.zeros((chain.flexures, form.unknowns), bool)
     of_flexures[:, : form.modes] = True
     keep = np.zeros(matrix.shape[-1], bool)
@@ -191,4 +197,4 @@ def _condensed(chain: Chain, form: Layout, matrix: Float[np.ndarray, "s m m"]) -
     answer = np.linalg.solve(some[:, others[:, None], others], some[:, others[:, None], own])
     stiffness[whole] = some[:, own[:, None], own] - some[:, own[:, None], others] @ answer
     sign[whole] = np.linalg.slogdet(some)[0]
-    return Held(stiffness, sign)
+    return HeldStiffness(stiffness, sign)

@@ -12,7 +12,7 @@ from notchflex._jax import constant, jnp
 from notchflex.mechanics.chain import Chain
 
 
-class Units(NamedTuple):
+class UnitRows(NamedTuple):
     """Rows of one 1 each, for every number that may change, in the order of the rows' axis.
 
     How bodies move depends on few of them: rows of motions are short, over the modes and the
@@ -20,14 +20,14 @@ class Units(NamedTuple):
     """
 
     modes: Array
-    lips: list[Array]
+    contact_pairs: list[Array]
     log_ratio: list[Array]
     older: list[Array]
     turn: Array
     tension: list[Array]
     handed: list[Array]
     outside: Array
-    drawn: list[Array]
+    released_length: list[Array]
     stretch: list[Array] | None
 
     @property
@@ -44,7 +44,7 @@ class Units(NamedTuple):
     def spread(self, rows: Array) -> Array:
         """Short rows over all numbers that may change."""
         modes, whole = self.modes.shape
-        between = sum(len(own) for own in (*self.lips, *self.log_ratio))
+        between = sum(len(own) for own in (*self.contact_pairs, *self.log_ratio))
         beyond = whole - rows.shape[-1] - between
         return jnp.concatenate(
             [_padded(rows[..., :modes], between), _padded(rows[..., modes:], beyond)], axis=-1
@@ -56,7 +56,7 @@ def _padded(rows: Array, behind: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Layout:
+class RowLayout:
     """Where everything stands among the numbers that may change at one flexure.
 
     Of a tendon beyond come back the length that is set free and the stretch (tension times length).
@@ -65,7 +65,7 @@ class Layout:
     """
 
     modes: int
-    lips: tuple[int, ...]
+    contact_pairs: tuple[int, ...]
     tendons: tuple[int, ...]
     older: int
     wrench: int
@@ -76,7 +76,7 @@ class Layout:
     @property
     def unknowns(self) -> int:
         """Own unknowns of a flexure."""
-        return self.modes + sum(self.lips) + 2 * sum(self.tendons)
+        return self.modes + sum(self.contact_pairs) + 2 * sum(self.tendons)
 
     @property
     def carried(self) -> int:
@@ -98,12 +98,12 @@ class Layout:
         """
         return self.wrench if self.turn and self.follows else self.turn
 
-    def units(self) -> Units:
+    def units(self) -> UnitRows:
         """Unit rows of everything, in order."""
         wrench = [self.wrench] * self.older
         sizes = [
             (self.modes,),
-            self.lips,
+            self.contact_pairs,
             [2 * count for count in self.tendons],
             wrench,
             (self.turn,),
@@ -115,21 +115,39 @@ class Layout:
         ]
         ends = np.cumsum([size for group in sizes for size in group])
         rows = map(constant, np.split(np.eye(ends[-1]), ends[:-1]))
-        modes, lips, log_ratio, older, turn, tension, handed, far, drawn, stretch = (
-            [next(rows) for _ in group] for group in sizes
-        )
+        (
+            modes,
+            contact_pairs,
+            log_ratio,
+            older,
+            turn,
+            tension,
+            handed,
+            far,
+            released_length,
+            stretch,
+        ) = ([next(rows) for _ in group] for group in sizes)
         strokes = stretch if self.by_stroke else None
-        return Units(
-            modes[0], lips, log_ratio, older, turn[0], tension, handed, far[0], drawn, strokes
+        return UnitRows(
+            modes[0],
+            contact_pairs,
+            log_ratio,
+            older,
+            turn[0],
+            tension,
+            handed,
+            far[0],
+            released_length,
+            strokes,
         )
 
 
-def layout(chain: Chain, *, by_stroke: bool) -> Layout:
-    """The layout of a chain whose tendons are given by tension alone, or some by stroke."""
+def row_layout(chain: Chain, *, by_stroke: bool) -> RowLayout:
+    """The row_layout of a chain whose tendons are given by tension alone, or some by stroke."""
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
-    return Layout(
+    return RowLayout(
         modes=chain.stiffness.shape[-1],
-        lips=tuple(group.closes.shape[-1] for group in chain.lips),
+        contact_pairs=tuple(group.has_contact.shape[-1] for group in chain.contact_pairs),
         tendons=tuple(len(group.numbers) for group in chain.groups),
         older=chain.window - 1 if wrench else 0,
         wrench=wrench,

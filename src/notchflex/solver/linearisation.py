@@ -13,7 +13,7 @@ and what comes back are
     the wrenches of spans and lips that end beyond; those of the loads, or their moments alone;
     tendon set free and stretched.
 
-Only the geometry of a span, an opening or a rod is differentiated by JAX, on its own.
+Only the geometry of a span, an contact or a rod is differentiated by JAX, on its own.
 """
 
 from __future__ import annotations
@@ -23,17 +23,32 @@ from typing import NamedTuple, cast
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.loads.applied import Applied, body_wrench
+from notchflex.loads.applied import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.flexure import held_by_strains, pull_change
+from notchflex.mechanics.flexure import geometric_stiffness, material_tangent
 from notchflex.mechanics.motion import Motion, skew, wrench_turn
-from notchflex.solver.element import RATE, STICTION, Memory, Unknowns, driven, heights, pressed
-from notchflex.solver.layout import Layout, Units
-from notchflex.solver.residual import Evaluation, holds, reaches
-from notchflex.solver.tendon_jacobian import Moves, Opening, Strand, moves_of, opening_of, strand_of
+from notchflex.solver.element import (
+    RATE,
+    STICTION,
+    Memory,
+    Unknowns,
+    is_active,
+    notch_heights,
+    trial_log_ratio,
+)
+from notchflex.solver.residual import Evaluation, slip_mask, span_mask
+from notchflex.solver.row_layout import RowLayout, UnitRows
+from notchflex.solver.tendon_jacobian import (
+    ContactJacobian,
+    Moves,
+    TendonJacobian,
+    contact_jacobian,
+    relative_motion_jacobian,
+    tendon_jacobian,
+)
 
 
-class Blocks(NamedTuple):
+class LinearisedRows(NamedTuple):
     """Rows of all flexures, each over (own unknowns, carried, from beyond)."""
 
     residual: Float[Array, "n u z"]
@@ -41,14 +56,14 @@ class Blocks(NamedTuple):
     behind: Float[Array, "n b z"]
 
 
-def blocks(
+def linearise(
     chain: Chain,
     unknowns: Unknowns,
     memory: Memory,
-    applied: Applied | None,
+    applied: BodyLoads | None,
     at: Evaluation,
-    form: Layout,
-) -> Blocks:
+    form: RowLayout,
+) -> LinearisedRows:
     """Rows of all flexures.
 
     Args:
@@ -60,12 +75,16 @@ def blocks(
         form: What the rows are over.
     """
     unit = form.units()
-    moves = moves_of(chain, at, unit)
-    strands = [strand_of(chain, k, unknowns, at, unit, moves) for k in range(len(chain.groups))]
-    openings = [opening_of(chain, k, at, unit, moves) for k in range(len(chain.lips))]
+    moves = relative_motion_jacobian(chain, at, unit)
+    tendons = [
+        tendon_jacobian(chain, k, unknowns, at, unit, moves) for k in range(len(chain.groups))
+    ]
+    contacts = [
+        contact_jacobian(chain, k, at, unit, moves) for k in range(len(chain.contact_pairs))
+    ]
     elastic = chain.elastic
     if elastic is None:
-        elastic = jax.vmap(held_by_strains, in_axes=(0, None, 0, 0))(
+        elastic = jax.vmap(material_tangent, in_axes=(0, None, 0, 0))(
             chain.rods, chain.law, chain.memory, unknowns.modes
         )
         elastic = _never_singular(chain, elastic)
@@ -75,39 +94,48 @@ def blocks(
         return unit.spread(unit.of_modes(rows))
 
     if at.wrenches is not None:
-        assert at.flexure.bent is not None
-        elastic = elastic - jax.vmap(pull_change)(
-            chain.rods, unknowns.modes, at.flexure.bent, at.wrenches.whole
+        assert at.flexure.configuration is not None
+        elastic = elastic - jax.vmap(geometric_stiffness)(
+            chain.rods, unknowns.modes, at.flexure.configuration, at.wrenches.whole
         )
-        whole, behind = _forces(chain, unknowns, applied, at, unit, moves, strands, openings)
+        whole, behind = _forces(chain, unknowns, applied, at, unit, moves, tendons, contacts)
         balance = by_modes(elastic) - jnp.einsum("nwm,nwz->nmz", at.flexure.twist, whole)
     else:
         balance = by_modes(elastic)
-    for strand, span in zip(strands, at.spans, strict=True):
+    for tendon, span in zip(tendons, at.spans, strict=True):
         if span.crossing.slope is not None:
-            balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, strand.gap_tension)
-    for group, touch, force in zip(chain.lips, at.touches, unit.lips, strict=True):
-        if touch.slope is not None:
-            closing = group.closes[..., None] * touch.slope
-            balance = balance - jnp.einsum("nlm,lz->nmz", closing, force)
-    height = heights(chain)[:, None, None]
-    stiff = chain.lip_stiffness[:, None, None]
-    residual = [balance / chain.stiffness[..., None]]
-    for group, touch, force, own, opening in zip(
-        chain.lips, at.touches, unknowns.lip_force, unit.lips, openings, strict=True
+            balance = balance + jnp.einsum("ntm,ntz->nmz", span.crossing.slope, tendon.gap_tension)
+    for group, contact, force in zip(
+        chain.contact_pairs, at.contacts, unit.contact_pairs, strict=True
     ):
-        presses = pressed(chain.lip_stiffness, group.closes, force, touch.gap)[..., None]
-        closing = unit.spread(opening.gap)
+        if contact.slope is not None:
+            closing = group.has_contact[..., None] * contact.slope
+            balance = balance - jnp.einsum("nlm,lz->nmz", closing, force)
+    height = notch_heights(chain)[:, None, None]
+    stiff = chain.contact_stiffness[:, None, None]
+    residual = [balance / chain.stiffness[..., None]]
+    for group, contact, force, own, contact in zip(
+        chain.contact_pairs,
+        at.contacts,
+        unknowns.contact_force,
+        unit.contact_pairs,
+        contacts,
+        strict=True,
+    ):
+        presses = is_active(chain.contact_stiffness, group.has_contact, force, contact.gap)[
+            ..., None
+        ]
+        closing = unit.spread(contact.gap)
         residual.append(jnp.where(presses, closing / height, own[None] / (stiff * height)))
     residual += [
-        _friction(chain, k, unknowns, memory, at, unit, strand) for k, strand in enumerate(strands)
+        _friction(chain, k, unknowns, memory, at, unit, tendon) for k, tendon in enumerate(tendons)
     ]
     onward = [-unit.spread(moves.relative[number]) for number in range(form.older)]
     onward += [] if moves.turn is None else [moves.turn]
-    onward += [strand.carried for strand in strands]
-    behind += [strand.drawn for strand in strands]
-    behind += [strand.stretch for strand in strands if strand.stretch is not None]
-    return Blocks(*(_stacked(chain, rows, form) for rows in (residual, onward, behind)))
+    onward += [tendon.carried for tendon in tendons]
+    behind += [tendon.released_length for tendon in tendons]
+    behind += [tendon.stretch for tendon in tendons if tendon.stretch is not None]
+    return LinearisedRows(*(_stacked(chain, rows, form) for rows in (residual, onward, behind)))
 
 
 # A mode that resists by less than this part of its stiffness at rest is taken to resist so much:
@@ -129,7 +157,7 @@ def _never_singular(chain: Chain, elastic: Float[Array, "n m m"]) -> Float[Array
     return elastic + jax.vmap(jnp.diag)(missing)
 
 
-def _stacked(chain: Chain, rows: list[Array], form: Layout) -> Float[Array, "n k z"]:
+def _stacked(chain: Chain, rows: list[Array], form: RowLayout) -> Float[Array, "n k z"]:
     """Rows below each other; the flexures as leading axis, also where all have the same."""
     if not rows:
         return jnp.zeros((chain.flexures, 0, form.unknowns + form.carried + form.beyond))
@@ -139,31 +167,36 @@ def _stacked(chain: Chain, rows: list[Array], form: Layout) -> Float[Array, "n k
 def _forces(
     chain: Chain,
     unknowns: Unknowns,
-    applied: Applied | None,
+    applied: BodyLoads | None,
     at: Evaluation,
-    unit: Units,
+    unit: UnitRows,
     moves: Moves,
-    strands: list[Strand],
-    openings: list[Opening],
+    tendons: list[TendonJacobian],
+    contacts: list[ContactJacobian],
 ) -> tuple[Float[Array, "n w z"], list[Array]]:
     """Rows of all that acts on the distal body and beyond, and of what is handed back."""
     wrenches, pose = at.wrenches, at.flexure.pose
     assert wrenches is not None
     assert pose is not None
     ending = jnp.zeros((*wrenches.ending.shape, unit.modes.shape[-1]))
-    for group, span, strand in zip(chain.groups, at.spans, strands, strict=True):
-        if strand.wrench is not None and span.crossing.wrench is not None:
-            along = strand.gap_tension[:, :, None] * span.crossing.wrench[..., None]
-            pull = along + unit.spread(span.gap_tension[..., None, None] * strand.wrench)
-            ending = ending - jnp.einsum("ntwz,ntk->nkwz", pull, reaches(chain, group.back))
-    for group, touch, force, own, opening in zip(
-        chain.lips, at.touches, unknowns.lip_force, unit.lips, openings, strict=True
+    for group, span, tendon in zip(chain.groups, at.spans, tendons, strict=True):
+        if tendon.wrench is not None and span.crossing.wrench is not None:
+            along = tendon.gap_tension[:, :, None] * span.crossing.wrench[..., None]
+            pull = along + unit.spread(span.gap_tension[..., None, None] * tendon.wrench)
+            ending = ending - jnp.einsum("ntwz,ntk->nkwz", pull, span_mask(chain, group.back))
+    for group, contact, force, own, contact in zip(
+        chain.contact_pairs,
+        at.contacts,
+        unknowns.contact_force,
+        unit.contact_pairs,
+        contacts,
+        strict=True,
     ):
-        if opening.wrench is not None and touch.wrench is not None:
-            along = own[None, :, None] * touch.wrench[..., None]
-            along = along + unit.spread(force[..., None, None] * opening.wrench)
-            push = group.closes[..., None, None] * along
-            ending = ending + jnp.einsum("nlwz,nlk->nkwz", push, reaches(chain, group.back))
+        if contact.wrench is not None and contact.wrench is not None:
+            along = own[None, :, None] * contact.wrench[..., None]
+            along = along + unit.spread(force[..., None, None] * contact.wrench)
+            push = group.has_contact[..., None, None] * along
+            ending = ending + jnp.einsum("nlwz,nlk->nkwz", push, span_mask(chain, group.back))
     whole = ending[:, 0]
     if unit.handed:
         whole = whole + unit.handed[0][None]
@@ -201,7 +234,7 @@ def _forces(
     return whole, behind
 
 
-def _by_turn(rotation: Array, load: Applied) -> Float[Array, "w a"]:
+def _by_turn(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
     """Slope of a body's loads by the turn of the body about its own axes."""
     axes = 3 if len(rotation) == 3 else 1
 
@@ -217,8 +250,8 @@ def _friction(
     unknowns: Unknowns,
     memory: Memory,
     at: Evaluation,
-    unit: Units,
-    strand: Strand,
+    unit: UnitRows,
+    tendon: TendonJacobian,
 ) -> Float[Array, "n 2t z"]:
     """Rows of the memory law of both edges."""
     group, span, own = chain.groups[k], at.spans[k], unknowns.log_ratio[k]
@@ -230,12 +263,12 @@ def _friction(
     ]
     # Edges, then the turning angles that they depend on.
     slope = jnp.stack([jnp.stack(by_one, axis=-1) for by_one in slopes], axis=-1)
-    limit = jnp.einsum("ntes,nstz->ntez", holds(group)[..., None] * slope, strand.turning)
+    limit = jnp.einsum("ntes,nstz->ntez", slip_mask(group)[..., None] * slope, tendon.turning)
     limit = unit.spread(limit)
-    height = heights(chain)[:, None, None, None]
-    stuck = -RATE * (strand.at_edges / height - strand.log_ratio[None] / STICTION)
-    value, bound = driven(chain, own, span.slid, memory, k), span.bound
+    height = notch_heights(chain)[:, None, None, None]
+    stuck = -RATE * (tendon.at_edges / height - tendon.log_ratio[None] / STICTION)
+    value, bound = trial_log_ratio(chain, own, span.slid, memory, k), span.bound
     upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
-    slides = strand.log_ratio[None] - jnp.where(upper, limit, -limit)
+    slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)
     rows = jnp.where(upper | lower, slides, stuck)
     return rows.reshape(chain.flexures, -1, rows.shape[-1])

@@ -13,10 +13,10 @@ from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.actuation import bearable, command_residual, stroke
-from notchflex.solver.block_elimination import Step, linear_step
-from notchflex.solver.element import Memory, Unknowns, heights, pressed
-from notchflex.solver.friction_predictor import played
+from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
+from notchflex.solver.block_elimination import NewtonStep, linear_step
+from notchflex.solver.element import Memory, Unknowns, is_active, notch_heights
+from notchflex.solver.friction_predictor import predict_log_ratios
 from notchflex.solver.residual import Evaluation, evaluate
 
 
@@ -52,7 +52,7 @@ class Settings(Pytree, eq=True):
 DEFAULT = Settings()
 
 
-class Point(NamedTuple):
+class Iterate(NamedTuple):
     """A guess or an answer: the unknowns and the base tensions."""
 
     unknowns: Unknowns
@@ -72,7 +72,7 @@ class NewtonResult(NamedTuple):
         converged: Whether the imbalance is within the tolerance.
     """
 
-    point: Point
+    point: Iterate
     slid: tuple[Float[Array, "n t 2"], ...]
     bound: tuple[Float[Array, "n t 2"], ...]
     stroke: Float[Array, " t"]
@@ -86,7 +86,7 @@ class _Search(NamedTuple):
 
     best: NewtonResult
     allowed: Float[Array, ""]
-    step: Point
+    step: Iterate
     part: Float[Array, ""]
     tries: Int[Array, ""]
     over: Bool[Array, ""]
@@ -119,7 +119,7 @@ def newton(
     command: Command,
     memory: Memory,
     before: Float[Array, " t"],
-    start: Point,
+    start: Iterate,
     settings: Settings,
     enough: Float[Array, ""],
 ) -> NewtonResult:
@@ -142,7 +142,7 @@ def newton(
     """
     # Rounding grows with the moments that must balance, so the tolerance does, within reason.
     height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
-    softest = jnp.min(jnp.where(chain.rods.idle > 0.0, jnp.inf, chain.stiffness))
+    softest = jnp.min(jnp.where(chain.rods.padding_mask > 0.0, jnp.inf, chain.stiffness))
     turn_per_newton = height / softest
     largest_tension = jnp.max(jnp.maximum(start.base_tension, 0.0), initial=0.0)
     growth = jnp.minimum(1.0 + largest_tension * turn_per_newton, _LARGEST_GROWTH)
@@ -175,10 +175,10 @@ def newton(
             residual=largest,
             iterations=best.iterations + 1,
             converged=(solved | (largest < _ROUNDING * tolerance))
-            & bearable(chain, command, point.base_tension),
+            & tension_is_bounded(chain, command, point.base_tension),
         )
 
-        def again() -> tuple[Point, Array]:
+        def again() -> tuple[Iterate, Array]:
             step = linear_step(chain, command, *here, at)
             step = _moderate(chain, point, step)
             # Where strokes are given, contacts that turn round must not be held up on their way.
@@ -192,19 +192,19 @@ def newton(
             whole = jnp.minimum(by_turn, _LARGEST_LOG_RATIO / log_ratio)
             if stops:
                 step = stopped(whole)
-                return Point(step.unknowns, step.base_tension), whole
+                return Iterate(step.unknowns, step.base_tension), whole
             assert command.by_stroke is not None
             early = (
                 jnp.any(command.by_stroke) & (best.iterations < _PLAYED) & (largest > _PLAYED_ABOVE)
             )
             limits = memory._replace(bound=found.bound)
 
-            def contacts_put() -> Step:
+            def contacts_put() -> NewtonStep:
                 return _contacts_put(chain, command, limits, before, point, step, whole, by_turn)
 
             chosen = jax.lax.cond(early, contacts_put, lambda: step)
             part = jnp.where(early, by_turn, whole)
-            return Point(chosen.unknowns, chosen.base_tension), part
+            return Iterate(chosen.unknowns, chosen.base_tension), part
 
         step, part = jax.lax.cond(taken & ~solved, again, lambda: (search.step, 0.5 * search.part))
         return _Search(
@@ -236,7 +236,7 @@ def newton(
     return jax.lax.while_loop(searching, iterate, search).best
 
 
-def _moderate(chain: Chain, point: Point, step: Step) -> Step:
+def _moderate(chain: Chain, point: Iterate, step: NewtonStep) -> NewtonStep:
     """A step that changes log ratios of slack tendons by no more than is of use.
 
     Without tension they act on nothing, and a contact that sticks would throw them about: all that
@@ -255,21 +255,23 @@ def _moderate(chain: Chain, point: Point, step: Step) -> Step:
 
 
 def _stopped_by_lips(
-    chain: Chain, unknowns: Unknowns, at: Evaluation, step: Step, part: Float[Array, ""]
-) -> Step:
+    chain: Chain, unknowns: Unknowns, at: Evaluation, step: NewtonStep, part: Float[Array, ""]
+) -> NewtonStep:
     """A step of which a part takes no notch farther than to where its lips meet.
 
     Beyond, the law of the material would be taken at a bend that the notch cannot have, and what
     follows from it would open the lips again.
     """
     modes = step.unknowns.modes
-    for group, touch, force in zip(chain.lips, at.touches, unknowns.lip_force, strict=True):
-        if touch.slope is None:
+    for group, contact, force in zip(
+        chain.contact_pairs, at.contacts, unknowns.contact_force, strict=True
+    ):
+        if contact.slope is None:
             continue  # bodies have more than one flexure to come together by
-        closing = -part * jnp.einsum("nlm,nm->nl", touch.slope, modes)
-        is_open = ~pressed(chain.lip_stiffness, group.closes, force, touch.gap)
-        stops = is_open & (closing > touch.gap) & (touch.gap > 0.0) & (group.closes > 0.0)
-        reach = (1.0 + _BEYOND) * touch.gap + _OVERLAP * heights(chain)[:, None]
+        closing = -part * jnp.einsum("nlm,nm->nl", contact.slope, modes)
+        is_open = ~is_active(chain.contact_stiffness, group.has_contact, force, contact.gap)
+        stops = is_open & (closing > contact.gap) & (contact.gap > 0.0) & (group.has_contact > 0.0)
+        reach = (1.0 + _BEYOND) * contact.gap + _OVERLAP * notch_heights(chain)[:, None]
         allowed = jnp.where(stops, reach / jnp.where(stops, closing, 1.0), 1.0)
         modes = modes * jnp.minimum(jnp.min(allowed, axis=-1, keepdims=True), 1.0)
     return step._replace(unknowns=step.unknowns._replace(modes=modes))
@@ -280,11 +282,11 @@ def _contacts_put(
     command: Command,
     memory: Memory,
     before: Float[Array, " t"],
-    point: Point,
-    step: Step,
+    point: Iterate,
+    step: NewtonStep,
     whole: Float[Array, ""],
     part: Float[Array, ""],
-) -> Step:
+) -> NewtonStep:
     """A step whose contacts go where their tension would leave them, not where a linear step does.
 
     It serves while the tensions of tendons drawn by stroke are still to be found, and concerns only
@@ -298,14 +300,14 @@ def _contacts_put(
         tension, 0.5 * point.base_tension, 2.0 * point.base_tension + chain.closing_force
     )
     tension = command.either(moderate, tension)
-    put = played(chain, before, tension, memory)
+    put = predict_log_ratios(chain, before, tension, memory)
     logs = []
     for group, there, here, own in zip(
         chain.groups, put, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True
     ):
         sought = command.by_stroke[jnp.array(group.numbers)][None, :, None]
         logs.append(jnp.where(sought, there - here, whole * own) / part)
-    return Step(
+    return NewtonStep(
         step.unknowns._replace(log_ratio=tuple(logs)),
         (tension - point.base_tension) / part,
     )

@@ -13,44 +13,44 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.loads.applied import Applied, body_wrench
+from notchflex.loads.applied import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain, flexure_states
-from notchflex.mechanics.contact import Touch
+from notchflex.mechanics.contact import GapResponse
 from notchflex.mechanics.flexure import FlexureState
 from notchflex.mechanics.motion import Motion, identity
 from notchflex.mechanics.tendon import Crossing, TendonGroup
-from notchflex.solver.element import Memory, Unknowns, between, driven, signorini
+from notchflex.solver.element import Memory, Unknowns, clip_symmetric, signorini, trial_log_ratio
 
 
-class Spans(NamedTuple):
+class TendonSpans(NamedTuple):
     """A group of t tendons over all flexures, n by t (mm, N).
 
     Attributes:
         crossing: Its way over every gap.
-        passed_on: Part of its tension that each edge of the gap leaves it.
+        tension_ratio: Part of its tension that each edge of the gap leaves it.
         gap_tension: Tension in the gap; 0 where the tendon has no span there.
         body_tension: Tension inside the distal body, likewise.
-        drawn: How much tendon the shape has set free beyond the distal body.
+        released_length: How much tendon the shape has set free beyond the distal body.
         stretch: Sum of tension times length beyond, N mm.
-        drawn_behind: As `drawn`, this gap included.
-        stretch_behind: As `stretch`, this gap and the body included.
+        released_length: As `released_length`, this gap included.
+        tension_length: As `stretch`, this gap and the body included.
         slid: Tendon slid over both edges toward the base, by the memory's stiffness.
         bound: Largest log ratio at both edges.
     """
 
     crossing: Crossing
-    passed_on: Float[Array, "n t 2"]
+    tension_ratio: Float[Array, "n t 2"]
     gap_tension: Float[Array, "n t"]
     body_tension: Float[Array, "n t"]
-    drawn: Float[Array, "n t"]
+    released_length: Float[Array, "n t"]
     stretch: Float[Array, "n t"]
-    drawn_behind: Float[Array, "n t"]
-    stretch_behind: Float[Array, "n t"]
+    released_length: Float[Array, "n t"]
+    tension_length: Float[Array, "n t"]
     slid: Float[Array, "n t 2"]
     bound: Float[Array, "n t 2"]
 
 
-class Wrenches(NamedTuple):
+class BodyWrenches(NamedTuple):
     """What acts on the bodies (moment, force), about and along the frame of body j.
 
     Attributes:
@@ -67,16 +67,16 @@ class Wrenches(NamedTuple):
     whole: Float[Array, "n w"]
 
 
-class Base(NamedTuple):
+class BaseReaction(NamedTuple):
     """What comes back to the base.
 
     Attributes:
-        drawn: How much of every tendon the shape has set free, mm.
+        released_length: How much of every tendon the shape has set free, mm.
         stretch: Sum of tension times length of every tendon, N mm.
         load: External loads on all bodies, about and along the base; None if there are none.
     """
 
-    drawn: Float[Array, " t"]
+    released_length: Float[Array, " t"]
     stretch: Float[Array, " t"]
     load: Float[Array, " w"] | None
 
@@ -90,7 +90,7 @@ class Evaluation(NamedTuple):
             nothing acts on bodies.
         rotation: Rotation of every body against the base; None where no load asks for it.
         spans: For each group of tendons.
-        touches: For each kind of lips.
+        contacts: For each kind of lips.
         wrenches: What acts on the bodies; None as the anchors.
         base: What comes back to the base.
         residual: Imbalance, in the form of the unknowns and scaled to be comparable.
@@ -99,10 +99,10 @@ class Evaluation(NamedTuple):
     flexure: FlexureState
     anchors: Motion | None
     rotation: Float[Array, "n d d"] | None
-    spans: tuple[Spans, ...]
-    touches: tuple[Touch, ...]
-    wrenches: Wrenches | None
-    base: Base
+    spans: tuple[TendonSpans, ...]
+    contacts: tuple[GapResponse, ...]
+    wrenches: BodyWrenches | None
+    base: BaseReaction
     residual: Unknowns
 
 
@@ -111,7 +111,7 @@ def evaluate(
     unknowns: Unknowns,
     memory: Memory,
     base_tension: Float[Array, " t"],
-    applied: Applied | None,
+    applied: BodyLoads | None,
 ) -> Evaluation:
     """Judge given unknowns.
 
@@ -132,58 +132,64 @@ def evaluate(
     flexure = flexure_states(chain, unknowns.modes, with_pose=on_bodies)
     anchors = _anchors(chain, flexure.pose)
     spans = tuple(
-        _spans(chain, k, crossed(group, chain, flexure, anchors), unknowns, memory, base_tension)
+        _spans(chain, k, cross_gaps(group, chain, flexure, anchors), unknowns, memory, base_tension)
         for k, group in enumerate(chain.groups)
     )
-    touches = tuple(
-        jax.vmap(type(group).touch)(group, chain.rods, flexure, picked(anchors, group.back))
-        for group in chain.lips
+    contacts = tuple(
+        jax.vmap(type(group).gap_response)(
+            group, chain.rods, flexure, select_anchors(anchors, group.back)
+        )
+        for group in chain.contact_pairs
     )
     wrenches, rotation, load = None, None, None
     if on_bodies:
         assert flexure.pose is not None
         outside = _outside(flexure.pose, applied)
         rotation, load = outside.rotation, outside.load
-        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, touches, outside)
+        wrenches = _wrenches(chain, flexure.pose, unknowns, spans, contacts, outside)
     balance = flexure.internal
     if chain.elastic is not None:
         balance = jnp.einsum("nmk,nk->nm", chain.elastic, unknowns.modes)
     for span in spans:
         if span.crossing.slope is not None:
             balance = balance + jnp.einsum("nt,ntm->nm", span.gap_tension, span.crossing.slope)
-    for group, touch, force in zip(chain.lips, touches, unknowns.lip_force, strict=True):
-        if touch.slope is not None:
-            balance = balance - jnp.einsum("nl,nlm->nm", force * group.closes, touch.slope)
+    for group, contact, force in zip(
+        chain.contact_pairs, contacts, unknowns.contact_force, strict=True
+    ):
+        if contact.slope is not None:
+            balance = balance - jnp.einsum("nl,nlm->nm", force * group.has_contact, contact.slope)
     if wrenches is not None:
         balance = balance - jnp.einsum("nwm,nw->nm", flexure.twist, wrenches.whole)
     residual = Unknowns(
         modes=balance / chain.stiffness,
-        lip_force=tuple(
-            signorini(chain, group.closes, force, touch.gap)
-            for group, force, touch in zip(chain.lips, unknowns.lip_force, touches, strict=True)
+        contact_force=tuple(
+            signorini(chain, group.has_contact, force, contact.gap)
+            for group, force, contact in zip(
+                chain.contact_pairs, unknowns.contact_force, contacts, strict=True
+            )
         ),
         log_ratio=tuple(
-            own - between(driven(chain, own, span.slid, memory, k), span.bound)
+            own - clip_symmetric(trial_log_ratio(chain, own, span.slid, memory, k), span.bound)
             for k, (own, span) in enumerate(zip(unknowns.log_ratio, spans, strict=True))
         ),
     )
-    base = Base(
-        drawn=per_tendon(chain, tuple(span.drawn_behind[0] for span in spans)),
-        stretch=per_tendon(chain, tuple(span.stretch_behind[0] for span in spans)),
+    base = BaseReaction(
+        released_length=in_tendon_order(chain, tuple(span.released_length[0] for span in spans)),
+        stretch=in_tendon_order(chain, tuple(span.tension_length[0] for span in spans)),
         load=load,
     )
-    return Evaluation(flexure, anchors, rotation, spans, touches, wrenches, base, residual)
+    return Evaluation(flexure, anchors, rotation, spans, contacts, wrenches, base, residual)
 
 
-def crossed(
+def cross_gaps(
     group: TendonGroup, chain: Chain, flexure: FlexureState, anchors: Motion | None
 ) -> Crossing:
     """A group of tendons over all gaps."""
-    own = picked(anchors, group.back) if group.acts_on_bodies else None
+    own = select_anchors(anchors, group.back) if group.acts_on_bodies else None
     return jax.vmap(type(group).cross)(group, chain.rods, flexure, own)
 
 
-def picked(anchors: Motion | None, back: Array) -> Motion | None:
+def select_anchors(anchors: Motion | None, back: Array) -> Motion | None:
     """Of the bodies before (second axis), for every tendon or lip the one it comes from."""
     if anchors is None:
         return None
@@ -199,7 +205,7 @@ def picked(anchors: Motion | None, back: Array) -> Motion | None:
 
 
 def _anchors(chain: Chain, pose: Motion | None) -> Motion | None:
-    """Pose of every body seen from those before it, as far as the window reaches."""
+    """Pose of every body seen from those before it, as far as the window span_mask."""
     if pose is None:
         return None
     seen = [pose]
@@ -229,16 +235,16 @@ def _spans(
     unknowns: Unknowns,
     memory: Memory,
     base_tension: Float[Array, " t"],
-) -> Spans:
+) -> TendonSpans:
     """Tensions, lengths set free and bounds of the k-th group."""
     group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
     at_base = _of_group(base_tension, group)[None]
-    passed_on = jnp.exp(-runs[..., None] * log_ratio)
-    beyond_both = at_base * jnp.cumprod(passed_on[..., 0] * passed_on[..., 1], axis=0)
-    gap_tension = runs * passed_on[..., 0] * _from_base_side(beyond_both, at_base[0])
-    body_tension = passed_on[..., 1] * gap_tension
+    tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
+    beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
+    gap_tension = runs * tension_ratio[..., 0] * _from_base_side(beyond_both, at_base[0])
+    body_tension = tension_ratio[..., 1] * gap_tension
     shortening = runs * (group.natural_gap - crossing.length)
     in_body = body_tension * group.body_length
     lengths = jnp.stack([shortening, gap_tension * group.natural_gap + in_body])
@@ -248,17 +254,17 @@ def _spans(
     at_exit = behind[0] + behind[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
     bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
-    return Spans(
+    return TendonSpans(
         crossing=crossing,
-        passed_on=passed_on,
+        tension_ratio=tension_ratio,
         gap_tension=gap_tension,
         body_tension=body_tension,
-        drawn=beyond[0],
+        released_length=beyond[0],
         stretch=beyond[1],
-        drawn_behind=behind[0],
-        stretch_behind=behind[1],
+        released_length=behind[0],
+        tension_length=behind[1],
         slid=jnp.stack([at_exit, at_entry], axis=-1),
-        bound=holds(group) * jnp.stack(bounds, axis=-1),
+        bound=slip_mask(group) * jnp.stack(bounds, axis=-1),
     )
 
 
@@ -267,7 +273,7 @@ def _of_group(values: Float[Array, " all"], group: TendonGroup) -> Float[Array, 
     return jnp.stack([values[number] for number in group.numbers])
 
 
-def holds(group: TendonGroup) -> Float[Array, "n t 2"]:
+def slip_mask(group: TendonGroup) -> Float[Array, "n t 2"]:
     """1 where a tendon can slide over an edge: not where it is fixed, nor where it does not go."""
     return jnp.stack([group.visits, group.visits * (1.0 - group.ends)], axis=-1)
 
@@ -280,7 +286,7 @@ class _Outside(NamedTuple):
     load: Float[Array, " w"] | None
 
 
-def _outside(pose: Motion, applied: Applied | None) -> _Outside:
+def _outside(pose: Motion, applied: BodyLoads | None) -> _Outside:
     """Sum of the loads on every body and all beyond, in the frame of the body."""
     if applied is None:
         return _Outside(None, None, None)
@@ -294,7 +300,7 @@ def _outside(pose: Motion, applied: Applied | None) -> _Outside:
 
 
 def body_poses(relative: Motion) -> Motion:
-    """Poses of bodies 0 to n in the frame of the base, from the poses between neighbours.
+    """Poses of bodies 0 to n in the frame of the base, from the poses clip_symmetric neighbours.
 
     First from every second body on, then every fourth, until all are seen from the base.
     """
@@ -320,21 +326,23 @@ def _wrenches(
     chain: Chain,
     pose: Motion,
     unknowns: Unknowns,
-    spans: tuple[Spans, ...],
-    touches: tuple[Touch, ...],
+    spans: tuple[TendonSpans, ...],
+    contacts: tuple[GapResponse, ...],
     outside: _Outside,
-) -> Wrenches:
+) -> BodyWrenches:
     """What spans, lips and loads do to the bodies."""
     size = chain.rods.basis.shape[-2]
     ending = jnp.zeros((chain.flexures, chain.window, size))
     for group, span in zip(chain.groups, spans, strict=True):
         if span.crossing.wrench is not None:
             pull = -span.gap_tension[..., None] * span.crossing.wrench
-            ending = ending + jnp.einsum("ntw,ntk->nkw", pull, reaches(chain, group.back))
-    for group, touch, force in zip(chain.lips, touches, unknowns.lip_force, strict=True):
-        if touch.wrench is not None:
-            push = (force * group.closes)[..., None] * touch.wrench
-            ending = ending + jnp.einsum("nlw,nlk->nkw", push, reaches(chain, group.back))
+            ending = ending + jnp.einsum("ntw,ntk->nkw", pull, span_mask(chain, group.back))
+    for group, contact, force in zip(
+        chain.contact_pairs, contacts, unknowns.contact_force, strict=True
+    ):
+        if contact.wrench is not None:
+            push = (force * group.has_contact)[..., None] * contact.wrench
+            ending = ending + jnp.einsum("nlw,nlk->nkw", push, span_mask(chain, group.back))
     handed = [jnp.zeros((chain.flexures, size))]
     for number in reversed(range(chain.window - 1)):
         behind = jax.vmap(Motion.wrench)(pose, ending[:, number + 1] + handed[0])
@@ -342,15 +350,15 @@ def _wrenches(
     whole = ending[:, 0] + handed[0]
     if outside.beyond is not None:
         whole = whole + outside.beyond
-    return Wrenches(ending, jnp.stack(handed, axis=1), outside.beyond, whole)
+    return BodyWrenches(ending, jnp.stack(handed, axis=1), outside.beyond, whole)
 
 
-def reaches(chain: Chain, back: Array) -> Float[Array, "n t window"]:
-    """1 where a span or opening that ends at a body reaches over so many flexures more."""
+def span_mask(chain: Chain, back: Array) -> Float[Array, "n t window"]:
+    """1 where a span or opening that ends at a body span_mask over so many flexures more."""
     return 1.0 * (back[..., None] > jnp.arange(chain.window)[None, None])
 
 
-def per_tendon(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...]) -> Array:
+def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...]) -> Array:
     """Bring values per group of tendons into the order of the robot's tendons, as last axis."""
     if not grouped:
         return jnp.zeros(0)

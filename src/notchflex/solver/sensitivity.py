@@ -16,13 +16,13 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import stroke
 from notchflex.solver.block_elimination import linear_step
-from notchflex.solver.continuation import Solved, on_the_way
+from notchflex.solver.continuation import SolverState, interpolate_command
 from notchflex.solver.element import Memory
-from notchflex.solver.newton import Point
+from notchflex.solver.newton import Iterate
 from notchflex.solver.residual import evaluate
 
 
-class Way(NamedTuple):
+class SubstepHistory(NamedTuple):
     """How a solved state was come to from the one before, told by `Advance`.
 
     Attributes:
@@ -32,7 +32,7 @@ class Way(NamedTuple):
         reached: Whether the load was reached.
     """
 
-    between: Solved
+    between: SolverState
     part_before: Float[Array, ""]
     parts: Int[Array, ""]
     reached: Bool[Array, ""]
@@ -42,7 +42,9 @@ class Way(NamedTuple):
 _PARTS_FOLLOWED = 2
 
 
-def answering(chain: Chain, command: Command, last: Solved, solved: Solved, way: Way) -> Solved:
+def attach_derivatives(
+    chain: Chain, command: Command, last: SolverState, solved: SolverState, way: SubstepHistory
+) -> SolverState:
     """A solved state with its derivatives by chain, command and the state before.
 
     Contacts remember: where loads on the bodies came on before the tendons, the derivatives go
@@ -63,13 +65,15 @@ def answering(chain: Chain, command: Command, last: Solved, solved: Solved, way:
         whole = (way.parts <= 1) | (not chain.friction.remembers)
         return _answering_part(chain, command, last, solved, way.reached & whole)
     known = way.reached & (way.parts <= _PARTS_FOLLOWED)
-    halfway = on_the_way(chain, command, last, _still(way.part_before))
+    halfway = interpolate_command(chain, command, last, _still(way.part_before))
     items = (halfway, way.between, way.parts > 1), (command, solved, jnp.array(True))
 
-    def follow(before: Solved, item: tuple[Command, Solved, Array]) -> tuple[Solved, None]:
+    def follow(
+        before: SolverState, item: tuple[Command, SolverState, Array]
+    ) -> tuple[SolverState, None]:
         towards, found, taken = item
 
-        def answer() -> Solved:
+        def answer() -> SolverState:
             return _answering_part(chain, towards, before, found, known)
 
         return jax.lax.cond(taken, answer, lambda: before), None
@@ -79,13 +83,13 @@ def answering(chain: Chain, command: Command, last: Solved, solved: Solved, way:
 
 
 def _answering_part(
-    chain: Chain, command: Command, last: Solved, solved: Solved, reached: Bool[Array, ""]
-) -> Solved:
+    chain: Chain, command: Command, last: SolverState, solved: SolverState, reached: Bool[Array, ""]
+) -> SolverState:
     """The same of a load, or a part of one, that was solved in one go."""
     point = _still(solved.point)
     at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
     step = linear_step(chain, command, point.unknowns, last.memory, point.base_tension, at)
-    moved = Point(step.unknowns, step.base_tension)
+    moved = Iterate(step.unknowns, step.base_tension)
     point = jax.tree.map(lambda value, by: value + by, point, moved)
     at = evaluate(chain, point.unknowns, last.memory, point.base_tension, command.applied)
     memory = Memory(
@@ -93,8 +97,8 @@ def _answering_part(
         slid=tuple(span.slid for span in at.spans),
         bound=tuple(span.bound for span in at.spans),
     )
-    drawn = stroke(chain, point.base_tension, at.base)
-    answer = Solved(point, memory, drawn, command.applied)
+    released_length = stroke(chain, point.base_tension, at.base)
+    answer = SolverState(point, memory, released_length, command.applied)
     return jax.tree.map(
         lambda value, varied: _varying(value, varied, reached), _still(solved), answer
     )
@@ -122,4 +126,4 @@ def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Arra
     return jnp.zeros_like(varied), tangents[1] * jnp.where(known, 1.0, jnp.nan)
 
 
-__all__ = ["Way", "answering"]
+__all__ = ["SubstepHistory", "attach_derivatives"]

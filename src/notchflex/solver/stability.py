@@ -12,12 +12,14 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from notchflex.loads.command import Command
-from notchflex.solver.continuation import Solved
+from notchflex.solver.continuation import SolverState
 from notchflex.solver.held_stiffness import held_stiffness
-from notchflex.solver.programs.prepare import Prepared
+from notchflex.solver.programs.prepare import PreparedChain
 
 
-def stable(prepared: Prepared, commands: Command, solved: Solved) -> Bool[np.ndarray, " s"]:
+def stable(
+    prepared: PreparedChain, commands: Command, solved: SolverState
+) -> Bool[np.ndarray, " s"]:
     """Whether every state is stable, contacts that stick held."""
     told: list[bool] = []
     for stiffness, signs in held_stiffness(prepared, commands, solved):
@@ -29,7 +31,7 @@ def stable(prepared: Prepared, commands: Command, solved: Solved) -> Bool[np.nda
 
 
 def stability(
-    prepared: Prepared, commands: Command, solved: Solved
+    prepared: PreparedChain, commands: Command, solved: SolverState
 ) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
     """Smallest real part of the stiffness's eigenvalues and sign of the determinant, by state."""
     smallest: list[float] = []

@@ -9,14 +9,14 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.contact import LipGroup
+from notchflex.mechanics.contact import ContactGroup
 from notchflex.mechanics.flexure import flexure_state
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.motion import Motion, angular, skew, turned
 from notchflex.mechanics.tendon import TendonGroup
 from notchflex.solver.element import Unknowns
-from notchflex.solver.layout import Units
-from notchflex.solver.residual import Evaluation, picked
+from notchflex.solver.residual import Evaluation, select_anchors
+from notchflex.solver.row_layout import UnitRows
 
 
 class Moves(NamedTuple):
@@ -32,7 +32,7 @@ class Moves(NamedTuple):
     turn: Float[Array, "n a z"] | None
 
 
-class Strand(NamedTuple):
+class TendonJacobian(NamedTuple):
     """A group of tendons: rows at every flexure.
 
     Attributes:
@@ -43,7 +43,7 @@ class Strand(NamedTuple):
         gap_tension: Of the tension in the gap.
         carried: Of the tension handed on.
         at_edges: Of the tendon slid over both edges, by the memory's stiffness.
-        drawn: Of the tendon set free, this gap included; stretched by the memory's stiffness
+        released_length: Of the tendon set free, this gap included; stretched by its stiffness
             where no stroke is demanded.
         stretch: Of tension times length, this gap included; None where no stroke is demanded.
     """
@@ -54,11 +54,11 @@ class Strand(NamedTuple):
     gap_tension: Float[Array, "n t z"]
     carried: Float[Array, "n t z"]
     at_edges: Float[Array, "n t 2 z"]
-    drawn: Float[Array, "n t z"]
+    released_length: Float[Array, "n t z"]
     stretch: Float[Array, "n t z"] | None
 
 
-class Opening(NamedTuple):
+class ContactJacobian(NamedTuple):
     """A kind of lips: rows at every flexure.
 
     Attributes:
@@ -71,7 +71,7 @@ class Opening(NamedTuple):
     wrench: Float[Array, "n l w short"] | None
 
 
-def moves_of(chain: Chain, at: Evaluation, unit: Units) -> Moves:
+def relative_motion_jacobian(chain: Chain, at: Evaluation, unit: UnitRows) -> Moves:
     """How the bodies move."""
     pose, twist = at.flexure.pose, at.flexure.twist
     if pose is None or twist is None:
@@ -101,11 +101,11 @@ def _of_anchors(moves: Moves, back: Array) -> Float[Array, "n t w short"]:
 
 
 def _by_relative(
-    chain: Chain, at: Evaluation, group: TendonGroup | LipGroup, what: Callable[..., Any]
+    chain: Chain, at: Evaluation, group: TendonGroup | ContactGroup, what: Callable[..., Any]
 ) -> Any:
-    """Slopes of a crossing or touch by the motion relative to the anchor, as last axis."""
+    """Slopes of a crossing or response by the motion relative to the anchor, as last axis."""
     size = chain.rods.basis.shape[-2]
-    anchors = picked(at.anchors, group.back)
+    anchors = select_anchors(at.anchors, group.back)
     assert anchors is not None  # acts_on_bodies asks for them
 
     def one(own: Any, rod: Rod, flexure: Any, seen: Motion) -> Any:
@@ -122,7 +122,7 @@ def _by_relative(
 def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) -> Any:
     """Slopes of a crossing by the modes of the flexure where the anchor stays, as last axis."""
     with_pose = at.anchors is not None and group.acts_on_bodies
-    anchors = picked(at.anchors, group.back) if with_pose else None
+    anchors = select_anchors(at.anchors, group.back) if with_pose else None
 
     def one(own: Any, rod: Rod, memory: Any, seen: Motion | None, at_modes: Array) -> Any:
         def moved(varied: Array) -> Any:
@@ -134,9 +134,9 @@ def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) ->
     return jax.vmap(one)(group, chain.rods, chain.memory, anchors, modes)
 
 
-def strand_of(
-    chain: Chain, k: int, unknowns: Unknowns, at: Evaluation, unit: Units, moves: Moves
-) -> Strand:
+def tendon_jacobian(
+    chain: Chain, k: int, unknowns: Unknowns, at: Evaluation, unit: UnitRows, moves: Moves
+) -> TendonJacobian:
     """What the k-th group of tendons does."""
     group, span = chain.groups[k], at.spans[k]
     crossing = span.crossing
@@ -156,47 +156,49 @@ def strand_of(
         turning.append(unit.of_modes(both))
     log_ratio = unit.log_ratio[k].reshape(-1, 2, unit.modes.shape[-1])
     runs = group.runs[..., None]
-    passed_on = span.passed_on[..., None]
+    tension_ratio = span.tension_ratio[..., None]
     gap_tension = runs * (
-        passed_on[:, :, 0] * unit.tension[k][None]
+        tension_ratio[:, :, 0] * unit.tension[k][None]
         - span.gap_tension[..., None] * log_ratio[None, :, 0]
     )
     body_tension = (
-        passed_on[:, :, 1] * gap_tension - span.body_tension[..., None] * log_ratio[None, :, 1]
+        tension_ratio[:, :, 1] * gap_tension - span.body_tension[..., None] * log_ratio[None, :, 1]
     )
     in_body = body_tension * group.body_length[..., None]
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None, :, None]
     here = gap_tension * group.natural_gap[..., None] + in_body
-    beyond = unit.drawn[k][None]
-    drawn = beyond - runs * unit.spread(cast("Array", sum(length)))
+    beyond = unit.released_length[k][None]
+    released_length = beyond - runs * unit.spread(cast("Array", sum(length)))
     if unit.stretch is None:
         stretch = None
-        at_exit = drawn = drawn + here / stiffness
+        at_exit = released_length = released_length + here / stiffness
         at_entry = beyond + in_body / stiffness
     else:
         stretch = unit.stretch[k][None] + here
-        at_exit = drawn + stretch / stiffness
+        at_exit = released_length + stretch / stiffness
         at_entry = beyond + (unit.stretch[k][None] + in_body) / stiffness
-    return Strand(
+    return TendonJacobian(
         turning=cast("Array", sum(turning)),
         wrench=wrench,
         log_ratio=log_ratio,
         gap_tension=gap_tension,
         carried=jnp.where(runs > 0.0, body_tension, unit.tension[k][None]),
         at_edges=jnp.stack([at_exit, at_entry], axis=2),
-        drawn=drawn,
+        released_length=released_length,
         stretch=stretch,
     )
 
 
-def opening_of(chain: Chain, k: int, at: Evaluation, unit: Units, moves: Moves) -> Opening:
+def contact_jacobian(
+    chain: Chain, k: int, at: Evaluation, unit: UnitRows, moves: Moves
+) -> ContactJacobian:
     """What the k-th kind of lips does."""
-    group, touch = chain.lips[k], at.touches[k]
-    if touch.slope is not None:
-        return Opening(unit.of_modes(touch.slope), None)
-    slopes = _by_relative(chain, at, group, type(group).touch)
+    group, contact = chain.contact_pairs[k], at.contacts[k]
+    if contact.slope is not None:
+        return ContactJacobian(unit.of_modes(contact.slope), None)
+    slopes = _by_relative(chain, at, group, type(group).gap_response)
     move = _of_anchors(moves, group.back)
-    return Opening(
+    return ContactJacobian(
         jnp.einsum("nlw,nlwz->nlz", slopes.gap, move),
         jnp.einsum("nlvw,nlwz->nlvz", slopes.wrench, move),
     )

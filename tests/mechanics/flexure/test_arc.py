@@ -8,7 +8,7 @@ from numpy.polynomial.legendre import legvander
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.mechanics.contact.spine import SpineLips
+from notchflex.mechanics.contact.spine import SpineContact
 from notchflex.mechanics.flexure import Rod, fibre_stretch, relative_pose, rod, with_level
 from notchflex.mechanics.flexure import flexure_state as plain_flexure_state
 from notchflex.mechanics.material import section_law
@@ -44,7 +44,7 @@ def pose_and_twist(shape: Rod, modes: np.ndarray) -> tuple[Motion, np.ndarray]:
 
 def lip_gap(shape: Rod, theta: float) -> float:
     state = flexure_state(shape, LAW, (), np.array([theta]), with_pose=False)
-    return float(SpineLips(np.ones(1), np.ones(1, int)).touch(shape, state, None).gap[0])
+    return float(SpineContact(np.ones(1), np.ones(1, int)).gap_response(shape, state, None).gap[0])
 
 
 def pacheco_notch(theta: float, centroid: float, height: float = 0.8) -> np.ndarray:

@@ -8,8 +8,8 @@ import pytest
 import notchflex as nf
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.flexure import Rod, pull_change, relative_pose
-from notchflex.mechanics.flexure.rod_kinematics import bent, twist_slope
+from notchflex.mechanics.flexure import Rod, geometric_stiffness, relative_pose
+from notchflex.mechanics.flexure.rod_kinematics import integrate_rod, twist_slope
 from notchflex.mechanics.motion import unskew
 
 SMALL = nf.StripNotch(3.5, 1.5, 6.9, deflection="small", repeat=7)
@@ -38,9 +38,9 @@ def test_slopes_are_the_derivatives_of_the_pose(name: str, flat: bool, margin) -
         shape = jax.tree.map(lambda leaf, j=number: leaf[j], chain.rods)
         modes = jnp.array(0.15 * numbers.normal(size=shape.modes))
         wrench = jnp.array(numbers.normal(size=shape.basis.shape[-2]))
-        own = bent(shape, modes)
+        own = integrate_rod(shape, modes)
         turns_and_moves = twist_slope(shape, modes, own) - twist(shape, modes)
         margin.within("twist", turns_and_moves, 1e-13)
         wanted = jax.jacfwd(lambda varied, s=shape, w=wrench: twist(s, varied).T @ w)(modes)
-        change = pull_change(shape, modes, own, wrench) - wanted
+        change = geometric_stiffness(shape, modes, own, wrench) - wanted
         margin.within("change of the pull, relative", change / np.abs(wanted).max(), 1e-13)

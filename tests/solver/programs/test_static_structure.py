@@ -5,10 +5,10 @@ import pytest
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.analysis.solve import prepared_for
+from notchflex.analysis.solve import prepare_for
 from notchflex.loads.conversion import load_path
-from notchflex.solver.programs.prepare import Prepared
-from notchflex.solver.programs.static_structure import KnownForm
+from notchflex.solver.programs.prepare import PreparedChain
+from notchflex.solver.programs.static_structure import StaticStructure
 
 LOADS = {
     "pacheco2021-a": nf.Load(tension=1.0),
@@ -18,48 +18,50 @@ LOADS = {
 }
 
 
-def ready(robot: nf.Robot, load: nf.Load) -> Prepared:
-    return prepared_for(robot, load_path(load, robot.number_of_tendons))
+def ready(robot: nf.Robot, load: nf.Load) -> PreparedChain:
+    return prepare_for(robot, load_path(load, robot.number_of_tendons))
 
 
 @pytest.mark.parametrize("name", LOADS)
 def test_the_chain_comes_back(name: str) -> None:
     own = ready(nf.load_robot(name), LOADS[name])
-    assert own.known_form.size < own.chain_form.size
-    for unpacked in (own.known_form.unpack(own.known_vector), _traced(own)):
+    assert own.static_structure.size < own.chain_layout.size
+    for unpacked in (own.static_structure.unpack(own.dynamic_vector), _traced(own)):
         back = jax.tree.leaves(unpacked)
         for one, leaf in zip(back, jax.tree.leaves(own.chain), strict=True):
             np.testing.assert_array_equal(one, leaf)
 
 
-def _traced(own: Prepared) -> object:
-    return jax.jit(own.known_form.unpack)(own.known_vector)
+def _traced(own: PreparedChain) -> object:
+    return jax.jit(own.static_structure.unpack)(own.dynamic_vector)
 
 
 def test_dimensions_do_not_change_the_form() -> None:
     """Nor what is zero by chance: a straight notch, no friction."""
     load = LOADS["pacheco2021-a"]
     wrist = nf.load_robot("pacheco2021-a")
-    own = ready(wrist, load).known_form
-    assert ready(nf.load_robot("pacheco2021-b-specimen"), load).known_form is own
+    own = ready(wrist, load).static_structure
+    assert ready(nf.load_robot("pacheco2021-b-specimen"), load).static_structure is own
     for name, value in {"notch[2].depth": 1.3, "friction.coefficient": 0.0}.items():
-        assert ready(wrist.with_value(name, value), load).known_form is own
+        assert ready(wrist.with_value(name, value), load).static_structure is own
 
 
 def test_a_form_serves_all_chains_of_a_batch() -> None:
     """A number that any of them has is part of the vector."""
     own = ready(nf.load_robot("gao2017"), LOADS["gao2017"])
     numbers = np.stack([own.vector, own.vector])
-    known = np.setdiff1d(np.arange(own.vector.size), own.known_form._taken)
+    known = np.setdiff1d(np.arange(own.vector.size), own.static_structure._taken)
     place = next(one for one in known if own.vector[one] == 0.0)
     numbers[1, place] = 0.25
-    wider = KnownForm.of(own.chain_form, [own.chain, own.chain], numbers)
-    assert wider is not own.known_form
+    wider = StaticStructure.of(own.chain_layout, [own.chain, own.chain], numbers)
+    assert wider is not own.static_structure
     packed = wider.pack(numbers)
-    second = own.chain_form.pack(wider.unpack(packed[1]))
+    second = own.chain_layout.pack(wider.unpack(packed[1]))
     np.testing.assert_array_equal(second, numbers[1])
     # Every chain that the first form serves is served by the wider one, which is there now.
-    assert KnownForm.of(own.chain_form, [own.chain], own.vector[None]) is own.known_form
+    assert (
+        StaticStructure.of(own.chain_layout, [own.chain], own.vector[None]) is own.static_structure
+    )
 
 
 def test_robots_that_differ_soon_share_a_form() -> None:
@@ -79,9 +81,9 @@ def test_robots_that_differ_soon_share_a_form() -> None:
         )
         robot = nf.load_robot("two-axis-wrist").replace(name=name, notch=notches, tendon=tendons)
         own = ready(robot, nf.Load(tension=[0.1], tip_force=(0.001, 0.002, 0.0)))
-        forms.append(own.known_form)
+        forms.append(own.static_structure)
         np.testing.assert_array_equal(
-            own.chain_form.pack(own.known_form.unpack(own.known_vector)), own.vector
+            own.chain_layout.pack(own.static_structure.unpack(own.dynamic_vector)), own.vector
         )
     assert len({id(one.form) for one in forms}) == 1
     assert len({id(one) for one in forms}) <= 3

@@ -10,14 +10,14 @@ from jaxtyping import Float
 from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.closing_loads.edges import edge_closing
 from notchflex.analysis.closing_loads.search import ClosingStatus, closing_tensions
-from notchflex.loads.command import tensions_alone
+from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble
 from notchflex.mechanics.contact import closing_travel, free_angle
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.prepare import Prepared, prepared
-from notchflex.solver.programs.run import lips
+from notchflex.solver.programs.prepare import PreparedChain, prepare
+from notchflex.solver.programs.run import solve_contacts
 
 _ANGLE = QUANTITIES["total_angle"]
 _MOST_ROWS = 12
@@ -28,7 +28,7 @@ class Closing(Displayed):
     """Closing of every notch, base to tip.
 
     Attributes:
-        angle: Notch angle at which its lips meet, precurvature included, rad.
+        angle: Notch angle at which its solve_contacts meet, precurvature included, rad.
         tension: Base tension that closes it, N, loading from rest; NaN where none was found.
         status: A `ClosingStatus`: "closes"; "never", no tension up to 64 times the one that
             would close a linear notch alone (twice that of the softest for slots); or "not found",
@@ -87,10 +87,10 @@ def closing(robot: Robot) -> Closing:
     tendon = np.argmax(arm, axis=1)
     longest = arm[np.arange(len(arm)), tendon]
     if np.isfinite(travel).all():
-        tension, status = _tensions(prepared(robot), tendon, longest, travel)
+        tension, status = _tensions(prepare(robot), tendon, longest, travel)
         met = travel
     else:
-        tension, met, status = edge_closing(prepared(robot), tendon, longest)
+        tension, met, status = edge_closing(prepare(robot), tendon, longest)
     has_spine = np.isfinite(travel)
     elastic = np.where(has_spine, travel / height, np.nan)
     return Closing(
@@ -111,7 +111,7 @@ def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
     Positive where it bends the notch toward its direction; 0 where it does not go.
     """
     place = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_place)[..., 0]
-    spine = np.where(np.asarray(chain.rods.lip_closes) > 0.0, chain.rods.end_offset[:, 0], 0.0)
+    spine = np.where(np.asarray(chain.rods.has_closure) > 0.0, chain.rods.end_offset[:, 0], 0.0)
     arm = np.zeros((chain.flexures, chain.tendons))
     for group in chain.groups:
         own = list(group.numbers)
@@ -120,7 +120,7 @@ def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
 
 
 def _tensions(
-    ready: Prepared,
+    ready: PreparedChain,
     tendon: np.ndarray,
     arm: Float[np.ndarray, " n"],
     travel: Float[np.ndarray, " n"],
@@ -132,14 +132,16 @@ def _tensions(
     notches = np.flatnonzero((arm > 0.0) & (travel > 0.0))
     if len(notches) == 0:
         return found, status
-    stiffness = np.asarray(chain.lip_stiffness)
+    stiffness = np.asarray(chain.contact_stiffness)
     # Always as many rows as notches, whichever are searched: one compiled program.
     which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 
     def overlap(tension: Float[np.ndarray, " m"]) -> np.ndarray:
         value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[which]] = np.resize(tension, chain.flexures)
-        force, gap, converged = lips(ready, tensions_alone(value), ready.rest, Settings())
+        force, gap, converged = solve_contacts(
+            ready, tension_commands(value), ready.rest, Settings()
+        )
         overlap = force[rows, which] / stiffness[which] - gap[rows, which]
         return np.where(converged, overlap, np.nan)[: len(notches)]
 

@@ -1,6 +1,6 @@
 """When do notches close whose edges belong to rigid pieces, as slots and triangular notches do?
 
-The tendon is pulled in steps from rest; between the two steps where an edge comes to touch, the
+The tendon is pulled in steps from rest; between the two steps where an edge comes to response, the
 tension is found by false position on the solver itself.
 """
 
@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.analysis.closing_loads.search import ClosingStatus, statuses
-from notchflex.loads.command import tensions_alone
+from notchflex.loads.command import tension_commands
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.prepare import Prepared
+from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import run
 
 # Steps of the first pull, up to so many times the tension that would close the softest notch if it
@@ -24,7 +24,7 @@ _ROUNDS, _MOST_ROUNDS = 4, 12
 
 
 def edge_closing(
-    ready: Prepared, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
+    ready: PreparedChain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
     """Tension (N) that closes every notch, its angle then (rad), and a `ClosingStatus`.
 
@@ -45,13 +45,13 @@ def edge_closing(
 
 
 def _by_one_tendon(
-    ready: Prepared, tendon: int, own: np.ndarray
+    ready: PreparedChain, tendon: int, own: np.ndarray
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], np.ndarray]:
     # Two steps where one would do: one alone is another program to compile.
     free, _ = _pull(ready, tendon, np.zeros(2))
     reach = -free[0, own]  # the gap at rest: an edge so far from closing
     # Tendon and edges are about as far from the axis.
-    linear = np.asarray(ready.chain.lip_stiffness)[own] * reach
+    linear = np.asarray(ready.chain.contact_stiffness)[own] * reach
     steps = np.linspace(0.0, _BEYOND_LINEAR * linear.max(), _STEPS + 1)
     overlap, angle = _pull(ready, tendon, steps)
     touching = overlap[:, own] > 0.0
@@ -84,13 +84,13 @@ def _by_one_tendon(
 
 
 def _pull(
-    ready: Prepared, tendon: int, tensions: Float[np.ndarray, " s"]
+    ready: PreparedChain, tendon: int, tensions: Float[np.ndarray, " s"]
 ) -> tuple[Float[np.ndarray, "s n"], Float[np.ndarray, "s n"]]:
     """Overlap of every notch's edges (contact force / stiffness - gap, mm) and its angle (rad)."""
     value = np.zeros((len(tensions), ready.chain.tendons))
     value[:, tendon] = tensions
-    came = run(ready, tensions_alone(value), ready.rest, Settings(), each_from_start=False)
-    stiffness = np.asarray(ready.chain.lip_stiffness)
+    came = run(ready, tension_commands(value), ready.rest, Settings(), each_from_start=False)
+    stiffness = np.asarray(ready.chain.contact_stiffness)
     overlap = came.quantity("contact_force") / stiffness - came.quantity("gap")
     good = came.converged[:, None]
     angle = came.quantity("notch_angle")

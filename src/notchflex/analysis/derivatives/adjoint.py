@@ -17,11 +17,11 @@ from notchflex._jax import jax, jnp
 from notchflex.analysis.derivatives.tangent import ROTATIONS, VECTORS, Change, PathTangents
 from notchflex.analysis.outputs import reported
 from notchflex.results.path import EquilibriumPath
-from notchflex.solver.derived.quantities import of_own
+from notchflex.solver.derived.quantities import unpad_quantity
 from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.pytree_layout import Form, lane_sizes
-from notchflex.solver.programs.static_structure import KnownForm
-from notchflex.solver.sensitivity import Way, answering
+from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
+from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.sensitivity import SubstepHistory, attach_derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Gradient:
 
     loads: Float[np.ndarray, "s command"]
     chain: Float[np.ndarray, " unknown"]
-    form: KnownForm
+    form: StaticStructure
 
     def along(self, change: Change) -> float:
         """Return the derivative of the number along a change."""
@@ -63,18 +63,18 @@ def gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> Gradie
     """
     long = path.prepared.long
     outputs = tuple(weights)
-    packed, command_form, states = PathTangents(path, outputs).steps
-    form = (long.known_form, command_form, long.state)
+    packed, command_layout, states = PathTangents(path, outputs).steps
+    form = (long.static_structure, command_layout, long.state)
     seeds = _packed(path, weights, _shapes(*form, outputs))
     # No step beyond the last that counts: one that failed there must not matter.
     backwards = slice(int(np.flatnonzero(seeds.any(axis=1)).max(initial=0)), None, -1)
     given = [one[backwards] for one in (*states, packed, seeds)]
     rows = (False, False, *(True,) * len(given))
-    start = (np.zeros(long.state.size), long.known_vector)
+    start = (np.zeros(long.state.size), long.dynamic_vector)
     came = _adjoint.along(rows, *start, *given, *form, outputs)
     loads = np.zeros_like(packed)
     loads[backwards] = came["load"]
-    return Gradient(loads, came["chain"].sum(axis=0), long.known_form)
+    return Gradient(loads, came["chain"].sum(axis=0), long.static_structure)
 
 
 def _packed(
@@ -87,7 +87,9 @@ def _packed(
         if turn is not None and name in (*VECTORS, *ROTATIONS):
             weight = weight @ turn if name in VECTORS else turn.T @ weight
         size = int(np.prod(shapes[name]))
-        numbers = of_own(path.chain, name, np.arange(float(size)).reshape(1, *shapes[name]))[0]
+        numbers = unpad_quantity(
+            path.chain, name, np.arange(float(size)).reshape(1, *shapes[name])
+        )[0]
         is_there = np.isfinite(numbers)  # tendons may meet fewer edges than there are
         whole = np.zeros((len(weight), size))
         whole[:, numbers[is_there].astype(int)] = weight[:, is_there]
@@ -97,15 +99,18 @@ def _packed(
 
 @lru_cache(maxsize=64)
 def _shapes(
-    chain_form: KnownForm, command_form: Form, state_form: Form, outputs: tuple[str, ...]
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
+    outputs: tuple[str, ...],
 ) -> dict[str, tuple[int, ...]]:
     """Shapes of the outputs of the long chain."""
-    del command_form
+    del command_layout
 
     def report(chain: Array, state: Array) -> dict[str, Array]:
-        return reported(chain_form.unpack(chain), state_form.unpack(state), outputs)
+        return reported(chain_layout.unpack(chain), state_layout.unpack(state), outputs)
 
-    vectors = (jax.ShapeDtypeStruct((form.size,), float) for form in (chain_form, state_form))
+    vectors = (jax.ShapeDtypeStruct((form.size,), float) for form in (chain_layout, state_layout))
     return {name: one.shape for name, one in jax.eval_shape(report, *vectors).items()}
 
 
@@ -120,24 +125,24 @@ def _adjoint(
     how: Float[Array, " 3"],
     load: Float[Array, " command"],
     weights: Float[Array, " outputs"],
-    chain_form: KnownForm,
-    command_form: Form,
-    state_form: Form,
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
     outputs: tuple[str, ...],
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
     """What a state counts, which is carried to the one before; what its load and chain count."""
-    solved, halfway = state_form.unpack(state), state_form.unpack(between)
-    way = Way(halfway, how[0], how[1].astype(int), how[2] > 0.0)
-    leaves, structure = jax.tree.flatten(chain_form.unpack(chain))
+    solved, halfway = state_layout.unpack(state), state_layout.unpack(between)
+    way = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+    leaves, structure = jax.tree.flatten(chain_layout.unpack(chain))
     varies = [jnp.issubdtype(leaf.dtype, jnp.floating) for leaf in leaves]
 
     def found(load: Array, before: Array, numbers: list[Array]) -> tuple[Array, Array]:
         rest = iter(numbers)
         every = [next(rest) if own else leaf for own, leaf in zip(varies, leaves, strict=True)]
-        robot, last = jax.tree.unflatten(structure, every), state_form.unpack(before)
-        answer = answering(robot, command_form.unpack(load), last, solved, way)
+        robot, last = jax.tree.unflatten(structure, every), state_layout.unpack(before)
+        answer = attach_derivatives(robot, command_layout.unpack(load), last, solved, way)
         values = reported(robot, answer, outputs)
-        return state_form.pack(answer), jnp.concatenate([values[one].ravel() for one in outputs])
+        return state_layout.pack(answer), jnp.concatenate([values[one].ravel() for one in outputs])
 
     numbers = [jnp.asarray(leaf) for own, leaf in zip(varies, leaves, strict=True) if own]
     pull_back = jax.vjp(found, load, before, numbers)[1]
@@ -147,7 +152,7 @@ def _adjoint(
         next(rest).ravel() if own else jnp.zeros(leaf.size)
         for own, leaf in zip(varies, leaves, strict=True)
     ]
-    by_chain = chain_form.pack(jnp.concatenate(every))
+    by_chain = chain_layout.pack(jnp.concatenate(every))
     return jnp.where(remembers[0] > 0.0, by_before, 0.0), {"load": by_load, "chain": by_chain}
 
 

@@ -16,12 +16,12 @@ from notchflex._jax import jax, jnp
 from notchflex.analysis.derivatives.callback import outputs_function
 from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
 from notchflex.analysis.derivatives.kinks import Kink, kinks
-from notchflex.analysis.outputs import known_outputs
+from notchflex.analysis.outputs import check_outputs
 from notchflex.analysis.solve import check_refinement
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.conversion import load_path
-from notchflex.loads.validation import robot_given, shown
+from notchflex.loads.validation import check_is_robot, short_repr
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
@@ -83,7 +83,7 @@ def differentiable(
         >>> f"{by['notch.depth']:.2f} rad/mm, {by['tension'][0, 0]:.3f} rad/N"
         '13.30 rad/mm, 1.520 rad/N'
     """
-    path = load_path(loads, robot_given(robot).number_of_tendons)
+    path = load_path(loads, check_is_robot(robot).number_of_tendons)
     check_refinement(refinement)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if not names or len(set(names)) < len(names):
@@ -101,7 +101,7 @@ def differentiable(
             start[name] = np.array([getattr(one, name) for one in path.external])
     start = {name: jnp.asarray(start[name], float) for name in names}
     return Differentiable(
-        robot, path, start, known_outputs(outputs), settings or DEFAULT, refinement
+        robot, path, start, check_outputs(outputs), settings or DEFAULT, refinement
     )
 
 
@@ -229,7 +229,7 @@ class Differentiable:
         """Values of all parameters, in their shapes."""
         if not isinstance(values, Mapping | None):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError.WRONG_TYPE(
-                f"give values by name of the parameter; got {shown(values)}"
+                f"give values by name of the parameter; got {short_repr(values)}"
             )
         given = dict(values or {})
         wrong = [name for name in given if name not in self.start]
@@ -255,7 +255,7 @@ class Differentiable:
             return jnp.broadcast_to(jnp.asarray(value, float), wanted)
         except (TypeError, ValueError):
             raise InputError.WRONG_SHAPE(
-                f"`{name}` must be numbers of shape {wanted}; got {shown(value)}"
+                f"`{name}` must be numbers of shape {wanted}; got {short_repr(value)}"
             ) from None
 
     @cached_property
@@ -341,7 +341,7 @@ class _Solver:
         """Change of loads and chain per unit of every value."""
         of = self._of
         # One program for all: with a change of the chain where any value changes it.
-        still = np.zeros(of.model.ready.long.chain_form.size) if of.numbers else None
+        still = np.zeros(of.model.ready.long.chain_layout.size) if of.numbers else None
         for name, value in values.items():
             if name in of.numbers:
                 yield self._by_number(path, values, name)

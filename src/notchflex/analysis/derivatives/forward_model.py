@@ -18,16 +18,16 @@ from jaxtyping import Bool, Float
 from notchflex.analysis.derivatives.adjoint import gradient
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.derivatives.tangent import Change, PathTangents
-from notchflex.analysis.solve import prepared_for
+from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
-from notchflex.loads.command import command
 from notchflex.loads.load_path import LoadPath
+from notchflex.loads.make_commands import make_commands
 from notchflex.mechanics.chain import Shaped, laws, shape_of
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import Prepared, flat, prepared
+from notchflex.solver.programs.prepare import PreparedChain, flat, prepared
 from notchflex.solver.programs.run import run
 
 # One gradient of a number takes about as long as derivatives along so many directions.
@@ -55,7 +55,7 @@ class ForwardModel:
     any_load: bool = False
 
     @cached_property
-    def ready(self) -> Prepared:
+    def ready(self) -> PreparedChain:
         """The robot as it is, as arrays."""
         return self._assembled(self.robot)
 
@@ -69,8 +69,8 @@ class ForwardModel:
         Raises:
             InputError: The arrays of the robot have another form than those of the model's.
         """
-        ready = self._prepared(robot)
-        commands = command(load, robot, ready.chain)
+        ready = self._prepare(robot)
+        commands = make_commands(load, robot, ready.chain)
         came = run(ready, commands, None, self.settings, each_from_start=self.from_rest)
         return EquilibriumPath(robot, load, ready, came, settings=self.settings)
 
@@ -92,25 +92,27 @@ class ForwardModel:
             def of_laws(value: float) -> np.ndarray:
                 return flat(laws(replace(part, **{key: value}), shape))
 
-            chain = np.zeros(self.ready.long.chain_form.size)
+            chain = np.zeros(self.ready.long.chain_layout.size)
             chain[self._places[section]] = slope(of_laws, getattr(part, key), order=2)
             return Change(None, chain)
 
         def packed(value: float) -> np.ndarray:
             varied = robot.with_value(name, value)
             ready = self._prepared(varied)
-            loads, _ = ready.long_commands(command(load, varied, ready.chain))
+            loads, _ = ready.padded_commands(make_commands(load, varied, ready.chain))
             return np.concatenate([ready.long.vector, loads.ravel()])
 
-        size = self.ready.long.chain_form.size
+        size = self.ready.long.chain_layout.size
         found = slope(packed, number_at(robot, name))
         return Change(found[size:].reshape(len(load), -1), found[:size])
 
-    def load_change(self, path: EquilibriumPath, load: LoadPath) -> Float[np.ndarray, "s command"]:
+    def load_change(
+        self, path: EquilibriumPath, load: LoadPath
+    ) -> Float[np.ndarray, "s make_commands"]:
         """Difference of other loads from those of a path, packed for the long chain."""
         ready, robot = path.prepared, path.robot
-        here, _ = ready.long_commands(path.commands)
-        there, _ = ready.long_commands(command(load, robot, ready.chain))
+        here, _ = ready.padded_commands(path.commands)
+        there, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
         return there - here
 
     def derivatives(
@@ -148,17 +150,17 @@ class ForwardModel:
                 found[name][:, *place] = [by.along(one) for one in directions]
         return found
 
-    def _assembled(self, robot: Robot) -> Prepared:
+    def _assembled(self, robot: Robot) -> PreparedChain:
         if self.any_load:
-            return prepared(robot, "space", loaded=True, refinement=self.refinement, flat=False)
-        return prepared_for(robot, self.load, None, self.refinement)
+            return prepare(robot, "space", loaded=True, refinement=self.refinement, flat=False)
+        return prepare_for(robot, self.load, None, self.refinement)
 
     @cached_property
-    def _prepared(self) -> Callable[[Robot], Prepared]:
+    def _prepared(self) -> Callable[[Robot], PreparedChain]:
         """Arrays of the robot with some other numbers; a control loop asks for the same again."""
         return lru_cache(maxsize=4)(self._varied)
 
-    def _varied(self, robot: Robot) -> Prepared:
+    def _varied(self, robot: Robot) -> PreparedChain:
         own, shape = self.robot, self._shape(robot)
         if robot is own:
             return self.ready
@@ -167,7 +169,7 @@ class ForwardModel:
             fields = laws(robot.material, shape) | laws(robot.friction, shape)
             return self.ready.with_fields(fields)
         ready = self._assembled(robot)
-        if ready.chain_form is not self.ready.chain_form:
+        if ready.chain_layout is not self.ready.chain_layout:
             raise InputError.UNSUPPORTED(
                 "with these values the robot has another form; it must stay the same"
             )

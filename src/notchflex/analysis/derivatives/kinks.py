@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import Solved
-from notchflex.solver.programs.run import Run
-from notchflex.solver.residual import holds
+from notchflex.solver.continuation import SolverState
+from notchflex.solver.programs.run import SolverRun
+from notchflex.solver.residual import slip_mask
 
 if TYPE_CHECKING:  # for the type only: a path tells its kinks
     from notchflex.results.path import EquilibriumPath
@@ -54,7 +54,7 @@ def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
     Returns:
         One record each, by step; none where a step did not converge.
     """
-    if not isinstance(path.run, Run):
+    if not isinstance(path.run, SolverRun):
         return []
     solved, before = path.run.solved, path.prepared.state.unpack(path.run.between)
     found = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
@@ -62,7 +62,7 @@ def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
     return sorted((one for one in found if good[one.step]), key=lambda one: one.step)
 
 
-def _contacts(chain: Chain, solved: Solved, before: Solved, within: float) -> list[Kink]:
+def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: float) -> list[Kink]:
     height = np.asarray(chain.rods.length).sum(-1)[:, None, None]
     edges = np.asarray(chain.contacts)
     found: list[Kink] = []
@@ -73,7 +73,7 @@ def _contacts(chain: Chain, solved: Solved, before: Solved, within: float) -> li
         slip = np.abs(np.asarray(solved.memory.slid[k]) - np.asarray(before.memory.slid[k]))
         left = np.maximum(bound - np.abs(ratio), 0.0)
         distance = np.maximum(left, slip / height)
-        can_slide = np.asarray(holds(group)) > 0.0
+        can_slide = np.asarray(slip_mask(group)) > 0.0
         tension = np.asarray(solved.point.base_tension)[:, list(group.numbers)]
         loaded = (tension > 0.0)[:, None, :, None]
         at_switch = (distance < within) & can_slide & loaded & (bound > 0.0)
@@ -88,7 +88,7 @@ def _contacts(chain: Chain, solved: Solved, before: Solved, within: float) -> li
 def _notches(path: EquilibriumPath, within: float) -> list[Kink]:
     chain = path.chain
     height = np.asarray(chain.rods.length).sum(-1)
-    travel = path.contact_force / np.asarray(chain.lip_stiffness)
+    travel = path.contact_force / np.asarray(chain.contact_stiffness)
     distance: Float[np.ndarray, "s n"] = np.maximum(np.abs(path.gap), travel) / height
     return [
         Kink(int(step), "notch", int(notch) + 1, None, float(distance[step, notch]))

@@ -16,13 +16,13 @@ from jaxtyping import Array, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.analysis.outputs import reported
 from notchflex.results.path import EquilibriumPath
-from notchflex.solver.derived.quantities import of_own
-from notchflex.solver.programs.capacity import lengthen
+from notchflex.solver.derived.quantities import unpad_quantity
+from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.pytree_layout import Form, lane_sizes
-from notchflex.solver.programs.run import Run
-from notchflex.solver.programs.static_structure import KnownForm
-from notchflex.solver.sensitivity import Way, answering
+from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
+from notchflex.solver.programs.run import SolverRun
+from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.sensitivity import SubstepHistory, attach_derivatives
 
 VECTORS = ("tip_position", "body_position", "base_force", "base_moment")
 ROTATIONS = ("tip_rotation", "body_rotation")
@@ -40,7 +40,9 @@ class Change:
     loads: Float[np.ndarray, "s command"] | None
     chain: Float[np.ndarray, " chain"] | None
 
-    def entries(self, form: KnownForm) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+    def entries(
+        self, form: StaticStructure
+    ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
         """Return where the chain changes, as packed for programs, and by how much."""
         if form not in self._entries:
             chain = np.zeros(0) if self.chain is None else self.chain
@@ -49,7 +51,7 @@ class Change:
         return self._entries[form]
 
     @cached_property
-    def _entries(self) -> dict[KnownForm, tuple[np.ndarray, np.ndarray]]:
+    def _entries(self) -> dict[StaticStructure, tuple[np.ndarray, np.ndarray]]:
         return {}
 
 
@@ -77,20 +79,20 @@ class PathTangents:
         """
         loads, chain = direction.loads, direction.chain
         long = self.path.prepared.long
-        form = long.known_form
+        form = long.static_structure
         varies = chain is not None
         change = form.pack(chain) if varies else np.zeros(1)
-        packed, command_form, states = self.steps
+        packed, command_layout, states = self.steps
         moved = np.zeros_like(packed) if loads is None else loads
-        given = (np.zeros(long.state.size), long.known_vector, change)
+        given = (np.zeros(long.state.size), long.dynamic_vector, change)
         steps = (*states, packed, moved)
         rows = (*(False,) * len(given), *(True,) * len(steps))
-        others = (form, command_form, long.state, self.outputs, varies)
+        others = (form, command_layout, long.state, self.outputs, varies)
         found = _tangent.along(rows, *given, *steps, *others)
         return {name: self._own(name, values) for name, values in found.items()}
 
     @cached_property
-    def steps(self) -> tuple[np.ndarray, Form, tuple[np.ndarray, ...]]:
+    def steps(self) -> tuple[np.ndarray, PytreeLayout, tuple[np.ndarray, ...]]:
         """What programs take of every load, for the long chain.
 
         Returns:
@@ -98,16 +100,16 @@ class PathTangents:
             the states before and at the load and between, and how it was found.
         """
         ready, came = self.path.prepared, self.path.run
-        assert isinstance(came, Run)
-        packed, form = ready.long_commands(self.path.commands)
+        assert isinstance(came, SolverRun)
+        packed, form = ready.padded_commands(self.path.commands)
         own = (came.states_before, came.states, came.between)
-        every = (lengthen(one, ready.state, ready.long.state) for one in own)
+        every = (pad_rows(one, ready.state, ready.long.state) for one in own)
         how = np.stack([came.part_before, came.parts, self.path.converged], axis=1)
         remembers = (self.remembers & ~came.from_start)[:, None].astype(float)
         return packed, form, (remembers, *every, how)
 
     def _own(self, name: str, values: np.ndarray) -> np.ndarray:
-        own = of_own(self.path.chain, name, values)
+        own = unpad_quantity(self.path.chain, name, values)
         turn = self.path.base_to_world
         if turn is None or name not in (*VECTORS, *ROTATIONS):
             return own
@@ -126,9 +128,9 @@ def _tangent(
     how: Float[Array, " 3"],
     load: Float[Array, " command"],
     load_change: Float[Array, " command"],
-    chain_form: KnownForm,
-    command_form: Form,
-    state_form: Form,
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
     outputs: tuple[str, ...],
     varies: bool,
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
@@ -136,14 +138,14 @@ def _tangent(
 
     The program for loads alone, where the chain does not vary, is a fifth shorter.
     """
-    solved, halfway = state_form.unpack(state), state_form.unpack(between)
-    way = Way(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+    solved, halfway = state_layout.unpack(state), state_layout.unpack(between)
+    way = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
 
     def told(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
-        own, last = chain_form.unpack(varied), state_form.unpack(before)
-        command = command_form.unpack(load)
-        found = answering(own, command, last, solved, way)
-        return state_form.pack(found), reported(own, found, outputs)
+        own, last = chain_layout.unpack(varied), state_layout.unpack(before)
+        command = command_layout.unpack(load)
+        found = attach_derivatives(own, command, last, solved, way)
+        return state_layout.pack(found), reported(own, found, outputs)
 
     at, changes = (
         (load, before),

@@ -15,10 +15,10 @@ from notchflex.analysis.derivatives.kinks import Kink, kinks
 from notchflex.analysis.derivatives.tangent import Change
 from notchflex.analysis.solve import check_refinement
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.applied import Applied
+from notchflex.loads.applied import BodyLoads
 from notchflex.loads.command import Command
 from notchflex.loads.conversion import load_path
-from notchflex.loads.validation import robot_given
+from notchflex.loads.validation import check_is_robot
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
@@ -83,7 +83,7 @@ def tip_response(
         >>> found.jacobian.shape, found.compliance.shape
         ((2, 6, 1), (2, 6, 6))
     """
-    path = load_path(loads, robot_given(robot).number_of_tendons)
+    path = load_path(loads, check_is_robot(robot).number_of_tendons)
     check_refinement(refinement)
     model = ForwardModel(robot, path, settings or DEFAULT, refinement, any_load=True)
     found = model.solve(robot, path)
@@ -101,7 +101,7 @@ def tip_response(
 def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
     """Changes of the loads, packed: a unit of every drive, then of tip moment and force."""
     long = path.prepared.long
-    packed, form = path.prepared.long_commands(path.commands)
+    packed, form = path.prepared.padded_commands(path.commands)
     none: Command = form.unpack(np.zeros(form.size))
     assert none.applied is not None  # the chain is assembled for loads
     units = [none._replace(value=constant(row)) for row in np.eye(long.chain.tendons)]
@@ -121,7 +121,7 @@ def _pose_change(
     return np.concatenate([0.5 * np.stack(turned, axis=-1), changes["tip_position"]], axis=-1)
 
 
-def _with_tip(applied: Applied, wrench: Float[np.ndarray, " 6"], length: float) -> Applied:
+def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float) -> BodyLoads:
     """Loads with a moment and a force more at the tip, dead in the base frame."""
     moment, force = wrench[:3], wrench[3:]
     last = np.zeros(len(applied.dead_force))

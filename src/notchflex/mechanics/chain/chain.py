@@ -13,7 +13,7 @@ from notchflex._jax import constant, jax, jnp
 from notchflex._pytree import Pytree, static
 from notchflex.mechanics.chain.mass import body_lengths, body_masses
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
-from notchflex.mechanics.contact import LipGroup, lay_lips
+from notchflex.mechanics.contact import ContactGroup, build_contacts
 from notchflex.mechanics.flexure import (
     FlexureState,
     Rod,
@@ -29,7 +29,7 @@ from notchflex.mechanics.flexure.plane import planar_points
 from notchflex.mechanics.friction import FrictionLaw, friction_law
 from notchflex.mechanics.material import SectionLaw, section_law
 from notchflex.mechanics.motion import Motion, rotation_about
-from notchflex.mechanics.tendon import Ground, Laid, TendonGroup, route
+from notchflex.mechanics.tendon import RoutedTendons, RoutingContext, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
 from notchflex.robot.kinds import Friction, Material, Notch
 
@@ -50,7 +50,7 @@ class Chain(Pytree):
         law: The material.
         friction: The friction between tendons and tube.
         groups: The tendons, by the way they run.
-        lips: The lips that close notches, by their kind.
+        contact_pairs: The lips that close notches, by their kind.
         axial_stiffness: Axial stiffness of each tendon, infinite where inextensible, N.
         free_length: Length of each tendon before its first contact, from its actuator on and
             through the base, mm.
@@ -60,9 +60,9 @@ class Chain(Pytree):
         stiffness: Stiffness of each mode in the free robot, N mm; the scale of residuals.
         elastic: Stiffness of the modes of each flexure against each other, N mm, where the
             material is linear; None where the law of the material must be asked.
-        lip_stiffness: Stiffness of each notch at its lips in the free robot, N/mm.
+        contact_stiffness: Stiffness of each notch at its lips in the free robot, N/mm.
         closing_force: Force that would close a notch by that stiffness, mean of all, N.
-        drawn_stiffness: How fast the tension of a tendon answers its stroke, roughly, N/mm.
+        stroke_stiffness: How fast the tension of a tendon answers its stroke, roughly, N/mm.
         frame: Rotation from the frame in which flexures, tendons and lips are given to that of the
             base: x and z span the plane of bending of a flat chain. None in space.
         notch_frame: Rotation from the frame of every notch, turned by its direction, to the tube.
@@ -81,7 +81,7 @@ class Chain(Pytree):
     law: SectionLaw
     friction: FrictionLaw
     groups: tuple[TendonGroup, ...]
-    lips: tuple[LipGroup, ...]
+    contact_pairs: tuple[ContactGroup, ...]
     axial_stiffness: Float[Array, " t"]
     free_length: Float[Array, " t"]
     body_length: Float[Array, " bodies"]
@@ -89,9 +89,9 @@ class Chain(Pytree):
     body_centre: Float[Array, "bodies 3"]
     stiffness: Float[Array, "n modes"]
     elastic: Float[Array, "n modes modes"] | None
-    lip_stiffness: Float[Array, " n"]
+    contact_stiffness: Float[Array, " n"]
     closing_force: Float[Array, ""]
-    drawn_stiffness: Float[Array, ""]
+    stroke_stiffness: Float[Array, ""]
     frame: Float[Array, "3 3"] | None
     notch_frame: Float[Array, "n 3 3"]
     tendon_place: Float[Array, "t 3"]
@@ -120,7 +120,7 @@ class Chain(Pytree):
     @property
     def forces_on_bodies(self) -> bool:
         """Whether any force acts on a body, so that poses enter the balance."""
-        parts = (*self.groups, *self.lips)
+        parts = (*self.groups, *self.contact_pairs)
         return self.loaded or any(part.acts_on_bodies for part in parts)
 
     @property
@@ -165,7 +165,7 @@ def assemble(
         rods=rods,
         memory=(),
         groups=laid.groups,
-        lips=shaped.lips,
+        contact_pairs=shaped.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
         free_length=constant(laid.base_length + [tendon.free_length for tendon in tendons]),
         body_length=body_length,
@@ -179,7 +179,9 @@ def assemble(
         loaded=loaded,
         follows=loaded and follows,  # unloaded chains are of one form
         refinement=refinement,
-        window=max((int(np.max(part.back)) for part in (*laid.groups, *shaped.lips)), default=1),
+        window=max(
+            (int(np.max(part.back)) for part in (*laid.groups, *shaped.contact_pairs)), default=1
+        ),
         **laws(robot.material, shaped),
         **laws(robot.friction, shaped),
     )
@@ -201,14 +203,14 @@ def laws(part: Material | Friction, shaped: Shaped) -> dict[str, Any]:
     law = section_law(part)
     elastic = _elastic(shaped.alike, law)[shaped.which]
     stiffness = np.einsum("nmm->nm", elastic)
-    lip_stiffness = 1.0 / np.sum(shaped.lip_slope / stiffness, axis=-1)
+    contact_stiffness = 1.0 / np.sum(shaped.lip_slope / stiffness, axis=-1)
     return {
         "law": law,
         "stiffness": constant(stiffness),
         "elastic": constant(elastic) if law.is_linear else None,
-        "lip_stiffness": constant(lip_stiffness),
-        "closing_force": constant(lip_stiffness @ shaped.height / len(lip_stiffness)),
-        "drawn_stiffness": constant(lip_stiffness.sum() / len(lip_stiffness) ** 2),
+        "contact_stiffness": constant(contact_stiffness),
+        "closing_force": constant(contact_stiffness @ shaped.height / len(contact_stiffness)),
+        "stroke_stiffness": constant(contact_stiffness.sum() / len(contact_stiffness) ** 2),
     }
 
 
@@ -220,7 +222,7 @@ class Shaped(NamedTuple):
         which: Which of them each notch is.
         rods: All flexures.
         laid: The tendons.
-        lips: The lips.
+        contact_pairs: The lips.
         body_length: Length of each body on the tube axis, mm.
         notch_frame: Rotation from the frame of every notch to the tube.
         height: Length of the neutral axis of every flexure, mm.
@@ -230,8 +232,8 @@ class Shaped(NamedTuple):
     alike: Rod
     which: list[int]
     rods: Rod
-    laid: Laid
-    lips: tuple[LipGroup, ...]
+    laid: RoutedTendons
+    contact_pairs: tuple[ContactGroup, ...]
     body_length: Array
     notch_frame: Array
     height: Float[np.ndarray, " n"]
@@ -266,7 +268,7 @@ def _shaped(
     rods = dataclasses.replace(rods, start_offset=rods.start_offset + lead)
     free = jax.tree.map(lambda *leaves: np.stack(leaves)[which], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
-    ground = Ground(notches, rods, free, body_length, turns_with_chord=turns_with_chord)
+    ground = RoutingContext(notches, rods, free, body_length, turns_with_chord=turns_with_chord)
     directions = {notch.direction_deg: np.empty(0) for notch in notches}
     for side in directions:
         directions[side] = np.asarray(rotation_about(constant(_UP * np.radians(side))))
@@ -275,7 +277,7 @@ def _shaped(
         which,
         rods,
         route(tendons, ground),
-        lay_lips(notches, tube, rods, body_length),
+        build_contacts(notches, tube, rods, body_length),
         body_length,
         constant(np.stack([directions[notch.direction_deg] for notch in notches])),
         np.sum(rods.length, axis=-1),
@@ -302,7 +304,7 @@ def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
         chain,
         rods=flattened(chain.rods, frame),
         groups=tuple(planar(group) for group in chain.groups),
-        lips=tuple(planar(group) for group in chain.lips),
+        contact_pairs=tuple(planar(group) for group in chain.contact_pairs),
         frame=constant(frame),
     )
 
@@ -320,7 +322,7 @@ def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
     basis = rods.basis
     answered = rods.length[..., None, None] * (law.stiffness(rods.section) @ basis)
     own = np.einsum("niam,niak->nmk", basis, answered)
-    return own + rods.idle[:, None] * np.eye(rods.modes)
+    return own + rods.padding_mask[:, None] * np.eye(rods.modes)
 
 
 def _lip_slope(rods: Rod, outer_radius: float) -> Float[np.ndarray, "n modes"]:
@@ -329,11 +331,11 @@ def _lip_slope(rods: Rod, outer_radius: float) -> Float[np.ndarray, "n modes"]:
     Lips opposite a spine move with their fibre; where edges meet, by their distance from the
     tube axis times the turn of the distal body.
     """
-    fibre = np.einsum("nc,nicm,ni->nm", fibre_stretch(rods.lip), rods.basis, rods.length)
+    fibre = np.einsum("nc,nicm,ni->nm", fibre_stretch(rods.closure), rods.basis, rods.length)
     turn = rods.start_rotation @ rods.turn[:, -1, :, 1:]
     edge = outer_radius * np.linalg.norm(turn[:, :2], axis=1)
-    slope = np.where(rods.lip_closes[:, None] > 0.0, fibre, edge)
-    return slope**2 * (1.0 - rods.idle)
+    slope = np.where(rods.has_closure[:, None] > 0.0, fibre, edge)
+    return slope**2 * (1.0 - rods.padding_mask)
 
 
 def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:

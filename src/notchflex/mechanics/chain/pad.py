@@ -24,7 +24,7 @@ _NOTHING = (
     "turn_pair",
     "step",
     "node_turn",
-    "lip_closes",
+    "has_closure",
     "chord",
 )
 
@@ -69,13 +69,15 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
             changed(group, present=0.0, visits=0.0, ends=0.0, back=1, body_length=0.0)
             for group in chain.groups
         ),
-        lips=tuple(changed(group, closes=0.0, back=1) for group in chain.lips),
+        contact_pairs=tuple(
+            changed(group, has_contact=0.0, back=1) for group in chain.contact_pairs
+        ),
         body_length=with_nothing(chain.body_length),
         body_mass=with_nothing(chain.body_mass),
         body_centre=with_nothing(chain.body_centre),
         stiffness=np.concatenate([chain.stiffness, np.ones((more, chain.stiffness.shape[1]))]),
         elastic=None if chain.elastic is None else _elastic(chain.elastic, more),
-        lip_stiffness=longer(chain.lip_stiffness),
+        contact_stiffness=longer(chain.contact_stiffness),
         notch_frame=longer(chain.notch_frame),
         contacts=contacts,
     )
@@ -85,7 +87,7 @@ def _rods(chain: Chain, changed: Any) -> Rod:
     rods = chain.rods
     values = {name: 0.0 for name in _NOTHING if getattr(rods, name) is not None}
     values |= {name: np.eye(getattr(rods, name).shape[-1]) for name in _ROTATIONS}
-    wider: Rod = changed(rods, idle=1.0, **values)
+    wider: Rod = changed(rods, padding_mask=1.0, **values)
     # The first that is added begins at the tip, at the end of the last body.
     wider.start_offset[chain.flexures, -1] = chain.body_length[-1]  # pyright: ignore
     return wider

@@ -1,7 +1,7 @@
 """Contact: the lips of a notch that close it."""
 
-from notchflex.mechanics.contact.build import lay_lips
-from notchflex.mechanics.contact.pairs import LipGroup, Touch
+from notchflex.mechanics.contact.build import build_contacts
+from notchflex.mechanics.contact.pairs import ContactGroup, GapResponse
 from notchflex.mechanics.contact.spine import closing_travel, free_angle
 
-__all__ = ["LipGroup", "Touch", "closing_travel", "free_angle", "lay_lips"]
+__all__ = ["ContactGroup", "GapResponse", "closing_travel", "free_angle", "build_contacts"]

@@ -9,18 +9,18 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant
-from notchflex.mechanics.contact.edge import Edges
-from notchflex.mechanics.contact.pairs import LipGroup
-from notchflex.mechanics.contact.spine import SpineLips
+from notchflex.mechanics.contact.edge import EdgeContact
+from notchflex.mechanics.contact.pairs import ContactGroup
+from notchflex.mechanics.contact.spine import SpineContact
 from notchflex.mechanics.flexure import Rod
 from notchflex.mechanics.tendon.openings import passages
 from notchflex.robot import Tube
 from notchflex.robot.kinds import Notch
 
 
-def lay_lips(
+def build_contacts(
     notches: Sequence[Notch], tube: Tube, rods: Rod, body_length: Float[Array, " bodies"]
-) -> tuple[LipGroup, ...]:
+) -> tuple[ContactGroup, ...]:
     """Lips of every kind that the notches have.
 
     Args:
@@ -29,10 +29,10 @@ def lay_lips(
         rods: All flexures of the chain.
         body_length: Length of the rigid pieces on the tube axis, base first, mm.
     """
-    groups: list[LipGroup] = []
-    if np.any(rods.lip_closes):
-        closes = rods.lip_closes[:, None]
-        groups.append(SpineLips(closes, cast("Array", np.ones(closes.shape, int))))
+    groups: list[ContactGroup] = []
+    if np.any(rods.has_closure):
+        has_contact = rods.has_closure[:, None]
+        groups.append(SpineContact(has_contact, cast("Array", np.ones(has_contact.shape, int))))
     sides = sorted({side % 360.0 for side in _sides(notches)})
     if sides:
         line = passages(notches, body_length, sides)
@@ -40,21 +40,21 @@ def lay_lips(
         across = tube.outer_radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
         along = np.array([0.0, 0.0, 1.0])
         # As many lips as close at one flexure, whichever sides they are on.
-        count = int(line.closes.sum(axis=1).max(initial=1.0))
-        chosen = np.argsort(-line.closes, axis=1, kind="stable")[:, :count]
+        count = int(line.has_contact.sum(axis=1).max(initial=1.0))
+        chosen = np.argsort(-line.has_contact, axis=1, kind="stable")[:, :count]
 
         def own(values: np.ndarray) -> np.ndarray:
             index = chosen.reshape(*chosen.shape, *(1,) * (values.ndim - 2))
             return np.take_along_axis(values, index, axis=1)
 
-        closes = own(line.closes)
+        has_contact = own(line.has_contact)
         groups.append(
-            Edges(
-                closes=constant(closes),
-                back=cast("Array", np.where(closes > 0.0, own(line.back), 1)),
+            EdgeContact(
+                has_contact=constant(has_contact),
+                back=cast("Array", np.where(has_contact > 0.0, own(line.back), 1)),
                 leaves=constant(own(across + line.left[..., None] * along)),
                 enters=constant(own(across + line.enters[..., None] * along)),
-                normal=constant(np.broadcast_to(along, (*closes.shape, 3))),
+                normal=constant(np.broadcast_to(along, (*has_contact.shape, 3))),
             )
         )
     return tuple(groups)

@@ -1,6 +1,6 @@
 """Edges of two rigid pieces that meet across a slot or a triangular notch.
 
-The edge of the distal piece touches the face of the proximal one, which may be several bodies
+The edge of the distal piece contacts the face of the proximal one, which may be several bodies
 back, as in a row of slots cut from either side in turn. The gap is the distance of the edge from
 the plane of that face, and the force stands on the plane (no friction).
 """
@@ -10,12 +10,12 @@ from __future__ import annotations
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax
-from notchflex.mechanics.contact.pairs import LipGroup, Touch
+from notchflex.mechanics.contact.pairs import ContactGroup, GapResponse
 from notchflex.mechanics.flexure import FlexureState, Rod
 from notchflex.mechanics.motion import Motion, wrench_at
 
 
-class Edges(LipGroup):
+class EdgeContact(ContactGroup):
     """Edges on several sides of the tube.
 
     Attributes:
@@ -29,7 +29,7 @@ class Edges(LipGroup):
     enters: Float[Array, "*n l d"]
     normal: Float[Array, "*n l d"]
 
-    def touch(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Touch:
+    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
         """Distance of the edge from the plane of the face, and a force along its normal."""
         del rod, flexure
         assert anchors is not None  # acts_on_bodies asks for it
@@ -40,4 +40,4 @@ class Edges(LipGroup):
             return gap, wrench_at(enters, along)
 
         gap, wrench = jax.vmap(one)(anchors, self.leaves, self.enters, self.normal)
-        return Touch(gap, wrench, slope=None)
+        return GapResponse(gap, wrench, slope=None)

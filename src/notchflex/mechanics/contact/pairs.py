@@ -17,7 +17,7 @@ from notchflex.mechanics.flexure import FlexureState, Rod
 from notchflex.mechanics.motion import Motion
 
 
-class Touch(NamedTuple):
+class GapResponse(NamedTuple):
     """Lips of one kind at one flexure (mm).
 
     Attributes:
@@ -32,21 +32,21 @@ class Touch(NamedTuple):
     slope: Float[Array, "l modes"] | None
 
 
-class LipGroup(Pytree, ABC):
+class ContactGroup(Pytree, ABC):
     """Lips of one kind. Arrays carry the flexures as leading axis, then the lips.
 
     Attributes:
         acts_on_bodies: Whether the contact is a force on bodies.
-        closes: 1 where there are such lips at a flexure.
+        has_contact: 1 where there are such lips at a flexure.
         back: How many bodies before the distal one their anchor is.
     """
 
     acts_on_bodies: ClassVar[bool]
-    closes: Float[Array, "*n l"]
+    has_contact: Float[Array, "*n l"]
     back: Int[Array, "*n l"]
 
     @abstractmethod
-    def touch(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Touch:
+    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
         """Lips at one flexure (of a group without its leading axis).
 
         Args:

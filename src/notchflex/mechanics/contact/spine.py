@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex._jax import constant
-from notchflex.mechanics.contact.pairs import LipGroup, Touch
+from notchflex.mechanics.contact.pairs import ContactGroup, GapResponse
 from notchflex.mechanics.flexure import (
     FlexureState,
     Rod,
@@ -21,17 +21,17 @@ from notchflex.mechanics.flexure import (
 from notchflex.mechanics.motion import Motion
 
 
-class SpineLips(LipGroup):
+class SpineContact(ContactGroup):
     """One pair of lips at every notch that has a spine."""
 
     acts_on_bodies = False
 
-    def touch(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Touch:
+    def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
         """Length of the fibre between the lips."""
         del anchors
-        to_lip = of_rod(rod, fibre_stretch(rod.lip))[None]
+        to_lip = of_rod(rod, fibre_stretch(rod.closure))[None]
         strain = rod.length @ (rod.reference_strain + flexure.strain)
-        return Touch(gap=to_lip @ strain, wrench=None, slope=fibre_slope(rod, to_lip))
+        return GapResponse(gap=to_lip @ strain, wrench=None, slope=fibre_slope(rod, to_lip))
 
 
 def closing_travel(rods: Rod) -> Float[np.ndarray, " n"]:
@@ -40,10 +40,10 @@ def closing_travel(rods: Rod) -> Float[np.ndarray, " n"]:
     It is where the first mode, whose amplitude is that angle, leaves no length between the lips;
     for an arc h / (r_o + ybar) less the precurvature.
     """
-    lip = of_rod(rods, fibre_stretch(constant(rods.lip)))
+    lip = of_rod(rods, fibre_stretch(constant(rods.closure)))
     free = np.einsum("nc,nic,ni->n", lip, rods.reference_strain, rods.length)
     slope = np.einsum("nc,nic,ni->n", lip, np.asarray(rods.basis)[..., 0], rods.length)
-    spine = np.asarray(rods.lip_closes) > 0.0
+    spine = np.asarray(rods.has_closure) > 0.0
     return np.where(spine, -free / np.where(spine, slope, 1.0), np.inf)
 
 

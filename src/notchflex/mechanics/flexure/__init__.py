@@ -8,7 +8,7 @@ from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.rod_kinematics import (
     free_pose,
-    pull_change,
+    geometric_stiffness,
     relative_pose,
     rod_end,
     turn_doubt,
@@ -18,8 +18,8 @@ from notchflex.mechanics.flexure.state import (
     fibre_slope,
     fibre_stretch,
     flexure_state,
-    held_by_strains,
     in_space,
+    material_tangent,
     of_rod,
 )
 
@@ -37,11 +37,11 @@ __all__ = [
     "flattened",
     "flexure_state",
     "free_pose",
-    "held_by_strains",
+    "material_tangent",
     "in_space",
     "modulus_from_single_notch",
     "of_rod",
-    "pull_change",
+    "geometric_stiffness",
     "relative_pose",
     "rod",
     "rod_end",

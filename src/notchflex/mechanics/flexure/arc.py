@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from notchflex._jax import constant, jax
-from notchflex.mechanics.flexure.quadrature import Places
+from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import FibreSection
@@ -45,7 +45,7 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0) -> Rod:
     # radian in its plane is right to 1e-15; the turns of one that also bends sideways and twists
     # need ten for 3e-8.
     nodes = (7 + 4 * refinement,)
-    places = Places((0.0, notch.height), nodes, (10 + 3 * refinement,))
+    places = RodQuadrature((0.0, notch.height), nodes, (10 + 3 * refinement,))
     place = 2.0 * places.every / notch.height - 1.0
     basis = _modes(place, float(section.shear_centre), refinement) / notch.height
     straight = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -62,11 +62,11 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0) -> Rod:
         end_offset=constant(-neutral_axis),
         reference_strain=constant(reference[:count]),
         section=jax.tree.map(lambda value: constant(np.full(count, value)), section),
-        lip=constant([0.5 * tube.outer_diameter + float(left.centroid), 0.0]),
-        lip_closes=constant(1.0),
-        small=constant(0.0),
+        closure=constant([0.5 * tube.outer_diameter + float(left.centroid), 0.0]),
+        has_closure=constant(1.0),
+        linear_kinematics=constant(0.0),
         chord=constant(0.0),
-        idle=constant(np.zeros(basis.shape[-1])),
+        padding_mask=constant(np.zeros(basis.shape[-1])),
         levels=(1, 2 + refinement, basis.shape[-1]),
     )
 

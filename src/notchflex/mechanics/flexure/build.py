@@ -34,7 +34,7 @@ def with_level(rod: Rod, level: str) -> Rod:
     """Keep the modes that a level of loads needs; strains that are constant keep one node."""
     modes = rod.levels[LEVELS.index(level)]
     kept: dict[str, Any] = {name: getattr(rod, name)[..., : modes + 1] for name in _HAT}
-    kept |= {"basis": rod.basis[..., :modes], "idle": rod.idle[..., :modes]}
+    kept |= {"basis": rod.basis[..., :modes], "padding_mask": rod.padding_mask[..., :modes]}
     if rod.turn_pair is not None:
         kept["turn_pair"] = rod.turn_pair[..., : modes + 1, : modes + 1]
     alike = (rod.reference_strain, kept["basis"], *jax.tree.leaves(rod.section))
@@ -56,7 +56,7 @@ def stack(rods: Sequence[Rod]) -> Rod:
     filled = [_filled(rod, modes, nodes, poses, levels) for rod in rods]
     unused: dict[str, Any] = {
         name: None
-        for name in ("small", "chord")
+        for name in ("linear_kinematics", "chord")
         if not any(np.any(getattr(rod, name)) for rod in filled)
     }
     used = [dataclasses.replace(rod, **unused) if unused else rod for rod in filled]
@@ -100,6 +100,6 @@ def _filled(rod: Rod, modes: int, nodes: int, poses: int, levels: tuple[int, ...
         node_rotation=rod.node_rotation[index],
         node_offset=rod.node_offset[index],
         section=jax.tree.map(lambda leaf: leaf[index], rod.section),
-        idle=constant(np.arange(modes) >= rod.modes),
+        padding_mask=constant(np.arange(modes) >= rod.modes),
         levels=levels,
     )

@@ -77,7 +77,7 @@ def up_to(count: int, parts: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k no
 
 
 @dataclass(frozen=True)
-class Places:
+class RodQuadrature:
     """Places along a rod.
 
     Attributes:

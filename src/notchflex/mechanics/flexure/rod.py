@@ -43,14 +43,14 @@ class Rod(Pytree):
         node_rotation: Rotation from the followed curve at each node to its start.
         node_offset: Where the followed curve is at each node, in the frame of its start.
         section: What is left of the tube at each node.
-        lip: Where a notch with a solid spine closes, across the section from the neutral axis
+        closure: Where a notch with a solid spine closes, across the section from the neutral axis
             (x, y): the fibre that has no length left when the lips meet.
-        lip_closes: 1 where there is such a fibre, 0 where the notch closes otherwise.
-        small: 1 where displacements are taken in proportion to the strains (small deflection);
+        has_closure: 1 where there is such a fibre, 0 where the notch closes otherwise.
+        linear_kinematics: 1 where displacements are proportional to the strains (small deflection);
             None where no flexure of a chain asks for it, so that nothing is computed for it.
         chord: 1 where the angle of the chord from start to end is of interest (Liu 2022); None
             likewise.
-        idle: 1 for modes that only fill up the arrays, because another notch has more.
+        padding_mask: 1 for modes that only fill up the arrays, because another notch has more.
         levels: How many modes serve tendons alone, loads in the plane of bending, and space.
     """
 
@@ -72,11 +72,11 @@ class Rod(Pytree):
     node_rotation: Float[Array, "*n nodes d d"]
     node_offset: Float[Array, "*n nodes d"]
     section: FibreSection
-    lip: Float[Array, "*n 2"]
-    lip_closes: Float[Array, "*n"]
-    small: Float[Array, "*n"] | None
+    closure: Float[Array, "*n 2"]
+    has_closure: Float[Array, "*n"]
+    linear_kinematics: Float[Array, "*n"] | None
     chord: Float[Array, "*n"] | None
-    idle: Float[Array, "*n modes"]
+    padding_mask: Float[Array, "*n modes"]
     levels: tuple[int, int, int] = static()
 
     @property

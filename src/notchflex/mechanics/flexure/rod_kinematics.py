@@ -31,7 +31,7 @@ from notchflex.mechanics.motion import (
 )
 
 
-class Bent(NamedTuple):
+class RodConfiguration(NamedTuple):
     """A rod beside its curve; places are the nodes of the pose and then the end.
 
     Attributes:
@@ -55,7 +55,7 @@ class Bent(NamedTuple):
         return Motion(self.rotation[-1], self.step.sum(axis=0))
 
 
-def bent(rod: Rod, modes: Float[Array, " modes"]) -> Bent:
+def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
     """Turns and steps of a rod under given modes."""
     xp = array_module(modes)
     hat = xp.concatenate([np.ones(1), modes])
@@ -68,7 +68,7 @@ def bent(rod: Rod, modes: Float[Array, " modes"]) -> Bent:
         turning = _before(rotation) @ _left_slopes(turns) @ slope
         from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
     stepped = _stepped(rod, rotation)
-    return Bent(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
+    return RodConfiguration(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
 
 
 def free_pose(rod: Rod) -> Motion:
@@ -156,18 +156,20 @@ def _small_motion(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     return Motion(rotation, end + cross(turn, end) + moved - rotation @ end)
 
 
-def _beside(rod: Rod, modes: Float[Array, " modes"], own: Bent) -> Motion:
+def _beside(rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration) -> Motion:
     """Motion from where the followed curve would end to where the rod ends."""
-    if rod.small is None:
+    if rod.linear_kinematics is None:
         return own.end
-    xp, is_small = array_module(modes), rod.small > 0.0
+    xp, is_small = array_module(modes), rod.linear_kinematics > 0.0
     pairs = zip(_small_motion(rod, modes), own.end, strict=True)
     return Motion(*(xp.where(is_small, small, large) for small, large in pairs))
 
 
 def rod_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     """Pose of the rod's last section as seen from its first."""
-    return _beside(rod, modes, bent(rod, modes)).then(Motion(rod.curve_rotation, rod.curve_offset))
+    return _beside(rod, modes, integrate_rod(rod, modes)).then(
+        Motion(rod.curve_rotation, rod.curve_offset)
+    )
 
 
 def _tail(rod: Rod) -> Motion:
@@ -177,23 +179,27 @@ def _tail(rod: Rod) -> Motion:
     )
 
 
-def relative_pose(rod: Rod, modes: Float[Array, " modes"], own: Bent | None = None) -> Motion:
+def relative_pose(
+    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
+) -> Motion:
     """Pose of the distal body as seen from the proximal one."""
-    beside = _beside(rod, modes, bent(rod, modes) if own is None else own)
+    beside = _beside(rod, modes, integrate_rod(rod, modes) if own is None else own)
     return Motion(rod.start_rotation, rod.start_offset).then(beside).then(_tail(rod))
 
 
-def twist_slope(rod: Rod, modes: Float[Array, " modes"], own: Bent) -> Float[Array, "w modes"]:
+def twist_slope(
+    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration
+) -> Float[Array, "w modes"]:
     """Twist (angular, linear) of the distal body, in its own frame, per unit of mode."""
     end = own.rotation[-1]
     turn = own.turn[-1] if len(end) == 2 else end.T @ own.turn[-1]
     twist = jnp.concatenate([turn, end.T @ _moved(own)])
-    if rod.small is not None:
-        twist = jnp.where(rod.small > 0.0, _small_twist(rod, modes), twist)
+    if rod.linear_kinematics is not None:
+        twist = jnp.where(rod.linear_kinematics > 0.0, _small_twist(rod, modes), twist)
     return _tail(rod).twist_inside(twist)
 
 
-def _moved(own: Bent) -> Float[Array, "d modes"]:
+def _moved(own: RodConfiguration) -> Float[Array, "d modes"]:
     """Displacement of the end per unit of mode, along the axes of the start."""
     return jnp.sum(own.stepped + _crossed(own.turn[:-1], own.step[..., None]), axis=0)
 
@@ -205,8 +211,8 @@ def _crossed(turn: Array, vector: Array) -> Array:
     return jnp.cross(turn, jnp.broadcast_to(vector, turn.shape), axis=1)
 
 
-def pull_change(
-    rod: Rod, modes: Float[Array, " modes"], own: Bent, wrench: Float[Array, " w"]
+def geometric_stiffness(
+    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration, wrench: Float[Array, " w"]
 ) -> Float[Array, "modes modes"]:
     """How what a wrench on the distal body does to each mode changes with the modes.
 
@@ -227,13 +233,13 @@ def pull_change(
     change = mixed + mixed.T - leaving
     if axes == 3:
         change = change + _order_of_turns(rod, own, at_end)
-    if rod.small is not None:
+    if rod.linear_kinematics is not None:
         small = jax.jacfwd(lambda varied: _small_twist(rod, varied).T @ at_end)(modes)
-        change = jnp.where(rod.small > 0.0, small, change)
+        change = jnp.where(rod.linear_kinematics > 0.0, small, change)
     return change
 
 
-def _arms(rod: Rod, own: Bent, force: Array) -> Float[Array, "gauss a modes"]:
+def _arms(rod: Rod, own: RodConfiguration, force: Array) -> Float[Array, "gauss a modes"]:
     """Moments of a force that moves along with each step, per unit of mode, about the start."""
     if len(force) == 3:
         return _moments(own.stepped, force)
@@ -250,8 +256,10 @@ def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:
     return jnp.cross(points, jnp.broadcast_to(force[:, None], points.shape), axis=1)
 
 
-def _order_of_turns(rod: Rod, own: Bent, at_end: Float[Array, " 6"]) -> Float[Array, "modes modes"]:
-    """What `pull_change` has in space alone, where a turn after another is not the other after it.
+def _order_of_turns(
+    rod: Rod, own: RodConfiguration, at_end: Float[Array, " 6"]
+) -> Float[Array, "modes modes"]:
+    """What `geometric_stiffness` has in space alone, where turns do not commute.
 
     The slopes of the turns change with the modes: from place to place by those before, within each
     step by the slope of the exponential and by the pairs of Magnus's series.
@@ -296,7 +304,7 @@ def node_poses(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     Between the places of the turn its order is left out, and steps are summed up by the polynomials
     through their nodes: enough to judge a result by, not to compute it.
     """
-    own = bent(rod, modes)
+    own = integrate_rod(rod, modes)
     start = Motion(rod.start_rotation, rod.start_offset)
     turns = jnp.concatenate([jnp.zeros_like(rod.turn[:1]), rod.turn])
     onward = (rod.node_turn - turns[rod.node_place]) @ jnp.concatenate([jnp.ones(1), modes])

@@ -11,8 +11,8 @@ from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.rod_kinematics import (
-    Bent,
-    bent,
+    RodConfiguration,
+    integrate_rod,
     relative_pose,
     rod_end,
     twist_slope,
@@ -25,7 +25,7 @@ class FlexureState(Pytree):
     """One flexure under given modes (mm, N, rad), in the frame of its proximal body.
 
     Attributes:
-        bent: Turns and steps of the rod; None where nobody asked for its pose.
+        configuration: Turns and steps of the rod; None where nobody asked for its pose.
         pose: From the proximal body to the distal one; None where nobody asked.
         twist: Twist (angular, linear) of the distal body, in its own frame, per unit of mode;
             None where nobody asked.
@@ -38,7 +38,7 @@ class FlexureState(Pytree):
         chord_angle: Its angle, rad; None where nobody asked.
     """
 
-    bent: Bent | None
+    configuration: RodConfiguration | None
     pose: Motion | None
     twist: Float[Array, "w modes"] | None
     resultants: Float[Array, "intervals w"]
@@ -102,7 +102,7 @@ def flexure_state(
     """
     own, pose, twist = None, None, None
     if with_pose:
-        own = bent(rod, modes)
+        own = integrate_rod(rod, modes)
         pose, twist = relative_pose(rod, modes, own), twist_slope(rod, modes, own)
     elastic = rod.basis @ modes
     respond = jax.vmap(law.respond)
@@ -114,12 +114,12 @@ def flexure_state(
     axes = min(angular(elastic[0]), 2)
     bending = jnp.einsum("i,icm->cm", rod.length, rod.basis[:, :axes])
     return FlexureState(
-        bent=own,
+        configuration=own,
         pose=pose,
         twist=twist,
         resultants=resultants,
         strain=elastic,
-        internal=internal + rod.idle * modes,
+        internal=internal + rod.padding_mask * modes,
         # About x and y of the section's frame; the third axis of space is that of torsion.
         bend=rod.length @ rod.reference_strain[:, :axes] + bending @ modes,
         chord_turn=chord_turn,
@@ -127,7 +127,7 @@ def flexure_state(
     )
 
 
-def held_by_strains(
+def material_tangent(
     rod: Rod, law: SectionLaw, memory: Any, modes: Float[Array, " modes"]
 ) -> Float[Array, "modes modes"]:
     """Change of what the strains do to each mode (`internal`), per unit of mode."""
@@ -142,7 +142,7 @@ def held_by_strains(
 
     answers = jax.vmap(answered)(rod.basis @ modes, rod.section, memory, rod.basis)
     weighed = rod.length[:, None, None] * rod.basis
-    return jnp.einsum("icm,ick->mk", weighed, answers) + jnp.diag(rod.idle)
+    return jnp.einsum("icm,ick->mk", weighed, answers) + jnp.diag(rod.padding_mask)
 
 
 def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"], Float[Array, ""]]:

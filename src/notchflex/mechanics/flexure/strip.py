@@ -17,7 +17,7 @@ from numpy.polynomial.legendre import legvander
 from numpy.typing import ArrayLike
 
 from notchflex._jax import constant, jax
-from notchflex.mechanics.flexure.quadrature import Places
+from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import FibreSection
@@ -60,7 +60,7 @@ def strip_rod(
         (5, 5, 10)
     """
     length = notch.strip_length_in(tube)
-    places = Places((0.0, length), (nodes,), (nodes,))
+    places = RodQuadrature((0.0, length), (nodes,), (nodes,))
     basis = _modes(2.0 * places.every / length - 1.0, bending_modes, more_sideways) / length
     along = Motion(
         constant(np.tile(np.eye(3), (len(places.every), 1, 1))),
@@ -77,11 +77,11 @@ def strip_rod(
         **places.fields(along, basis),
         reference_strain=constant(np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (nodes, 1))),
         section=_section(notch, tube, nodes),
-        lip=constant(np.zeros(2)),
-        lip_closes=constant(0.0),
-        small=constant(float(notch.deflection == "small")),
+        closure=constant(np.zeros(2)),
+        has_closure=constant(0.0),
+        linear_kinematics=constant(float(notch.deflection == "small")),
         chord=constant(1.0),
-        idle=constant(np.zeros(basis.shape[-1])),
+        padding_mask=constant(np.zeros(basis.shape[-1])),
         levels=(bending_modes, bending_modes, basis.shape[-1]),
     )
 

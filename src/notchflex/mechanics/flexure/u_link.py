@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from notchflex._jax import constant, jax
-from notchflex.mechanics.flexure.quadrature import Places
+from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.u_link_geometry import Course, Link
@@ -62,7 +62,7 @@ def u_link_rod(
     ends = (0.0, 0.5 * curved, link.length - 0.5 * curved, link.length)
     counts = (nodes[0], nodes[1], nodes[0])
     # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
-    places = Places(ends, counts, tuple(count - 1 for count in counts))
+    places = RodQuadrature(ends, counts, tuple(count - 1 for count in counts))
     place = places.every
     course = link.course(np.array([*place, 0.0, link.length]))
     section = _section(link, tube, Course(*(values[:-2] for values in course)), poisson_ratio)
@@ -102,11 +102,11 @@ def u_link_rod(
         **places.fields(_between(start, poses), basis),
         reference_strain=constant(free),
         section=jax.tree.map(lambda leaf: leaf[:count], section),
-        lip=constant(np.zeros(2)),
-        lip_closes=constant(0.0),
-        small=constant(0.0),
+        closure=constant(np.zeros(2)),
+        has_closure=constant(0.0),
+        linear_kinematics=constant(0.0),
         chord=constant(0.0),
-        idle=constant(np.zeros(basis.shape[-1])),
+        padding_mask=constant(np.zeros(basis.shape[-1])),
         levels=(in_plane, in_plane, basis.shape[-1]),
     )
 

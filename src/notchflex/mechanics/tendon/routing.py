@@ -22,7 +22,7 @@ from notchflex.robot.kinds import Notch
 _PULLS = {"straight": "gap", "straight-dead": "dead", "straight-follower": "follower"}
 
 
-class Ground(NamedTuple):
+class RoutingContext(NamedTuple):
     """What tendons are laid through.
 
     Attributes:
@@ -40,7 +40,7 @@ class Ground(NamedTuple):
     turns_with_chord: bool
 
 
-class Laid(NamedTuple):
+class RoutedTendons(NamedTuple):
     """Tendons laid through a robot.
 
     Attributes:
@@ -54,7 +54,7 @@ class Laid(NamedTuple):
     base_length: Float[np.ndarray, " t"]
 
 
-def route(tendons: Sequence[Tendon], ground: Ground) -> Laid:
+def route(tendons: Sequence[Tendon], ground: RoutingContext) -> RoutedTendons:
     """Group the tendons by the way they run and lay them through the chain.
 
     Raises:
@@ -72,7 +72,7 @@ def route(tendons: Sequence[Tendon], ground: Ground) -> Laid:
             masks = _masks(numbers, chosen, own)
             lay = _wall_arc if path == "wall-arc" else _straight
             groups.append(lay(masks, chosen, own, ground, path))
-    return Laid(tuple(groups), _on_tube(tendons), np.asarray(line.base_leaves))
+    return RoutedTendons(tuple(groups), _on_tube(tendons), np.asarray(line.base_leaves))
 
 
 def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -> dict[str, Any]:
@@ -111,7 +111,11 @@ def _on_tube(tendons: Sequence[Tendon]) -> Float[Array, "t 3"]:
 
 
 def _wall_arc(
-    masks: dict[str, Any], tendons: Sequence[Tendon], line: Passage, ground: Ground, path: str
+    masks: dict[str, Any],
+    tendons: Sequence[Tendon],
+    line: Passage,
+    ground: RoutingContext,
+    path: str,
 ) -> WallArc:
     del line, path
     rods = ground.rods
@@ -128,7 +132,11 @@ def _wall_arc(
 
 
 def _straight(
-    masks: dict[str, Any], tendons: Sequence[Tendon], line: Passage, ground: Ground, path: str
+    masks: dict[str, Any],
+    tendons: Sequence[Tendon],
+    line: Passage,
+    ground: RoutingContext,
+    path: str,
 ) -> Straight:
     along = np.array([0.0, 0.0, 1.0])
     place = np.asarray(_on_tube(tendons))

@@ -37,7 +37,7 @@ class Outline:
     bores: list[NDArray[np.float64]]
     flexures: list[NDArray[np.float64]]
     tendons: list[NDArray[np.float64]]
-    lips: list[NDArray[np.float64]]
+    contact_pairs: list[NDArray[np.float64]]
     centre_line: NDArray[np.float64]
     held: NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def outline(shape: Bent, view: float) -> Outline:
         bores=bores,
         flexures=flexures,
         tendons=[flat(shape.tendon(number)) for number in range(len(shape.robot.tendon))],
-        lips=[flat(shape.lips(notch)) for notch in range(len(shape.flexures))],
+        lips=[flat(shape.contact_pairs(notch)) for notch in range(len(shape.flexures))],
         centre_line=flat(_centre_line(shape)),
         held=flat(shape.on_body(0, [*clamp, clamp[1] + below, clamp[0] + below])),
     )
@@ -122,7 +122,7 @@ def _centre_line(shape: Bent) -> NDArray[np.float64]:
     rods = shape.chain.rods
     points: list[NDArray[np.float64]] = []
     for body, length in enumerate(shape.body_length):
-        if body and float(rods.lip_closes[body - 1]) > 0.0:
+        if body and float(rods.has_closure[body - 1]) > 0.0:
             points.append(
                 shape.flexures[body - 1].fibre(*np.asarray(rods.end_offset)[body - 1, :2])
             )

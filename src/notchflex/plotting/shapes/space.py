@@ -55,7 +55,7 @@ def space_panel(
         for number in range(len(shape.robot.tendon)):
             line = shape.tendon(number)
             items.append(Line(line, ORANGE, width=0.9, group=label, layer=5))
-        closed += [shape.lips(int(notch)) for notch in np.flatnonzero(path.closed[step])]
+        closed += [shape.contact_pairs(int(notch)) for notch in np.flatnonzero(path.closed[step])]
         loads += acting_at(path, step, shape)
     if closed:
         dots = np.array(closed)
@@ -96,7 +96,7 @@ def _walls(shape: Bent) -> Iterator[Pieces]:
 def _flexures(shape: Bent) -> Iterator[Pieces]:
     """Every flexure: the wall at its spine, or a band as broad as area and thickness say."""
     outer = shape.robot.tube.outer_radius
-    closes = np.asarray(shape.chain.rods.lip_closes) > 0.0
+    closes = np.asarray(shape.chain.rods.has_closure) > 0.0
     for one, spine in zip(shape.flexures, closes, strict=True):
         lines = _spine(one, outer) if spine else _band(one)
         along = np.stack([one.fibre(across, out) for across, out in lines], axis=1)

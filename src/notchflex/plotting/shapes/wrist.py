@@ -92,7 +92,7 @@ def wrist_panel(
         if not order:  # what holds the robot stands still: it is drawn once
             items.append(Area([shape.held], GREY, GREY, 0.5, layer=1))
         items += _robot(shape, colour, load_label(path, step), level=3 * order)
-        closed_points += [shape.lips[notch] for notch in np.flatnonzero(path.closed[step])]
+        closed_points += [shape.contact_pairs[notch] for notch in np.flatnonzero(path.closed[step])]
         loads += acting_at(path, step, bent)
     top = 3 * len(steps) + 5
     if closed_points:

@@ -189,7 +189,7 @@ def _path_of(record: Record) -> EquilibriumPath:
     from notchflex.results.recorded import BEFORE, TOLD, Recorded
     from notchflex.robot import robot_from_text
     from notchflex.solver.newton import Settings
-    from notchflex.solver.programs.prepare import prepared
+    from notchflex.solver.programs.prepare import prepare
 
     facts, arrays = record.facts, record.arrays
     robot = robot_from_text(facts["robot"])
@@ -199,7 +199,7 @@ def _path_of(record: Record) -> EquilibriumPath:
         np.array(facts["base_rotation_rad"]),
         _loads_from(facts["external"]),
     )
-    ready = prepared(
+    ready = prepare(
         robot,
         facts["level"],
         loaded=facts["loaded"],

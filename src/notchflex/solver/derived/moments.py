@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.contact.spine import SpineLips
+from notchflex.mechanics.contact.spine import SpineContact
 from notchflex.mechanics.flexure import Rod, fibre_stretch, of_rod
 from notchflex.mechanics.flexure.rod_kinematics import node_poses, relative_pose, rod_end
 from notchflex.mechanics.motion import Motion
@@ -31,7 +31,7 @@ def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Arra
     required = _along_wall(chain, unknowns, at)
     if at.wrenches is not None:
         required = required + jax.vmap(_required)(chain.rods, unknowns.modes, at.wrenches.whole)
-    robots = jnp.any(chain.rods.idle == 0.0, axis=-1)
+    robots = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
     counts = (robots[:, None] & (chain.rods.length > 0.0))[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
     error = jnp.max(jnp.abs(internal - required[..., bending]) * counts * carried)
@@ -46,9 +46,9 @@ def _required(
 ) -> Float[Array, "nodes w"]:
     """Wrench on all that is beyond each node, about the node, along its section's axes."""
     body, nodes = relative_pose(rod, modes), node_poses(rod, modes)
-    if rod.small is not None:
+    if rod.linear_kinematics is not None:
         # A linear beam takes its moments on the free shape, under forces as the body has them.
-        is_small = rod.small > 0.0
+        is_small = rod.linear_kinematics > 0.0
         shapes = (body, nodes), (_about_free_end(rod, modes), _free_nodes(rod))
         body, nodes = jax.tree.map(lambda large, small: jnp.where(is_small, small, large), *shapes)
 
@@ -80,8 +80,8 @@ def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array
         if isinstance(group, WallArc):
             weights = of_rod(chain.rods, fibre_stretch(group.across))
             acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
-    for group, force in zip(chain.lips, unknowns.lip_force, strict=True):
-        if isinstance(group, SpineLips):
-            lip = of_rod(chain.rods, fibre_stretch(chain.rods.lip))
-            acting = acting + (force * group.closes) * lip
+    for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
+        if isinstance(group, SpineContact):
+            lip = of_rod(chain.rods, fibre_stretch(chain.rods.closure))
+            acting = acting + (force * group.has_contact) * lip
     return jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)

@@ -13,7 +13,7 @@ from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED, Quantity
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import in_space, turn_doubt
-from notchflex.solver.continuation import Solved
+from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.moments import moment_error as error_of_modes
 from notchflex.solver.derived.solved_state import (
     SolvedState,
@@ -24,8 +24,8 @@ from notchflex.solver.derived.solved_state import (
     notch_angles,
     paired,
 )
-from notchflex.solver.element import at_bound
-from notchflex.solver.programs.pytree_layout import Form
+from notchflex.solver.element import bound_side
+from notchflex.solver.programs.pytree_layout import PytreeLayout
 
 # A state whose moments are off by this part of the largest is none.
 MODES_FAIL = 0.35
@@ -154,23 +154,23 @@ def peak_strain(state: SolvedState) -> Array:
           per=("notch",))  # fmt: skip
 def gap(state: SolvedState) -> Array:
     """What is left of the opening of a notch between its lips, where it is narrowest."""
-    return state.lips[1]
+    return state.contact_pairs[1]
 
 
 @Quantity("derived", "closed", key="closed", column="notch_{notch}_closed", per=("notch",),
           kind=bool)  # fmt: skip
 def closed(state: SolvedState) -> Array:
-    """True where the lips of a notch touch."""
+    """True where the lips of a notch response."""
     # Contact force or gap is zero, but for rounding.
     force, gap = state.quantity("contact_force"), state.quantity("gap")
-    return force > gap * state.chain.lip_stiffness
+    return force > gap * state.chain.contact_stiffness
 
 
 @Quantity("state", "contact force", "N_j", "N", key="contact_force_N",
           column="notch_{notch}_contact_N", per=("notch",))  # fmt: skip
 def contact_force(state: SolvedState) -> Array:
     """Force between the touching lips of a closed notch."""
-    return state.lips[0]
+    return state.contact_pairs[0]
 
 
 @Quantity("state", "tension ratio over a contact", "x_i", key="contacts.log_ratio",
@@ -185,11 +185,11 @@ def contact_log_ratio(state: SolvedState) -> Array:
 def contact_slid(state: SolvedState) -> Array:
     """Tendon length that has slid over a friction contact toward the base."""
     chain, spans = state.chain, state.at.spans
-    drawn, stretch = paired(chain, [(s.drawn, s.stretch) for s in spans])
-    behind, stretch_behind = paired(chain, [(s.drawn_behind, s.stretch_behind) for s in spans])
+    released_length, stretch = paired(chain, [(s.released_length, s.stretch) for s in spans])
+    behind, tension_length = paired(chain, [(s.released_length, s.tension_length) for s in spans])
     in_body = state.tensions[1] * state.by_tendon("body_length")
-    at_entry = drawn + (stretch + in_body) * state.compliance
-    return along_contacts(chain, behind + stretch_behind * state.compliance, at_entry)
+    at_entry = released_length + (stretch + in_body) * state.compliance
+    return along_contacts(chain, behind + tension_length * state.compliance, at_entry)
 
 
 @Quantity("state", "turning at a contact", r"\beta_i", "deg", key="contacts.turning_deg",
@@ -203,7 +203,7 @@ def contact_turning(state: SolvedState) -> Array:
           note="0 sticks, +1 slips toward the base, -1 slips toward the tip.")  # fmt: skip
 def contact_state(state: SolvedState) -> Array:
     """What a friction contact does: "stick", "slip toward base" or "slip toward tip"."""
-    return at_bound(state.quantity("contact_log_ratio"), state.quantity("contact_bound"))
+    return bound_side(state.quantity("contact_log_ratio"), state.quantity("contact_bound"))
 
 
 @Quantity("state", "largest tension ratio over a contact", "b_i", per=("tendon", "contact"))
@@ -283,20 +283,22 @@ class Shape(namedtuple("Shape", _reported("solve"))):  # pyright: ignore[reportU
     __slots__ = ()
 
     @staticmethod
-    def form(flexures: int, tendons: int) -> Form:
+    def form(flexures: int, tendons: int) -> PytreeLayout:
         """How it is packed for a robot of so many flexures and tendons."""
         sizes = {"tendon": tendons, "notch": flexures, "body": flexures + 1, "row": 3, "axis": 3}
         own = (REGISTERED[name] for name in Shape._fields)
-        return Form.of(Shape(*(np.zeros([sizes[axis] for axis in q.per], q.kind) for q in own)))
+        return PytreeLayout.of(
+            Shape(*(np.zeros([sizes[axis] for axis in q.per], q.kind) for q in own))
+        )
 
 
-def shape(chain: Chain, solved: Solved) -> Shape:
+def shape(chain: Chain, solved: SolverState) -> Shape:
     """What the program of a solve reports of a solved state."""
     state = SolvedState(chain, solved)
     return Shape(*(state.quantity(name) for name in Shape._fields))
 
 
-def quantities(chain: Chain, solved: Solved) -> dict[str, Array]:
+def quantities(chain: Chain, solved: SolverState) -> dict[str, Array]:
     """Everything else that is reported of a solved state, in the frame of the base."""
     state = SolvedState(chain, solved)
     return {name: state.quantity(name) for name in STATE}
@@ -311,7 +313,7 @@ def believable(value: Callable[[str], Any]) -> Any:
     return value("friction_holds") & (value("moment_error") < MODES_FAIL) & value("bend_possible")
 
 
-def of_own(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
+def unpad_quantity(chain: Chain, name: str, values: np.ndarray) -> np.ndarray:
     """Return a quantity of a chain whose contacts are all edges of all gaps as that of its own.
 
     Args:

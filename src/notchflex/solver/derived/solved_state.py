@@ -8,13 +8,13 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
-from notchflex.loads.applied import Applied, body_wrench
+from notchflex.loads.applied import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import FlexureState, in_space, relative_pose
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
-from notchflex.solver.continuation import Solved
+from notchflex.solver.continuation import SolverState
 from notchflex.solver.element import Unknowns
-from notchflex.solver.residual import Evaluation, body_poses, evaluate, per_tendon
+from notchflex.solver.residual import Evaluation, body_poses, evaluate, in_tendon_order
 
 # Of the cosine between the directions of two notches, less than 0.3 degrees.
 _IN_PLANE = 1e-5
@@ -27,7 +27,7 @@ class SolvedState:
     one of the memory only decides what sticks.
     """
 
-    def __init__(self, chain: Chain, solved: Solved) -> None:
+    def __init__(self, chain: Chain, solved: SolverState) -> None:
         """Take a state of a chain."""
         self.chain, self.solved = chain, solved
         self._found: dict[str, Array] = {}
@@ -84,7 +84,7 @@ class SolvedState:
         return paired(self.chain, [(s.gap_tension, s.body_tension) for s in self.at.spans])
 
     @cached_property
-    def lips(self) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
+    def contact_pairs(self) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
         """Contact force and gap of every notch."""
         return notch_lips(self.chain, self.solved.point.unknowns, self.at)
 
@@ -101,7 +101,9 @@ class SolvedState:
 
     def by_tendon(self, name: str) -> Float[Array, "n t"]:
         """What the chain knows of every gap and tendon."""
-        return per_tendon(self.chain, tuple(getattr(group, name) for group in self.chain.groups))
+        return in_tendon_order(
+            self.chain, tuple(getattr(group, name) for group in self.chain.groups)
+        )
 
 
 def bending_angle(
@@ -129,9 +131,13 @@ def notch_lips(
     """Contact force and what is left of the narrowest opening of every notch (N, mm)."""
     force = jnp.zeros(chain.flexures)
     gap = jnp.full(chain.flexures, jnp.inf)
-    for group, own, touch in zip(chain.lips, unknowns.lip_force, at.touches, strict=True):
-        force = force + jnp.sum(own * group.closes, axis=-1)
-        gap = jnp.minimum(gap, jnp.min(jnp.where(group.closes > 0.0, touch.gap, jnp.inf), axis=-1))
+    for group, own, contact in zip(
+        chain.contact_pairs, unknowns.contact_force, at.contacts, strict=True
+    ):
+        force = force + jnp.sum(own * group.has_contact, axis=-1)
+        gap = jnp.minimum(
+            gap, jnp.min(jnp.where(group.has_contact > 0.0, contact.gap, jnp.inf), axis=-1)
+        )
     return force, jnp.where(jnp.isinf(gap), jnp.nan, gap)
 
 
@@ -143,7 +149,7 @@ def largest_moment(flexure: FlexureState) -> Float[Array, " n"]:
 
 
 def base_wrench(
-    chain: Chain, base_tension: Float[Array, " t"], at: Evaluation, applied: Applied | None
+    chain: Chain, base_tension: Float[Array, " t"], at: Evaluation, applied: BodyLoads | None
 ) -> Float[Array, " 6"]:
     """What the holder does to the tube: moment about the base's origin, and force.
 
@@ -178,7 +184,7 @@ def notch_angles(chain: Chain, relative: Float[Array, "n d d"]) -> Float[Array, 
 def paired(chain: Chain, pairs: list[tuple[Array, Array]]) -> tuple[Array, Array]:
     """Pairs of values per group, each of the two in the order of the robot's tendons."""
     first, second = zip(*pairs, strict=True)
-    return per_tendon(chain, first), per_tendon(chain, second)
+    return in_tendon_order(chain, first), in_tendon_order(chain, second)
 
 
 def _in_space(chain: Chain, poses: Motion) -> Motion:

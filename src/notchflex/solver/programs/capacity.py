@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from lanewise import WIDTH
-from notchflex.solver.programs.pytree_layout import Form
+from notchflex.solver.programs.pytree_layout import PytreeLayout
 
 # From so many bodies on (left) numbers of bodies are multiples of so many (right).
 _STEPS = ((0, WIDTH), (2 * WIDTH, 2 * WIDTH), (16 * WIDTH, 4 * WIDTH), (32 * WIDTH, 8 * WIDTH))
@@ -35,7 +35,7 @@ def capacity(flexures: int) -> int:
 
 
 @lru_cache(maxsize=256)
-def places_within(own: Form, long: Form) -> Int[np.ndarray, " own"]:
+def padded_indices(own: PytreeLayout, long: PytreeLayout) -> Int[np.ndarray, " own"]:
     """Return where the numbers of a form are in that of a longer chain.
 
     Args:
@@ -49,15 +49,15 @@ def places_within(own: Form, long: Form) -> Int[np.ndarray, " own"]:
     return np.concatenate(found) if found else np.zeros(0, int)
 
 
-def lengthen(
-    rows: Float[np.ndarray, "*s own"], own: Form, long: Form
+def pad_rows(
+    rows: Float[np.ndarray, "*s own"], own: PytreeLayout, long: PytreeLayout
 ) -> Float[np.ndarray, "*s long"]:
     """Return rows of a form as those of a longer chain, 0 for the flexures added."""
     if own is long:
         return rows
     found = np.zeros((*rows.shape[:-1], long.size))
-    found[..., places_within(own, long)] = rows
+    found[..., padded_indices(own, long)] = rows
     return found
 
 
-__all__ = ["capacity", "lengthen", "places_within"]
+__all__ = ["capacity", "pad_rows", "padded_indices"]

@@ -15,15 +15,15 @@ from notchflex._jax import constant, jax
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, assemble, padded
 from notchflex.robot import Robot
-from notchflex.solver.continuation import Solved, at_rest, unloaded
+from notchflex.solver.continuation import SolverState, at_rest, unloaded
 from notchflex.solver.derived.quantities import Shape
-from notchflex.solver.programs.capacity import capacity, lengthen
-from notchflex.solver.programs.pytree_layout import Form
-from notchflex.solver.programs.static_structure import KnownForm
+from notchflex.solver.programs.capacity import capacity, pad_rows
+from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.programs.static_structure import StaticStructure
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedChain:
     """A chain, and how it and what belongs to it are packed.
 
     Attributes:
@@ -33,27 +33,27 @@ class Prepared:
     chain: Chain
 
     @cached_property
-    def chain_form(self) -> Form:
-        """Form of the chain."""
-        return Form.of(self.chain)
+    def chain_layout(self) -> PytreeLayout:
+        """PytreeLayout of the chain."""
+        return PytreeLayout.of(self.chain)
 
     @cached_property
     def vector(self) -> Float[np.ndarray, " chain"]:
         """The chain as one vector."""
-        return np.asarray(self.chain_form.pack(self.chain))
+        return np.asarray(self.chain_layout.pack(self.chain))
 
     @cached_property
-    def known_form(self) -> KnownForm:
-        """Form of what is not known of the chain beforehand."""
-        return KnownForm.of(self.chain_form, [self.chain], self.vector[None])
+    def static_structure(self) -> StaticStructure:
+        """PytreeLayout of what is not known of the chain beforehand."""
+        return StaticStructure.of(self.chain_layout, [self.chain], self.vector[None])
 
     @cached_property
-    def known_vector(self) -> Float[np.ndarray, " unknown"]:
+    def dynamic_vector(self) -> Float[np.ndarray, " unknown"]:
         """That as one vector."""
-        return self.known_form.pack(self.vector)
+        return self.static_structure.pack(self.vector)
 
     @cached_property
-    def long(self) -> Prepared:
+    def long(self) -> PreparedChain:
         """The robot with as many flexures as programs are compiled for.
 
         Its tendons are taken to meet the wall at every edge of every gap; where they do is for the
@@ -62,12 +62,14 @@ class Prepared:
         chain = self.chain
         more = padded(chain, capacity(chain.flexures), chain.contacts.shape[1])
         edges = np.tile(np.arange(2 * more.flexures), (chain.tendons, 1))
-        return Prepared(dataclasses.replace(more, contacts=edges))
+        return PreparedChain(dataclasses.replace(more, contacts=edges))
 
-    def long_commands(self, commands: Command) -> tuple[Float[np.ndarray, "s command"], Form]:
+    def padded_commands(
+        self, commands: Command
+    ) -> tuple[Float[np.ndarray, "s command"], PytreeLayout]:
         """Loads packed for the long chain, and the form of one of them."""
-        own, form = self.command_form(commands), self.long.command_form(commands)
-        return lengthen(own.pack(commands, leading=1), own, form), form
+        own, form = self.command_layout(commands), self.long.command_layout(commands)
+        return pad_rows(own.pack(commands, leading=1), own, form), form
 
     def places(self, fields: Mapping[str, Any]) -> Int[np.ndarray, " m"]:
         """Where the vector of the long chain holds some fields of the chain, flattened.
@@ -76,7 +78,7 @@ class Prepared:
             fields: As `chain.laws` returns them.
         """
         if (key := tuple(fields)) not in self._places:
-            form = self.long.chain_form
+            form = self.long.chain_layout
             every: Chain = jax.tree.unflatten(form.structure, form.places)
             long = {name: getattr(every, name) for name in fields}
             own = jax.tree.map(lambda at, leaf: at[tuple(map(slice, leaf.shape))], long, fields)
@@ -87,7 +89,7 @@ class Prepared:
     def _places(self) -> dict[Any, Int[np.ndarray, " m"]]:
         return {}
 
-    def with_fields(self, fields: Mapping[str, Any]) -> Prepared:
+    def with_fields(self, fields: Mapping[str, Any]) -> PreparedChain:
         """Return a robot of the same shape with other laws of material and friction.
 
         Args:
@@ -95,8 +97,8 @@ class Prepared:
         """
         vector = self.long.vector.copy()
         vector[self.places(fields)] = flat(fields)
-        other = Prepared(dataclasses.replace(self.chain, **fields))
-        long = Prepared(self.long.chain_form.unpack(vector))
+        other = PreparedChain(dataclasses.replace(self.chain, **fields))
+        long = PreparedChain(self.long.chain_layout.unpack(vector))
         for new, old in ((other, self), (long, self.long)):
             new.__dict__.update({name: getattr(old, name) for name in _OF_SHAPE})
         long.__dict__["vector"] = vector
@@ -104,7 +106,7 @@ class Prepared:
         return other
 
     @cached_property
-    def rest(self) -> Solved:
+    def rest(self) -> SolverState:
         """The free robot with slack tendons."""
         return at_rest(self.chain)
 
@@ -119,36 +121,36 @@ class Prepared:
         return np.append(self.rest_vector, 1.0)
 
     @cached_property
-    def state(self) -> Form:
-        """Form of a solved state."""
-        return Form.of(self.rest)
+    def state(self) -> PytreeLayout:
+        """PytreeLayout of a solved state."""
+        return PytreeLayout.of(self.rest)
 
-    def command_form(self, commands: Command) -> Form:
-        """Form of one of some loads: by tensions alone, or some by stroke."""
-        return self._tension_form if commands.by_stroke is None else self._stroke_form
+    def command_layout(self, commands: Command) -> PytreeLayout:
+        """PytreeLayout of one of some loads: by tensions alone, or some by stroke."""
+        return self._tension_layout if commands.by_stroke is None else self._stroke_layout
 
     @cached_property
-    def _tension_form(self) -> Form:
+    def _tension_layout(self) -> PytreeLayout:
         return self._form_of_commands(None)
 
     @cached_property
-    def _stroke_form(self) -> Form:
+    def _stroke_layout(self) -> PytreeLayout:
         return self._form_of_commands(np.zeros(self.chain.tendons, bool))
 
-    def _form_of_commands(self, by_stroke: np.ndarray | None) -> Form:
+    def _form_of_commands(self, by_stroke: np.ndarray | None) -> PytreeLayout:
         value = constant(np.zeros(self.chain.tendons))
-        return Form.of(Command(value, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
+        return PytreeLayout.of(Command(value, by_stroke, unloaded(self.chain)))  # pyright: ignore[reportArgumentType]
 
     @cached_property
-    def shape(self) -> Form:
-        """Form of what is told of the shape of every state."""
+    def shape(self) -> PytreeLayout:
+        """PytreeLayout of what is told of the shape of every state."""
         return Shape.form(self.chain.flexures, self.chain.tendons)
 
 
 # What robots of one shape share.
 _OF_SHAPE = (
-    *("chain_form", "rest", "rest_vector", "rest_carried", "state", "shape"),
-    *("_tension_form", "_stroke_form"),
+    *("chain_layout", "rest", "rest_vector", "rest_carried", "state", "shape"),
+    *("_tension_layout", "_stroke_layout"),
 )
 
 
@@ -158,7 +160,7 @@ def flat(tree: Any) -> np.ndarray:
 
 
 @lru_cache(maxsize=6)
-def prepared(
+def prepare(
     robot: Robot,
     level: str = "tendons",
     *,
@@ -166,19 +168,19 @@ def prepared(
     follows: bool = True,
     refinement: int = 0,
     flat: bool = True,
-) -> Prepared:
+) -> PreparedChain:
     """A robot ready to be solved; for the arguments see `notchflex.mechanics.chain.assemble`.
 
     The last robots asked for are remembered: a control loop solves the same one again and again.
     """
-    return Prepared(
+    return PreparedChain(
         assemble(robot, level, loaded=loaded, follows=follows, refinement=refinement, flat=flat)
     )
 
 
-def lengthened(ready: Prepared, flexures: int, edges: int) -> Prepared:
+def pad_prepared(ready: PreparedChain, flexures: int, edges: int) -> PreparedChain:
     """A robot ready to be solved beside longer ones; for the arguments see `chain.padded`."""
     chain = ready.chain
     if (chain.flexures, chain.contacts.shape[1]) == (flexures, edges):
         return ready
-    return Prepared(padded(chain, flexures, edges))
+    return PreparedChain(padded(chain, flexures, edges))

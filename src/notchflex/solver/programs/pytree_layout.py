@@ -16,14 +16,14 @@ from jaxtyping import Array
 from notchflex._jax import array_module, jax
 
 
-class Form:
+class PytreeLayout:
     """How a tree of arrays is laid out in a vector of floats.
 
     Forms are kept: trees of the same make have the very same form, so that compiled programs tell
     them apart by identity.
     """
 
-    _known: ClassVar[dict[Any, Form]] = {}
+    _known: ClassVar[dict[Any, PytreeLayout]] = {}
 
     def __init__(self, structure: Any, shapes: tuple[Any, ...], kinds: tuple[str, ...]) -> None:
         """Lay out leaves of given shapes and kinds of numbers one after the other."""
@@ -41,10 +41,10 @@ class Form:
 
     def __repr__(self) -> str:
         """Tell all of it: kept programs are found by this."""
-        return f"Form({self.structure}, {self.shapes}, {self.kinds})"
+        return f"PytreeLayout({self.structure}, {self.shapes}, {self.kinds})"
 
     @classmethod
-    def of(cls, tree: Any) -> Form:
+    def of(cls, tree: Any) -> PytreeLayout:
         """The form of a tree."""
         leaves, structure = jax.tree.flatten(tree)
         shapes = tuple(np.shape(leaf) for leaf in leaves)
@@ -77,10 +77,10 @@ class Form:
         return as_kind(part.reshape(shape), self.kinds[number])
 
 
-def lane_sizes(chain_form: Form, *_others: Any) -> tuple[int, int]:
+def lane_sizes(chain_layout: PytreeLayout, *_others: Any) -> tuple[int, int]:
     """Sizes of the axes that run along the chain: as many flexures, and bodies, as it has."""
-    one = jax.ShapeDtypeStruct((chain_form.size,), float)
-    chain = jax.eval_shape(chain_form.unpack, one)
+    one = jax.ShapeDtypeStruct((chain_layout.size,), float)
+    chain = jax.eval_shape(chain_layout.unpack, one)
     return chain.flexures, chain.flexures + 1
 
 
@@ -91,4 +91,4 @@ def as_kind(values: Array, kind: str) -> Array:
     return values.astype(int) if kind in "iu" else values
 
 
-__all__ = ["Form", "as_kind", "lane_sizes"]
+__all__ = ["PytreeLayout", "as_kind", "lane_sizes"]

@@ -16,15 +16,15 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import Solved, advance
-from notchflex.solver.derived.quantities import Shape, of_own, quantities, shape
+from notchflex.solver.continuation import SolverState, solve_load_step
+from notchflex.solver.derived.quantities import Shape, quantities, shape, unpad_quantity
 from notchflex.solver.derived.solved_state import notch_lips
 from notchflex.solver.newton import Settings
-from notchflex.solver.programs.capacity import lengthen, places_within
+from notchflex.solver.programs.capacity import pad_rows, padded_indices
 from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.prepare import Prepared
-from notchflex.solver.programs.pytree_layout import Form, lane_sizes
-from notchflex.solver.programs.static_structure import KnownForm
+from notchflex.solver.programs.prepare import PreparedChain
+from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
+from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.residual import evaluate
 from notchflex.solver.stability import stability, stable
 
@@ -32,12 +32,12 @@ from notchflex.solver.stability import stability, stable
 _TOLD = 7
 
 
-class Run:
+class SolverRun:
     """States of many loads, loads as leading axis."""
 
     def __init__(
         self,
-        prepared: Prepared,
+        prepared: PreparedChain,
         start: np.ndarray,
         table: np.ndarray,
         from_start: Bool[np.ndarray, " s"],
@@ -102,10 +102,10 @@ class Run:
 
     def _own_state(self, start: int) -> Float[np.ndarray, "s state"]:
         own, long = self._prepared.state, self._prepared.long.state
-        return self._table[:, start + places_within(own, long)]
+        return self._table[:, start + padded_indices(own, long)]
 
     @cached_property
-    def solved(self) -> Solved:
+    def solved(self) -> SolverState:
         """The same, unpacked."""
         return self._prepared.state.unpack(self.states)
 
@@ -113,10 +113,10 @@ class Run:
     def _more(self) -> dict[str, np.ndarray]:
         """What is reported of the state before the first load and of each state, by name."""
         own, long = self._prepared, self._prepared.long
-        rows = lengthen(np.concatenate([self.first[None], self.states]), own.state, long.state)
-        given = (np.zeros(1), long.known_vector, rows, long.known_form, long.state)
+        rows = pad_rows(np.concatenate([self.first[None], self.states]), own.state, long.state)
+        given = (np.zeros(1), long.dynamic_vector, rows, long.static_structure, long.state)
         every = _quantities.along((False, False, True), *given)
-        return {name: of_own(own.chain, name, values) for name, values in every.items()}
+        return {name: unpad_quantity(own.chain, name, values) for name, values in every.items()}
 
     def quantity(self, name: str) -> np.ndarray:
         """What is reported of each state, by its name in the registry."""
@@ -125,13 +125,13 @@ class Run:
         long = self._prepared.long
         packed = self._table[:, 2 * long.state.size : -_TOLD]
         values = long.shape.leaf(packed, Shape._fields.index(name))
-        return of_own(self._prepared.chain, name, values)
+        return unpad_quantity(self._prepared.chain, name, values)
 
     def before(self, name: str) -> np.ndarray:
         """A quantity of the state before the first load; of the shape only tension and stroke."""
         if name not in ("tension", "stroke"):
             return self._more[name][0]
-        start: Solved = self._prepared.state.unpack(self.first)
+        start: SolverState = self._prepared.state.unpack(self.first)
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
@@ -144,13 +144,13 @@ class Run:
 
 
 def run(
-    prepared: Prepared,
+    prepared: PreparedChain,
     commands: Command,
-    start: Solved | None,
+    start: SolverState | None,
     settings: Settings,
     *,
     each_from_start: bool | Bool[np.ndarray, " s"],
-) -> Run:
+) -> SolverRun:
     """Follow loads, each from the state before or each from the same one.
 
     Args:
@@ -164,22 +164,22 @@ def run(
         One entry per load.
     """
     long = prepared.long
-    packed, form = prepared.long_commands(commands)
-    forms = (long.known_form, form, long.state)
+    packed, form = prepared.padded_commands(commands)
+    forms = (long.static_structure, form, long.state)
     first, start_row, carried = prepared.rest_vector, long.rest_vector, long.rest_carried
     if start is not None:
         first = np.asarray(prepared.state.pack(start))
-        start_row = lengthen(first, prepared.state, long.state)
+        start_row = pad_rows(first, prepared.state, long.state)
         carried = np.append(start_row, 1.0)
     from_start = np.broadcast_to(each_from_start, len(packed))
     rows = (False, False, True, True, False, False)
-    given = (carried, long.known_vector, packed, from_start[:, None].astype(float), start_row)
+    given = (carried, long.dynamic_vector, packed, from_start[:, None].astype(float), start_row)
     table = _follow.along(rows, *given, _numbers(settings), *forms)
-    return Run(prepared, first, table, from_start)
+    return SolverRun(prepared, first, table, from_start)
 
 
-def lips(
-    prepared: Prepared, commands: Command, start: Solved, settings: Settings
+def solve_contacts(
+    prepared: PreparedChain, commands: Command, start: SolverState, settings: Settings
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Contact forces (N) and gaps (mm) of all notches, each load from the same state.
 
@@ -190,29 +190,31 @@ def lips(
         Contact forces and gaps, loads by notches, and which loads converged.
     """
     long = prepared.long
-    packed, form = prepared.long_commands(commands)
-    forms = (long.known_form, form, long.state)
-    before = lengthen(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
-    given = (np.zeros(1), long.known_vector, packed, before, np.array(settings.numbers))
-    force, gap, converged = _lips.along((False, False, True, False, False), *given, *forms)
+    packed, form = prepared.padded_commands(commands)
+    forms = (long.static_structure, form, long.state)
+    before = pad_rows(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
+    given = (np.zeros(1), long.dynamic_vector, packed, before, np.array(settings.numbers))
+    force, gap, converged = _solve_contacts.along(
+        (False, False, True, False, False), *given, *forms
+    )
     own = prepared.chain.flexures
     return force[:, :own], gap[:, :own], converged
 
 
 @native(5, lane_sizes)
-def _lips(
+def _solve_contacts(
     carried: Float[Array, " one"],
     vector: Float[Array, " chain"],
     load: Float[Array, " command"],
     start: Float[Array, " state"],
     numbers: Float[Array, " settings"],
-    chain_form: KnownForm,
-    command_form: Form,
-    state_form: Form,
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
 ) -> tuple[Array, tuple[Array, Array, Array]]:
     """Contact forces and gaps of one load, and whether it converged; nothing is carried on."""
-    chain, settings = chain_form.unpack(vector), Settings.of(numbers)
-    came = advance(chain, command_form.unpack(load), state_form.unpack(start), settings)
+    chain, settings = chain_layout.unpack(vector), Settings.of(numbers)
+    came = solve_load_step(chain, command_layout.unpack(load), state_layout.unpack(start), settings)
     point = came.solved.point
     at = evaluate(
         chain, point.unknowns, came.solved.memory, point.base_tension, came.solved.applied
@@ -234,33 +236,35 @@ def _follow(
     from_start: Float[Array, " 1"],
     start: Float[Array, " state"],
     numbers: Float[Array, " settings"],
-    chain_form: KnownForm,
-    command_form: Form,
-    state_form: Form,
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    state_layout: PytreeLayout,
 ) -> tuple[Float[Array, " state+1"], Float[Array, " told"]]:
     """The two states of a load, their shape, and how it went.
 
     Carried from load to load is the last solved state, and whether all loads since the start
     converged.
     """
-    chain: Chain = chain_form.unpack(vector)
+    chain: Chain = chain_layout.unpack(vector)
     settings = Settings.of(numbers)
     alive = (carried[-1] > 0.0) | (from_start[0] > 0.0)
     before = jnp.where(from_start[0] > 0.0, start, carried[:-1])
 
     def try_it() -> tuple[Array, Array, Array]:
-        came = advance(chain, command_form.unpack(load), state_form.unpack(before), settings)
+        came = solve_load_step(
+            chain, command_layout.unpack(load), state_layout.unpack(before), settings
+        )
         told = [came.residual, came.iterations, came.converged, True, came.reached]
         told += [came.parts, came.part_before]
         found = shape(chain, came.solved)
         told = jnp.concatenate(
             [
-                state_form.pack(came.between),
-                Form.of(found).pack(found),
+                state_layout.pack(came.between),
+                PytreeLayout.of(found).pack(found),
                 jnp.stack([jnp.asarray(x, float) for x in told]),
             ]
         )
-        return state_form.pack(came.solved), told, came.converged
+        return state_layout.pack(came.solved), told, came.converged
 
     def skip() -> tuple[Array, Array, Array]:
         told = jnp.zeros(Shape.form(chain.flexures, chain.tendons).size + _TOLD)
@@ -276,8 +280,8 @@ def _quantities(
     carried: Float[Array, " one"],
     vector: Float[Array, " chain"],
     state: Float[Array, " state"],
-    chain_form: KnownForm,
-    state_form: Form,
+    chain_layout: StaticStructure,
+    state_layout: PytreeLayout,
 ) -> tuple[Array, dict[str, Array]]:
     """What is reported of a state beyond its shape, by name; nothing is carried on."""
-    return carried, quantities(chain_form.unpack(vector), state_form.unpack(state))
+    return carried, quantities(chain_layout.unpack(vector), state_layout.unpack(state))

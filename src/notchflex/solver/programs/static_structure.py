@@ -16,30 +16,34 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex._jax import array_module, jax
 from notchflex.mechanics.chain import Chain, structural
-from notchflex.solver.programs.pytree_layout import Form, as_kind
+from notchflex.solver.programs.pytree_layout import PytreeLayout, as_kind
 
 # Numbers behind those of the vector, so that programs may read whole vectors up to its end.
 _BEHIND = 8
 
 
-class KnownForm:
+class StaticStructure:
     """How the numbers of a chain that are not known are laid out in a vector of floats.
 
     Known are zeros that a chain has at every flexure because of how it is made
     (`mechanics/chain/structure.py`), and whole numbers and flags that are the same at every
     flexure. Numbers of the rest lie flexure after flexure, as programs read them.
 
-    Forms are kept, as `Form` keeps its own.
+    Forms are kept, as `PytreeLayout` keeps its own.
 
     Attributes:
-        form: Form of the whole chain.
+        form: PytreeLayout of the whole chain.
         size: Numbers in a vector.
     """
 
-    _found: ClassVar[dict[Form, list[KnownForm]]] = {}
+    _found: ClassVar[dict[PytreeLayout, list[StaticStructure]]] = {}
 
     def __init__(
-        self, form: Form, flexures: int, known: Bool[np.ndarray, " chain"], numbers: np.ndarray
+        self,
+        form: PytreeLayout,
+        flexures: int,
+        known: Bool[np.ndarray, " chain"],
+        numbers: np.ndarray,
     ) -> None:
         """Take which numbers of a whole chain are known, and those numbers."""
         self.form, self._known, self._numbers = form, known, np.where(known, numbers, 0.0)
@@ -53,19 +57,19 @@ class KnownForm:
     def __repr__(self) -> str:
         """Tell all of it: kept programs are found by this."""
         known = np.packbits(self._known).tobytes().hex()
-        return f"KnownForm({self.form}, {known}, {self._numbers[self._known].tolist()})"
+        return f"StaticStructure({self.form}, {known}, {self._numbers[self._known].tolist()})"
 
     @classmethod
     def of(
-        cls, form: Form, chains: Sequence[Chain], numbers: Float[np.ndarray, "k chain"]
-    ) -> KnownForm:
+        cls, form: PytreeLayout, chains: Sequence[Chain], numbers: Float[np.ndarray, "k chain"]
+    ) -> StaticStructure:
         """A form that serves for some chains: one that is there already, if any does.
 
         A new one beside others knows only what they know too: it serves for their chains as well,
         so that robots that differ a little soon share one.
 
         Args:
-            form: Form of the whole chains.
+            form: PytreeLayout of the whole chains.
             chains: The chains.
             numbers: The same packed whole.
         """
@@ -83,7 +87,10 @@ class KnownForm:
 
     @staticmethod
     def _shared(
-        form: Form, found: list[KnownForm], known: Bool[np.ndarray, " chain"], numbers: np.ndarray
+        form: PytreeLayout,
+        found: list[StaticStructure],
+        known: Bool[np.ndarray, " chain"],
+        numbers: np.ndarray,
     ) -> Bool[np.ndarray, " chain"]:
         """What is known of a chain and by all forms that were found before."""
         for one in found:
@@ -122,7 +129,7 @@ class KnownForm:
 
 
 def _same(
-    form: Form, flexures: int, numbers: Float[np.ndarray, "k chain"]
+    form: PytreeLayout, flexures: int, numbers: Float[np.ndarray, "k chain"]
 ) -> Bool[np.ndarray, " chain"]:
     """Which numbers are the same at every flexure of every chain; of floats, which are zero."""
     found = np.zeros(form.size, bool)
@@ -140,4 +147,4 @@ def _by_flexure(places: np.ndarray, flexures: int) -> np.ndarray:
     return places.reshape(len(places) if along else 1, -1)
 
 
-__all__ = ["KnownForm"]
+__all__ = ["StaticStructure"]

@@ -87,7 +87,7 @@ class Marks:
         for number, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
             ball.visible = bool(closed)
             if closed:
-                ball.position = shape.lips(number, _LIPS_AT * self._outer)
+                ball.position = shape.contact_pairs(number, _LIPS_AT * self._outer)
 
 
 def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -61,7 +61,7 @@ def skins(rest: Bent) -> list[Skin]:
     Args:
         rest: The robot as `at_rest` draws it; later states are drawn with as many pieces.
     """
-    spine = np.asarray(rest.chain.rods.lip_closes) > 0.0
+    spine = np.asarray(rest.chain.rods.has_closure) > 0.0
     return [
         _spine(rest, notch) if spine[notch] else _strip(rest, notch)
         for notch in range(len(rest.flexures))

@@ -47,7 +47,7 @@ def _body(rest: Bent, body: int) -> Mesh:
     view = float(np.radians(notch.direction_deg))
     corners = np.array(body_corners(rest, body, view))
     solid = _through(corners, view, rest) ^ _tube(rest, corners[:, 1])
-    spine = np.asarray(rest.chain.rods.lip_closes) > 0.0
+    spine = np.asarray(rest.chain.rods.has_closure) > 0.0
     for flexure in (body - 1, body):
         # A flexure on a spine lies between the pieces; one across the tube reaches into them.
         if 0 <= flexure < len(rest.flexures) and not spine[flexure]:
