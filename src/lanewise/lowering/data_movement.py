@@ -63,6 +63,10 @@ def _stack(*arrays: References, axis: int = 0, **_: Any) -> References:
     return np.stack(arrays, axis=axis)
 
 
+def _unstack(refs: References, *, axis: int, **_: Any) -> list[References]:
+    return list(np.moveaxis(refs, axis, 0))
+
+
 def _split(refs: References, *, sizes: tuple[int, ...], axis: int, **_: Any) -> list[References]:
     return np.split(refs, np.cumsum(sizes)[:-1], axis=axis)
 
@@ -105,6 +109,7 @@ DATA_MOVEMENT: dict[str, Callable[..., Any]] = {
     "slice": _slice,
     "concatenate": _concatenate,
     "stack": _stack,
+    "unstack": _unstack,
     "split": _split,
     "pad": _pad,
     "copy": _identity,

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from lanewise import WIDTH
+from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.batch_rows import follow_row
 from notchflex.analysis.outputs import DEFAULT_OUTPUTS, check_outputs
@@ -27,7 +28,6 @@ from notchflex.loads.load_path import join_paths, load_path
 from notchflex.loads.validation import check_integer, one_or_several, short_repr
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
-from notchflex.solver.derived.quantities import BY_BODY, BY_FLEXURE
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain, pad_prepared
 from notchflex.solver.programs.pytree_layout import PytreeLayout
@@ -162,7 +162,7 @@ def simulate_batch(
     message = "simulate_batch needs a notchflex.LoadPath, or some in order"
     paths = [load_path(one, tendons) for one in one_or_several(loads, LoadPath, message)]
     if not paths or len({len(path) for path in paths}) > 1:
-        raise InputError("a batch needs one path or more, all of equally many steps")
+        raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
     joined = paths[0] if len(paths) == 1 else join_paths(paths)
     rows = len(paths)
     return Batch(_simulate(every, joined, rows, outputs, settings, refinement, cores, progress))
@@ -172,7 +172,7 @@ def _robots(robots: Any) -> list[Robot]:
     message = "a batch needs a notchflex.Robot, or some of them"
     every = one_or_several(robots, Robot, message)
     if not every or not all(isinstance(robot, Robot) for robot in every):
-        raise InputError(f"{message}; got {short_repr(robots)}")
+        raise InputError.WRONG_TYPE(f"{message}; got {short_repr(robots)}")
     return every
 
 
@@ -190,10 +190,10 @@ def _simulate(
     asked = check_outputs(outputs)
     threads = number_of_cores() if cores is None else check_integer(cores, "cores")
     if threads < 1:
-        raise InputError(f"cores must be 1 or more, or None for all; got {threads}")
+        raise InputError.OUT_OF_RANGE(f"cores must be 1 or more, or None for all; got {threads}")
     count = max(len(robots), paths)
     if len(robots) not in (1, count) or paths not in (1, count):
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             "a batch needs as many robots as loads, or one of either; "
             f"got {len(robots)} robots and {paths} loads"
         )
@@ -225,11 +225,11 @@ def _store(
     shape = tuple(np.maximum(arrays[name].shape[1:], values.shape[1:]))
     if shape != arrays[name].shape[1:]:
         wider = [(0, 0), *((0, b - a) for a, b in zip(arrays[name].shape[1:], shape, strict=True))]
-        arrays[name] = np.pad(arrays[name], wider, constant_values=np.nan)
+        arrays[name] = np.pad(arrays[name], wider, constant_values=_empty(values))
     first, last = int(rows[0]), int(rows[-1]) + 1
     where = rows if last - first > len(rows) else slice(first, last)
     if shape != values.shape[1:]:
-        arrays[name][where] = np.nan
+        arrays[name][where] = _empty(values)
     arrays[name][(where, *(slice(size) for size in values.shape[1:]))] = values
 
 
@@ -273,12 +273,18 @@ class _Table:
 
 
 def _unpad(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
-    """Values by flexure or body with NaN where a robot has none, rows and steps as leading axes."""
-    count = flexures + (name in BY_BODY)
-    if name in (*BY_FLEXURE, *BY_BODY) and (count < values.shape[2]).any():
+    """Values by flexure or body, empty where a robot has none, rows and steps as leading axes."""
+    along = REGISTERED[name].per[:1]
+    count = flexures + (along == ("body",))
+    if along in (("notch",), ("body",)) and (count < values.shape[2]).any():
         beyond = np.arange(values.shape[2]) >= count[:, None]
-        values[np.broadcast_to(beyond[:, None], values.shape[:3])] = np.nan
+        values[np.broadcast_to(beyond[:, None], values.shape[:3])] = _empty(values)
     return values
+
+
+def _empty(values: np.ndarray) -> float:
+    """What stands where a robot has no number: NaN, or 0 in whole numbers and flags."""
+    return np.nan if values.dtype.kind == "f" else 0
 
 
 def _tables(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from jaxtyping import Array, Float
 
 from notchflex.analysis.outputs import follow_path
-from notchflex.solver.continuation import at_rest, solve_load_step
+from notchflex.solver.continuation import at_rest
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
@@ -36,7 +36,7 @@ def follow_row(
     """
     robot, loads = chain_layout.unpack(chain), command_layout.unpack(commands)
     start, settings = at_rest(robot), Settings.of(numbers)
-    return follow_path(robot, loads, start, settings, outputs, solve_load_step)
+    return follow_path(robot, loads, start, settings, outputs)
 
 
 __all__ = ["follow_row"]

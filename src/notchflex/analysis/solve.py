@@ -9,6 +9,7 @@ from notchflex.loads import Load, LoadPath
 from notchflex.loads.applied import follows, is_planar, is_unloaded
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import load_path
+from notchflex.loads.validation import check_is_robot
 from notchflex.mechanics.chain import tendons_in_plane
 from notchflex.mechanics.flexure import LEVELS, MOST_REFINEMENT
 from notchflex.results.equilibrium import Equilibrium
@@ -128,7 +129,7 @@ def _follow(
     *,
     each_from_rest: bool = False,
 ) -> EquilibriumPath:
-    load = load_path(loads, robot.number_of_tendons)
+    load = load_path(loads, check_is_robot(robot).number_of_tendons)
     ready = prepare_for(robot, load, from_state, refinement)
     start = None if from_state is None else fitted(from_state, ready.chain)
     commands = make_commands(load, robot, ready.chain)
@@ -141,7 +142,7 @@ def _follow(
 def check_refinement(refinement: int) -> None:
     """Raise if there is no such refinement."""
     if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
         )
 
@@ -155,7 +156,7 @@ def prepare_for(
     """Prepare a robot with modes enough for all loads of a path, and for the state before it."""
     check_refinement(refinement)
     if from_state is not None and from_state.refinement != refinement:
-        raise InputError(
+        raise InputError.CONFLICT(
             f"the state was computed with refinement {from_state.refinement}, not {refinement}; "
             "go on with the same"
         )

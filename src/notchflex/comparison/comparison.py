@@ -216,7 +216,7 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
     """
     robot = comparison.robot
     if robot.number_of_tendons != 1:
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"the kinematic model shares the stroke of one tendon; {robot.name} has "
             f"{robot.number_of_tendons}."
         )
@@ -243,13 +243,13 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
 
 def _check(robot: Robot, measurements: Measurements) -> None:
     if not isinstance(measurements, Measurements):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             "compare needs Measurements; read_measurements reads them from a CSV, and "
             f"simulate_measurements makes them; got {type(measurements).__name__}"
         )
     notches = measurements.observed.get("notch_angle")
     if notches is not None and notches.shape[1] != robot.number_of_notches:
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"{measurements.source} has angles of {notches.shape[1]} notches, but {robot.name} has "
             f"{robot.number_of_notches}; choose the robot that was measured"
         )
@@ -269,12 +269,8 @@ def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
     if not len(rows) or not np.isfinite(measured.observed[name][rows]).any():
         return float("nan")
     values = {one: model[one][rows] for one in outputs_for((name,))}
-    slopes = {one: np.zeros((0, *value.shape)) for one, value in values.items()}
-    predicted = Predicted(values, np.ones(len(rows), bool), slopes)
-    part = measured.taken(rows)
-    # States of a path are in the world already, as what was measured.
-    part = replace(part, load=replace(part.load, base_rotation=np.zeros(3)))
-    off = misfit(name, part, predicted).values
+    predicted = Predicted(values, np.ones(len(rows), bool), {})
+    off = misfit(name, measured.taken(rows), predicted).values
     coordinates = 1 if name == "tip_tension" else 3
     squares = off.reshape(len(rows), -1, coordinates) ** 2
     known = np.isfinite(squares).any(axis=2)

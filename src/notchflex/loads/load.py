@@ -83,7 +83,7 @@ class Load(ExternalLoad):
         several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
         given: list[Any] = list(value) if several else [value]
         if len(given) > tendons:
-            raise InputError(
+            raise InputError.WRONG_SHAPE(
                 f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "
                 f"give at most {tendons}"
             )
@@ -91,7 +91,7 @@ class Load(ExternalLoad):
             if entry is not None:
                 entries[i] = check_number(entry, what, _PER_TENDON)
                 if not isfinite(entries[i]):
-                    raise InputError(f"{what} must be finite; got {short_repr(entry)}")
+                    raise InputError.NOT_FINITE(f"{what} must be finite; got {short_repr(entry)}")
         return entries
 
 

@@ -50,7 +50,7 @@ class LoadPath(Displayed):
         stroke = np.atleast_2d(check_table(self.stroke, "stroke"))
         base_rotation = np.array(check_vector(self.base_rotation, *BASE_TURN))
         if tension.shape != stroke.shape or tension.ndim != 2:
-            raise InputError(
+            raise InputError.WRONG_SHAPE(
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
                 f"got {tension.shape} and {stroke.shape}"
             )
@@ -60,15 +60,17 @@ class LoadPath(Displayed):
         if tension.size and np.isnan(stroke).all() and 0.0 <= tension.min() < np.inf:
             return  # valid tensions alone, as most often
         if len(tension) == 0:
-            raise InputError("a load path needs at least one step; got none")
+            raise InputError.NO_DATA("a load path needs at least one step; got none")
         if np.isinf(tension).any() or np.isinf(stroke).any():
-            raise InputError("a tension or stroke is infinite; give finite numbers (N, mm)")
+            raise InputError.NOT_FINITE(
+                "a tension or stroke is infinite; give finite numbers (N, mm)"
+            )
         if (tension < 0).any():
-            raise InputError(
+            raise InputError.OUT_OF_RANGE(
                 f"a tendon can only pull: got a tension of {np.nanmin(tension):g} N, give 0 or more"
             )
         if (~np.isnan(tension) & ~np.isnan(stroke)).any():
-            raise InputError(
+            raise InputError.CONFLICT(
                 "tension and stroke are both given for one tendon in one step; give one of them"
             )
 
@@ -159,7 +161,7 @@ class LoadPath(Displayed):
             [[0.0, nan], [1.0, nan], [nan, 1.0]]
         """
         if not isinstance(following, LoadPath):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise InputError(
+            raise InputError.WRONG_TYPE(
                 f"a load path goes on with another notchflex.LoadPath; got {short_repr(following)}"
             )
         count = max(self.tension.shape[1], following.tension.shape[1])
@@ -222,7 +224,7 @@ class LoadPath(Displayed):
         if given == count:
             return self
         if given > count:
-            raise InputError(
+            raise InputError.WRONG_SHAPE(
                 f"the load commands {given} tendons, but the robot has {count}; "
                 f"give at most {count}"
             )
@@ -241,7 +243,7 @@ def join_paths(paths: Sequence[LoadPath]) -> LoadPath:
         InputError: Their bases are turned differently.
     """
     if any((path.base_rotation != paths[0].base_rotation).any() for path in paths):
-        raise InputError("base_rotation must be the same for all paths of a batch")
+        raise InputError.CONFLICT("base_rotation must be the same for all paths of a batch")
     return LoadPath(
         np.concatenate([path.tension for path in paths]),
         np.concatenate([path.stroke for path in paths]),
@@ -269,16 +271,18 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
         loads, Load, "loads must be a notchflex.Load, a LoadPath or Loads in order"
     )
     if not every:
-        raise InputError("there are no loads; give at least one")
+        raise InputError.NO_DATA("there are no loads; give at least one")
     for load in every:
         if not isinstance(load, Load):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
+            raise InputError.WRONG_TYPE(
+                f"a load must be a notchflex.Load; got {type(load).__name__}"
+            )
     turns = {
         NO_TURN if load.base_rotation is NO_TURN else check_vector(load.base_rotation, *BASE_TURN)
         for load in every
     }
     if len(turns) > 1:
-        raise InputError("base_rotation must be the same for all loads of a path")
+        raise InputError.CONFLICT("base_rotation must be the same for all loads of a path")
     tension = [load.per_tendon("tension", tendons) for load in every]
     stroke = [load.per_tendon("stroke", tendons) for load in every]
     given = np.array(tension), np.array(stroke), np.array(turns.pop())
@@ -305,12 +309,12 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
         given = (None,)
     different = {id(one): one for one in given}.values()
     if not all(isinstance(one, ExternalLoad) for one in different):
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             "external of a load path must hold one ExternalLoad per step; "
             f"got {short_repr(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
         )
     if given and len(given) != steps:
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"external of a load path has {len(given)} entries, but there are {steps} steps; "
             "give one per step"
         )

@@ -22,7 +22,7 @@ def check_number(value: Any, what: str, form: str = "a number") -> float:
             raise TypeError
         return float(value)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} must be {form}; got {short_repr(value)}") from None
+        raise InputError.WRONG_TYPE(f"{what} must be {form}; got {short_repr(value)}") from None
 
 
 def check_integer(value: Any, what: str) -> int:
@@ -32,14 +32,16 @@ def check_integer(value: Any, what: str) -> int:
             raise TypeError
         return operator.index(value)
     except TypeError:
-        raise InputError(f"{what} must be a whole number; got {short_repr(value)}") from None
+        raise InputError.WRONG_TYPE(
+            f"{what} must be a whole number; got {short_repr(value)}"
+        ) from None
 
 
 def check_bool(value: Any, what: str) -> bool:
     """Return True or False."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise InputError(f"{what} must be True or False; got {short_repr(value)}")
+    raise InputError.WRONG_TYPE(f"{what} must be True or False; got {short_repr(value)}")
 
 
 def check_vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
@@ -64,7 +66,9 @@ def check_vector(value: Any, what: str, form: str) -> tuple[float, float, float]
         except InputError:
             numbers = []
     if len(numbers) != 3 or not all(isfinite(one) for one in numbers):
-        raise InputError(f"{what} needs three finite numbers ({form}); got {short_repr(value)}")
+        raise InputError.NOT_FINITE(
+            f"{what} needs three finite numbers ({form}); got {short_repr(value)}"
+        )
     return numbers[0], numbers[1], numbers[2]
 
 
@@ -81,7 +85,7 @@ def check_table(value: Any, what: str) -> np.ndarray:
             raise TypeError
         return np.asarray(value, float)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             f"{what} of a load path must be numbers, steps by tendons; got {short_repr(value)}"
         ) from None
 
@@ -91,13 +95,13 @@ def one_or_several(value: Any, kind: type, what: str) -> list[Any]:
     try:
         return [value] if isinstance(value, kind) else list(value)
     except TypeError:
-        raise InputError(f"{what}; got {short_repr(value)}") from None
+        raise InputError.WRONG_TYPE(f"{what}; got {short_repr(value)}") from None
 
 
 def check_is_robot(value: Any) -> Robot:
     """Return a robot."""
     if not isinstance(value, Robot):
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             'a notchflex.Robot is needed, such as load_robot("pacheco2021-a"); '
             f"got {short_repr(value)}"
         )

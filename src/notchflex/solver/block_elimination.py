@@ -120,7 +120,9 @@ def _tension_step(
     order = chain.tendon_order
     back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
     # Rows in the order of the robot's tendons.
-    released_length, tension_length = jnp.zeros_like(back).at[:, order].set(back)
+    released_length, tension_length = jnp.stack(
+        [back[:, place] for place in np.argsort(order)], axis=1
+    )
     by_base = slopes[1] @ released_length + slopes[2] @ tension_length
     matrix = slopes[0] + by_base[:, 1:]
     # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; a

@@ -250,7 +250,7 @@ def _spans(
     group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
-    at_base = base_tension[jnp.array(group.numbers)][None]
+    at_base = _of_group(base_tension, group)[None]
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
     gap_tension = runs * tension_ratio[..., 0] * _shift_from_base(beyond_both, at_base[0])
@@ -260,7 +260,7 @@ def _spans(
     lengths = jnp.stack([shortening, gap_tension * group.natural_gap + in_body])
     summed = jnp.cumsum(lengths[:, ::-1], axis=1)[:, ::-1]
     beyond = summed - lengths
-    stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None]
+    stiffness = _of_group(chain.memory_stiffness, group)[None]
     at_exit = summed[0] + summed[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
     bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
@@ -276,6 +276,11 @@ def _spans(
         slid=jnp.stack([at_exit, at_entry], axis=-1),
         bound=slip_mask(group) * jnp.stack(bounds, axis=-1),
     )
+
+
+def _of_group(values: Float[Array, " all"], group: TendonGroup) -> Float[Array, " t"]:
+    """Values of the tendons of a group; by slices, whose adjoint the native compiler knows."""
+    return jnp.stack([values[number] for number in group.numbers])
 
 
 def slip_mask(group: TendonGroup) -> Float[Array, "n t 2"]:
@@ -324,4 +329,5 @@ def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...])
     """Bring values per group of tendons into the order of the robot's tendons, as last axis."""
     if not grouped:
         return jnp.zeros(0)
-    return jnp.concatenate(grouped, axis=-1)[..., np.argsort(chain.tendon_order)]
+    together = jnp.concatenate(grouped, axis=-1)
+    return jnp.stack([together[..., place] for place in np.argsort(chain.tendon_order)], axis=-1)

@@ -16,56 +16,13 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import stroke
 from notchflex.solver.block_elimination import Iterate, linear_step
-from notchflex.solver.continuation import (
-    LoadStepResult,
-    SolverState,
-    interpolate_command,
-    solve_load_step,
-)
+from notchflex.solver.continuation import SolverState, interpolate_command
 from notchflex.solver.element import Memory
-from notchflex.solver.newton import Settings
 from notchflex.solver.residual import evaluate
 
 
-def solved_path(
-    chain: Chain, commands: Command, start: SolverState, settings: Settings
-) -> LoadStepResult:
-    """Follow a path of loads without derivatives; `differentiable_load_step` adds derivatives.
-
-    Args:
-        chain: The chain.
-        commands: The loads, as leading axis.
-        start: The state before the first.
-        settings: How hard to try.
-
-    Returns:
-        What came of every load, as leading axis; after one that failed each starts from the last
-        good state.
-    """
-    chain, commands, start, settings = _still((chain, commands, start, settings))
-
-    def step(last: SolverState, command: Command) -> tuple[SolverState, LoadStepResult]:
-        came = solve_load_step(chain, command, last, settings)
-        return came.solved, came
-
-    return jax.lax.scan(step, start, commands)[1]
-
-
-def differentiable_load_step(
-    chain: Chain, item: tuple[Command, LoadStepResult], last: SolverState, settings: Settings
-) -> LoadStepResult:
-    """A load that is solved already, from a solved state, with derivatives by all it takes.
-
-    They are NaN where it was not reached, and where nobody knows them, see `attach_derivatives`.
-    """
-    del settings  # it was needed to solve
-    command, came = item
-    way = SubstepHistory(came.between, came.part_before, came.parts, came.converged)
-    return came._replace(solved=attach_derivatives(chain, command, last, came.solved, way))
-
-
 class SubstepHistory(NamedTuple):
-    """How a solved state was come to from the one before, told by `LoadStepResult`.
+    """How a solved state was come to from the one before, told by `Advance`.
 
     Attributes:
         between: The state before the last part of the load.
@@ -168,4 +125,4 @@ def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Arra
     return jnp.zeros_like(varied), tangents[1] * jnp.where(known, 1.0, jnp.nan)
 
 
-__all__ = ["SubstepHistory", "attach_derivatives", "differentiable_load_step", "solved_path"]
+__all__ = ["SubstepHistory", "attach_derivatives"]

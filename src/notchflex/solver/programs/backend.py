@@ -40,7 +40,7 @@ def _chosen(variable: str) -> str:
     value, allowed = os.environ.get(variable), _ALLOWED[variable]
     if value and value not in allowed:
         names = ", ".join(sorted(allowed))
-        raise InputError(
+        raise InputError.UNKNOWN_NAME(
             f"the environment variable {variable} is {value!r}; allowed are {names}. "
             f"Set it to one of them, or unset it for {allowed[0]!r}."
         )

@@ -64,11 +64,7 @@ class PytreeLayout:
 
     def unpack(self, vector: Any) -> Any:
         """Return the tree of a vector (NumPy's or JAX's), with the vector's leading axes."""
-        parts = array_module(vector).split(vector, self._ends[1:-1], axis=-1)
-        leaves = [
-            as_kind(part.reshape(*vector.shape[:-1], *shape), kind)
-            for part, shape, kind in zip(parts, self.shapes, self.kinds, strict=True)
-        ]
+        leaves = [self.leaf(vector, number) for number in range(len(self.shapes))]
         return jax.tree.unflatten(self.structure, leaves)
 
     def leaf(self, vector: Any, number: int) -> Any:

@@ -18,7 +18,8 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
-from notchflex.solver.derived.quantities import Shape, notch_lips, quantities, shape, unpad_quantity
+from notchflex.solver.derived.quantities import Shape, quantities, shape, unpad_quantity
+from notchflex.solver.derived.solved_state import notch_lips
 from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.capacity import pad_rows, padded_indices
@@ -47,6 +48,7 @@ class SolverRun:
     Attributes:
         first: The state before the first load, packed.
         table: What the program returned, for the padded chain.
+        from_start: Which loads began at the state before the first.
         residual: Largest scaled residual of the last attempt.
         iterations: Newton iterations.
         converged: Whether the load was reached.
@@ -64,14 +66,27 @@ class SolverRun:
     parts: Int[np.ndarray, " s"] = _column(5, int)
     part_before: Float[np.ndarray, " s"] = _column(6)
 
-    def __init__(self, prepared: PreparedChain, first: np.ndarray, table: np.ndarray) -> None:
+    def __init__(
+        self,
+        prepared: PreparedChain,
+        first: np.ndarray,
+        table: np.ndarray,
+        from_start: Bool[np.ndarray, " s"],
+    ) -> None:
         """Take what the program returned."""
         self._prepared, self.first, self.table = prepared, first, table
+        self.from_start = from_start
 
     @cached_property
     def states(self) -> Float[np.ndarray, "s state"]:
         """The last solved state at each load, packed: its own, or as far as it was followed."""
         return self._unpadded_state(0)
+
+    @cached_property
+    def states_before(self) -> Float[np.ndarray, "s state"]:
+        """The state before each load, packed."""
+        last = np.concatenate([self.first[None], self.states[:-1]])
+        return np.where(self.from_start[:, None], self.first, last)
 
     @cached_property
     def between(self) -> Float[np.ndarray, "s state"]:
@@ -97,7 +112,7 @@ class SolverRun:
         return {name: unpad_quantity(own.chain, name, values) for name, values in every.items()}
 
     def quantity(self, name: str) -> np.ndarray:
-        """Return a quantity of each state, by its name in `Shape` or `Quantities`."""
+        """Return a quantity of each state, by its name in the registry."""
         if name not in Shape._fields:
             return self._derived[name][1:]
         long = self._prepared.long
@@ -127,7 +142,7 @@ def run(
     start: SolverState | None,
     settings: Settings,
     *,
-    each_from_start: bool,
+    each_from_start: bool | Bool[np.ndarray, " s"],
 ) -> SolverRun:
     """Follow loads, each from the state before or each from the same one.
 
@@ -136,7 +151,7 @@ def run(
         commands: The loads, as leading axis.
         start: The state before the first; rest where None.
         settings: Tolerance and limits.
-        each_from_start: Whether every load starts from `start`.
+        each_from_start: Whether every load starts from `start`, or which loads do.
 
     Returns:
         One entry per load.
@@ -148,39 +163,41 @@ def run(
         first = np.asarray(prepared.state.pack(start))
         start_row = pad_rows(first, prepared.state, long.state)
         carried = np.append(start_row, 1.0)
-    options = _options(settings, each_from_start)
-    vectors = (carried, long.dynamic_vector, packed, start_row, options)
-    by_row = (False, False, True, False, False)
+    from_start = np.broadcast_to(each_from_start, len(packed))
+    restarts = from_start[:, None].astype(float)
+    vectors = (carried, long.dynamic_vector, packed, restarts, start_row, _numbers(settings))
+    by_row = (False, False, True, True, False, False)
     table = _follow.along(by_row, *vectors, long.static_structure, form, long.state)
-    return SolverRun(prepared, first, table)
+    return SolverRun(prepared, first, table, from_start)
 
 
 @lru_cache(maxsize=64)
-def _options(settings: Settings, each_from_start: bool) -> Float[np.ndarray, " options"]:
-    """The options of `_follow`, kept for the next time."""
-    return np.array([*settings.numbers, float(each_from_start)])
+def _numbers(settings: Settings) -> Float[np.ndarray, " settings"]:
+    """The settings as an array, kept for the next time."""
+    return np.array(settings.numbers)
 
 
-@native(5, lane_sizes)
+@native(6, lane_sizes)
 def _follow(
     carried: Float[Array, " state+1"],
     vector: Float[Array, " chain"],
     load: Float[Array, " command"],
+    from_start: Float[Array, " 1"],
     start: Float[Array, " state"],
-    options: Float[Array, " options"],
+    numbers: Float[Array, " settings"],
     chain_layout: StaticStructure,
     command_layout: PytreeLayout,
     state_layout: PytreeLayout,
 ) -> tuple[Float[Array, " state+1"], Float[Array, " row"]]:
     """The two states of a load, their shape, and how the load was reached.
 
-    Carried from load to load is the last solved state, and whether all loads so far converged.
+    Carried from load to load is the last solved state, and whether all loads since the start
+    converged.
     """
     chain: Chain = chain_layout.unpack(vector)
-    settings = Settings.of(options[:-1])
-    each_from_start = options[-1] > 0.0
-    alive = carried[-1] > 0.0
-    before = jnp.where(each_from_start, start, carried[:-1])
+    settings = Settings.of(numbers)
+    alive = (carried[-1] > 0.0) | (from_start[0] > 0.0)
+    before = jnp.where(from_start[0] > 0.0, start, carried[:-1])
 
     def solve() -> tuple[Array, Array, Array]:
         command, last = command_layout.unpack(load), state_layout.unpack(before)
@@ -194,7 +211,7 @@ def _follow(
         rest = jnp.zeros(Shape.form(chain.flexures, chain.tendons).size + _STATUS)
         return before, jnp.concatenate([before, rest.at[-_STATUS].set(jnp.nan)]), alive
 
-    solved, row, converged = jax.lax.cond(alive | each_from_start, solve, skip)
+    solved, row, converged = jax.lax.cond(alive, solve, skip)
     goes_on = jnp.where(alive & converged, 1.0, 0.0)
     return jnp.append(solved, goes_on), jnp.concatenate([solved, row])
 
@@ -215,7 +232,7 @@ def _quantities(
     state_layout: PytreeLayout,
 ) -> tuple[Array, dict[str, Array]]:
     """Derived quantities of a state beyond its shape, by name; nothing is carried on."""
-    return carried, quantities(chain_layout.unpack(vector), state_layout.unpack(state))._asdict()
+    return carried, quantities(chain_layout.unpack(vector), state_layout.unpack(state))
 
 
 def solve_contacts(

@@ -93,10 +93,15 @@ class StaticStructure:
     def _fits(self, numbers: Float[np.ndarray, "k chain"]) -> bool:
         return bool((numbers[:, self._known] == self._numbers[self._known]).all())
 
-    def pack(self, numbers: Float[np.ndarray, "*k chain"]) -> Float[np.ndarray, "*k dynamic"]:
-        """Return the vectors of chains that are packed whole."""
+    def pack(self, numbers: Any) -> Any:
+        """Return the vectors of chains that are packed whole (NumPy's or JAX's)."""
+        xp = array_module(numbers)
         behind = np.zeros((*numbers.shape[:-1], _BEHIND))
-        return np.concatenate([numbers[..., self._taken], behind], axis=-1)
+        return xp.concatenate([numbers[..., self._taken], behind], axis=-1)
+
+    def indices_of(self, indices: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return where a vector holds numbers of the whole chain; constants at its end, a 0."""
+        return np.where(self._known[indices], self.size - 1, self._index[indices])
 
     def unpack(self, vector: Any) -> Any:
         """Return the chain of a vector."""
