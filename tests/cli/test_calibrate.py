@@ -12,7 +12,7 @@ import pytest
 import notchflex as nf
 import notchflex.fit as fitting
 from fitted import NAMES, OBSERVED, ROBOT, fitted, measured
-from notchflex.cli.arguments.calibrate_words import parse_fit, parse_pairs, robots_of
+from notchflex.cli.arguments.fit import DataSource, DataSources, FitOptions
 from notchflex.cli.tables import calibrate_tables
 from notchflex.fit import Fold, LeftOut, Posterior
 
@@ -139,22 +139,38 @@ def test_other_tables_fit_80_columns(capsys):
     assert "not solved" in out
 
 
-def test_pairs():
-    given = parse_pairs(["A=w.toml=1.csv", "A=w.toml=2.csv", "x/w.toml=3.csv", "gao2017=4.csv"])
-    assert given.robot == {"A": "w.toml", "w": "x/w.toml", "gao2017": "gao2017"}
+def test_sources_are_gathered_by_label(call, monkeypatch):
+    taken = []
+    monkeypatch.setattr(DataSources, "of", lambda sources: taken.extend(sources) or 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        call("calibrate", "A=w.toml=1.csv", "A=w.toml=2.csv", "x/w.toml=3.csv", "gao2017=4.csv",
+             "--fit", "m")  # fmt: skip
+    monkeypatch.undo()
+    given = DataSources.of(taken)
+    assert given.robots == {"A": "w.toml", "w": "x/w.toml", "gao2017": "gao2017"}
     assert given.data == {"A": ["1.csv", "2.csv"], "w": ["3.csv"], "gao2017": ["4.csv"]}
 
 
-def test_limits_and_priors():
-    one, other = parse_fit(["a.b, A:c.d"], ["a.b=:2", "A:c.d=-1:1e3"], ["A:c.d=10+-0.5"])
+def test_limits_and_priors(call, monkeypatch):
+    taken = []
+    check = FitOptions.constants
+    monkeypatch.setattr(FitOptions, "constants", lambda self: taken.append(check(self)) or 1 / 0)
+    for options in (
+        ["--fit", "a.b, A:c.d", "--bounds", "a.b=:2", "--bounds", "A:c.d=-1:1e3", "--prior",
+         "A:c.d=10+-0.5"],
+        ["--fit", "m", "--prior", "m=1e4±500"],
+    ):  # fmt: skip
+        with pytest.raises(ZeroDivisionError):
+            call("calibrate", "gao2017=4.csv", *options)
+    (one, other), (last,) = taken
     assert one == ("a.b", None, 2.0, None)
     assert other == ("A:c.d", -1.0, 1000.0, (10.0, 0.5))
-    assert parse_fit(["m"], [], ["m=1e4±500"])[0].prior == (10_000.0, 500.0)
+    assert last.prior == (10_000.0, 500.0)
 
 
 def test_values_are_set_in_all_robots_or_one():
-    given = parse_pairs([f"A={ROBOT}=1.csv", f"B={ROBOT}=2.csv"])
-    robots = robots_of(given, ["friction.coefficient=0.2", "B:notch[2].depth=1.38"])
+    given = DataSources.of([DataSource("A", ROBOT, "1.csv"), DataSource("B", ROBOT, "2.csv")])
+    robots = given.load(["friction.coefficient=0.2", "B:notch[2].depth=1.38"])
     assert {one.friction.coefficient for one in robots.values()} == {0.2}
     assert [one.notches[1].depth for one in robots.values()] == [1.4, 1.38]
 

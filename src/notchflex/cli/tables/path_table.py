@@ -6,8 +6,6 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-
 from notchflex.cli import terminal
 from notchflex.cli.tables.load_words import load_sentences
 from notchflex.cli.tables.path_columns import Column, Group, named_groups, step_group, usual_groups
@@ -131,7 +129,7 @@ def _columns(groups: Sequence[Group]) -> list[Column]:
 def _print_block(
     console: Console, path: EquilibriumPath, rows: Sequence[int], columns: Sequence[Column]
 ) -> None:
-    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
+    table = terminal.table()
     # Units stand on one line at the foot of the heads.
     deepest = max(column.head.count("\n") for column in columns)
     for column in columns:
