@@ -55,7 +55,7 @@ def measured(
     wanted = {one.name for one in CASES if only is None or only.lower() in one.name.lower()}
     if not wanted:
         names = "; ".join(one.name for one in CASES)
-        raise InputError(f"no case has `{only}` in its name; there are: {names}")
+        raise InputError.UNKNOWN_NAME(f"no case has `{only}` in its name; there are: {names}")
     wanted |= {one.of for one in CASES if isinstance(one, Case) and one.name in wanted}
     rows: dict[str, Row] = {}
     runs: dict[str, Run] = {}

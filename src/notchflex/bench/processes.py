@@ -68,5 +68,5 @@ def _run(arguments: list[str], cache: dict[str, str] | None = None) -> str:
         command = [sys.executable, *arguments]
         done = subprocess.run(command, env=environment, capture_output=True, text=True)
     if done.returncode:
-        raise InputError(f"a measuring process failed: {done.stderr.strip()[-500:]}")
+        raise InputError.PROCESS_FAILED(f"a measuring process failed: {done.stderr.strip()[-500:]}")
     return done.stdout

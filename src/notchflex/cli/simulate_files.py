@@ -30,12 +30,12 @@ def check(outputs: Outputs, *, steps: int) -> None:
     """
     targets = outputs.targets
     if steps < 2 and _is_animation(targets.get("plot", "")):
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"--plot {targets['plot']}: one step cannot be animated; write a .png, .svg or .pdf."
         )
     for name in ("nc", "parquet"):
         if targets.get(name) == STANDARD_OUTPUT:
-            raise InputError(
+            raise InputError.FILE_FORMAT(
                 f"--{name} - : a binary file cannot go to standard output; name a file."
             )
     if "nc" in targets:

@@ -34,7 +34,7 @@ def converted(
             return read(token.value)
         except InputError as problem:
             words = [word for word in (token.keyword, token.value or "''") if word]
-            raise InputError(f"{' '.join(words)}: {problem}") from None
+            raise InputError(f"{' '.join(words)}: {problem}", problem.code) from None
 
     def convert(_type: Any, tokens: Sequence[Token]) -> Any:
         values = tuple(map(convert_one, tokens))
@@ -69,7 +69,7 @@ def number(word: str, form: str, *, least: float = -math.inf) -> float:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value >= least):
-        raise InputError(f"give {form}.")
+        raise InputError.NOT_A_NUMBER(f"give {form}.")
     return value
 
 
@@ -87,10 +87,10 @@ def whole(low: int, high: int | None = None) -> Callable[[str], int]:
         sign, digits = word[:1] == "-", word.removeprefix("-")
         # Python converts no more than some thousand digits.
         if not digits.isdecimal() or len(digits) > 18:
-            raise InputError(f"give {form}.")
+            raise InputError.NOT_A_NUMBER(f"give {form}.")
         value = -int(digits) if sign else int(digits)
         if value < low or (high is not None and value > high):
-            raise InputError(f"give {form}.")
+            raise InputError.OUT_OF_RANGE(f"give {form}.")
         return value
 
     return read
@@ -111,7 +111,7 @@ def vector(what: str) -> Callable[[str], Vector]:
         form = f"three finite {what} joined by commas: X,Y,Z"
         values = [number(word, form) for word in text.split(",")]
         if len(values) != 3:
-            raise InputError(f"give {form}.")
+            raise InputError.BAD_SYNTAX(f"give {form}.")
         return values[0], values[1], values[2]
 
     return read
@@ -131,7 +131,7 @@ def parse_spec(text: str) -> list[float]:
     for part in text.split(","):
         values += _range(part.strip())
         if len(values) > MOST_STEPS:
-            raise InputError(f"this is more than {MOST_STEPS:,} steps.")
+            raise InputError.OUT_OF_RANGE(f"this is more than {MOST_STEPS:,} steps.")
     return values
 
 
@@ -140,20 +140,22 @@ def _range(part: str) -> list[float]:
     if len(words) == 1:
         return [_value(part)]
     if len(words) != 3:
-        raise InputError(f"{part!r} is not start:stop:count; give {SPEC}.")
+        raise InputError.BAD_SYNTAX(f"{part!r} is not start:stop:count; give {SPEC}.")
     start, stop = map(_value, words[:2])
     try:
         count = int(words[2])
     except ValueError:
-        raise InputError(f"the count in {part!r} is {words[2]!r}; give a whole number.") from None
+        raise InputError.NOT_A_NUMBER(
+            f"the count in {part!r} is {words[2]!r}; give a whole number."
+        ) from None
     if count < 1:
-        raise InputError(f"a range of {count} steps; give a count of 1 or more.")
+        raise InputError.OUT_OF_RANGE(f"a range of {count} steps; give a count of 1 or more.")
     if count == 1 and start != stop:
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"a range of 1 step cannot go from {start:g} to {stop:g}; give a count of 2 or more."
         )
     if count > MOST_STEPS:
-        raise InputError(f"this is more than {MOST_STEPS:,} steps.")
+        raise InputError.OUT_OF_RANGE(f"this is more than {MOST_STEPS:,} steps.")
     import numpy as np  # not for `--help`
 
     return np.linspace(start, stop, count).tolist()
@@ -164,7 +166,7 @@ def _value(word: str) -> float:
         value = float(word)
     except ValueError:
         got = f"{word!r} is not a number" if word.strip() else "a number is missing"
-        raise InputError(f"{got}; give {SPEC}.") from None
+        raise InputError.NOT_A_NUMBER(f"{got}; give {SPEC}.") from None
     if not math.isfinite(value):
-        raise InputError(f"got {word.strip()}; give finite numbers.")
+        raise InputError.NOT_FINITE(f"got {word.strip()}; give finite numbers.")
     return value

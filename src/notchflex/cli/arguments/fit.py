@@ -40,13 +40,13 @@ class DataSource(NamedTuple):
 def _read_source(text: str) -> DataSource:
     words = [word.strip() for word in text.split("=")]
     if len(words) not in (2, 3) or not all(words):
-        raise InputError(f"give a robot with its data: {PAIR}.")
+        raise InputError.BAD_SYNTAX(f"give a robot with its data: {PAIR}.")
     robot, data = words[-2:]
     label = words[0] if len(words) == 3 else robot_label(robot)
     if ":" in label or os.sep in label:
-        raise InputError(f"a label must not contain `:` or `{os.sep}`; choose another.")
+        raise InputError.BAD_SYNTAX(f"a label must not contain `:` or `{os.sep}`; choose another.")
     if label == "each":
-        raise InputError("the label `each` stands for every robot; choose another.")
+        raise InputError.CONFLICT("the label `each` stands for every robot; choose another.")
     return DataSource(label, robot, data)
 
 
@@ -80,18 +80,18 @@ class DataSources(NamedTuple):
             InputError: No source, one label for two robots, or a file that is given twice.
         """
         if not sources:
-            raise InputError(f"Give a robot with its data: {PAIR}.")
+            raise InputError.MISSING_VALUE(f"Give a robot with its data: {PAIR}.")
         gathered = cls({}, {})
         for label, robot, data in sources:
             other = gathered.robots.setdefault(label, robot)
             if other != robot:
-                raise InputError(
+                raise InputError.CONFLICT(
                     f"{other} and {robot} are both called {label}; give one of them another "
                     f"label: LABEL={robot}={data}."
                 )
             files = gathered.data.setdefault(label, [])
             if data in files:
-                raise InputError(f"{data} is given twice for {label}; give it once.")
+                raise InputError.CONFLICT(f"{data} is given twice for {label}; give it once.")
             files.append(data)
         return gathered
 
@@ -129,7 +129,7 @@ class DataSources(NamedTuple):
         """
         if label not in self.robots:
             labels = ", ".join(self.robots)
-            raise InputError(
+            raise InputError.UNKNOWN_NAME(
                 f"{source}: no robot of this fit is called {label}; allowed: {labels}."
             )
 
@@ -150,14 +150,14 @@ _PRIOR = "NAME=MEAN+-SD, such as material.elastic_modulus=10000+-500"
 def _of_constant(form: str, read: Callable[[str], Numbers], text: str) -> tuple[str, Numbers]:
     name, equals, values = (word.strip() for word in text.partition("="))
     if not (name and equals and values):
-        raise InputError(f"give {form}.")
+        raise InputError.BAD_SYNTAX(f"give {form}.")
     return name, read(values)
 
 
 def _read_limits(values: str) -> tuple[float | None, float | None]:
     low, colon, high = values.partition(":")
     if not colon or not (low.strip() or high.strip()):
-        raise InputError(f"give {_BOUNDS}.")
+        raise InputError.BAD_SYNTAX(f"give {_BOUNDS}.")
     lower, upper = (number(word, _BOUNDS) if word.strip() else None for word in (low, high))
     return lower, upper
 
@@ -165,7 +165,7 @@ def _read_limits(values: str) -> tuple[float | None, float | None]:
 def _read_prior(values: str) -> tuple[float, float]:
     words = re.split(r"\+-|±", values)
     if len(words) != 2:
-        raise InputError(f"give {_PRIOR}.")
+        raise InputError.BAD_SYNTAX(f"give {_PRIOR}.")
     return number(words[0], _PRIOR), number(words[1], _PRIOR)
 
 
@@ -218,7 +218,7 @@ class FitOptions:
             InputError: `--huber` with another objective.
         """
         if self.huber is not None and self.objective != "least-squares":
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"--huber {self.huber:g} belongs to least-squares; leave out one of the two."
             )
 
@@ -231,7 +231,7 @@ class FitOptions:
         """
         names = [name.strip() for text in self.fit for name in text.split(",")]
         if not names or not all(names):
-            raise InputError(
+            raise InputError.MISSING_VALUE(
                 "--fit needs names of constants joined by commas, such as "
                 "friction.coefficient,material.elastic_modulus."
             )
@@ -239,7 +239,7 @@ class FitOptions:
         for option, values in (("--bounds", self.bounds), ("--prior", self.prior)):
             _once([name for name, _ in values], option)
             for name in (name for name, _ in values if name not in names):
-                raise InputError(
+                raise InputError.UNKNOWN_NAME(
                     f"{option} {name}: this constant is not fitted; --fit names {', '.join(names)}."
                 )
         limits, priors = dict(self.bounds), dict(self.prior)
@@ -259,7 +259,7 @@ class FitOptions:
 def _once(names: Sequence[str], option: str) -> None:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise InputError(f"{option} {twice} is given twice; give it once.")
+        raise InputError.CONFLICT(f"{option} {twice} is given twice; give it once.")
 
 
 @Parameter(name="*", group=BEYOND)
@@ -303,15 +303,19 @@ class BeyondFit:
             InputError: Options that need another one, a robot or a package that is missing.
         """
         if (self.next_robot is not None or self.narrow) and not self.next:
-            raise InputError("--next-robot and --narrow belong to --next; give candidates with it.")
+            raise InputError.CONFLICT(
+                "--next-robot and --narrow belong to --next; give candidates with it."
+            )
         if self.next_robot is not None:
             sources.check_label(self.next_robot, f"--next-robot {self.next_robot}")
         if self.posterior:
             if objective != "least-squares":
-                raise InputError(
+                raise InputError.CONFLICT(
                     f"--posterior needs least-squares: {objective} is not a likelihood. Leave out "
                     "one of the two."
                 )
             need("numpyro", "bayes", "--posterior")
         if self.leave_out == "robot" and len(sources.robots) < 2:
-            raise InputError("--leave-out robot: there is only one robot; give two or more.")
+            raise InputError.TOO_FEW_DATA(
+                "--leave-out robot: there is only one robot; give two or more."
+            )

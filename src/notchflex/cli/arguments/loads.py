@@ -47,11 +47,11 @@ def tendon_command(option: str, *, negative: bool = False) -> Parameter:
 def _read_command(option: str, negative: bool, text: str) -> TendonCommand:
     name, equals, spec = text.rpartition("=")
     if equals and not name.strip().lstrip("-").isdecimal():
-        raise InputError(f"{name!r} is not a tendon; give its number, counted from 1.")
+        raise InputError.BAD_SYNTAX(f"{name!r} is not a tendon; give its number, counted from 1.")
     steps = parse_spec(spec)
     if not negative and min(steps) < 0:
         least = next(step for step in steps if step < 0)
-        raise InputError(f"got {least:g} N; a tendon only pulls, so give 0 N or more.")
+        raise InputError.OUT_OF_RANGE(f"got {least:g} N; a tendon only pulls, so give 0 N or more.")
     return TendonCommand(f"{option} {text}", int(name) if equals else None, steps)
 
 
@@ -78,19 +78,21 @@ def load_columns(
 
     every = [*tension, *stroke]
     if not every:
-        raise InputError("Give a load: --tension SPEC or --stroke SPEC, for example --tension 2.")
+        raise InputError.MISSING_VALUE(
+            "Give a load: --tension SPEC or --stroke SPEC, for example --tension 2."
+        )
     longest = max(every, key=lambda command: len(command.steps))
     tables = np.full((2, len(longest.steps), tendons), np.nan)
     commanded: dict[int, str] = {}
     for number_, command in enumerate(every):
         index = _tendon_index(command, tendons)
         if index in commanded:
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"{command.source}: tendon {index + 1} already has {commanded[index]}; "
                 "give each tendon one tension or one stroke."
             )
         if len(command.steps) not in (1, len(longest.steps)):
-            raise InputError(
+            raise InputError.WRONG_SHAPE(
                 f"{command.source} has {len(command.steps)} steps and {longest.source} has "
                 f"{len(longest.steps)}; give equal numbers of steps, or a single value for all."
             )
@@ -104,12 +106,12 @@ def _tendon_index(command: TendonCommand, tendons: int) -> int:
     has = "1 tendon" if tendons == 1 else f"{tendons} tendons"
     if command.tendon is None and tendons > 1:
         option, _, text = command.source.partition(" ")
-        raise InputError(
+        raise InputError.MISSING_VALUE(
             f"{command.source}: the robot has {has}; say which one, for example {option} 1={text}."
         )
     index = (command.tendon or 0) - (command.tendon is not None)
     if not 0 <= index < tendons:
-        raise InputError(
+        raise InputError.UNKNOWN_NAME(
             f"{command.source}: there is no tendon {command.tendon}; the robot has {has}."
         )
     return index
@@ -127,13 +129,15 @@ def _read_body_force(text: str) -> BodyForceOption:
     body, colon, rest = text.partition(":")
     force, at, point = rest.partition("@")
     if not colon or not body.strip().isdecimal() or len(body) > _DIGITS:
-        raise InputError(f"give {_BODY}.")
+        raise InputError.BAD_SYNTAX(f"give {_BODY}.")
 
     def read(words: str, what: str) -> Vector:
         try:
             return vector(what)(words)
         except InputError:
-            raise InputError(f"{words!r} is not three finite {what}; give {_BODY}.") from None
+            raise InputError.BAD_SYNTAX(
+                f"{words!r} is not three finite {what}; give {_BODY}."
+            ) from None
 
     where = read(point, "coordinates in mm") if at else None
     return BodyForceOption(int(body), read(force, "forces in N"), where)
@@ -204,12 +208,12 @@ class ExternalLoads:
             InputError: `--following` or `--tip-point` without a load that it is for.
         """
         if self.following and not (self.tip_force or self.tip_moment or self.body_force):
-            raise InputError(
+            raise InputError.CONFLICT(
                 "--following: nothing turns; give --tip-force, --tip-moment or --body-force."
             )
         if self.tip_point and self.tip_force is None and self.tip_mass is None:
             point = ",".join(f"{value:g}" for value in self.tip_point)
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"--tip-point {point}: nothing acts there; give --tip-force or --tip-mass."
             )
 

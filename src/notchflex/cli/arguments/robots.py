@@ -97,7 +97,7 @@ def variant(text: str, other: str) -> tuple[str, list[tuple[str, object]]]:
 
     label, colon, values = text.partition(":")
     if not colon or not label.strip():
-        raise InputError(
+        raise InputError.BAD_SYNTAX(
             f'--beside {text}: give {other}"LABEL: PATH=VALUE, PATH=VALUE", for example '
             '"linear: material.kind=linear".'
         )
@@ -116,7 +116,9 @@ def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, R
         InputError: Not of this form, too many, two of one label, or a robot that cannot be used.
     """
     if len(beside) > MOST_BESIDE:
-        raise InputError(f"--beside may be given {MOST_BESIDE} times at most; got {len(beside)}.")
+        raise InputError.OUT_OF_RANGE(
+            f"--beside may be given {MOST_BESIDE} times at most; got {len(beside)}."
+        )
     robots = {robot_label(name): first}
     for text in beside:
         if "=" in text:
@@ -126,7 +128,7 @@ def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, R
             label, other = _label_and_robot(text)
             robot = chosen_robot(other, ())
         if label in robots:
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"--beside {text}: there is already a robot called {label}; put another label "
                 'before it, such as "second: ROBOT".'
             )

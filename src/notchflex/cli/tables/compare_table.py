@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from notchflex._quantity import DEGREES
 from notchflex.cli import terminal
 from notchflex.fit.assessment.errors_of_parts import edge
-from notchflex.results.quantities.registry import DEGREES
 
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison
