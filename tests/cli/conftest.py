@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 
-from notchflex.cli import run
+from notchflex.cli import app, run
+from notchflex.errors import InputError
 
 Outcome = tuple[int, str, str]
 
@@ -24,13 +25,25 @@ def call(tmp_path, monkeypatch, capsys) -> Callable[..., Outcome]:
 
 
 @pytest.fixture
-def refused(call, tmp_path, wording) -> Callable[..., str]:
-    """Run a command that must be refused, and compare its message with the one that is kept."""
+def refused(call, tmp_path, monkeypatch, wording) -> Callable[..., str]:
+    """Run a command that must be refused with an error of a code; its message is a kept one."""
+    codes: list[str] = []
+    execute = app.execute
 
-    def runner(*arguments: str, name: str | None = None) -> str:
+    def recorded(tokens: Sequence[str]) -> int:
+        try:
+            return execute(tokens)
+        except InputError as problem:
+            codes.append(problem.code.name)
+            raise
+
+    monkeypatch.setattr(app, "execute", recorded)
+
+    def runner(wanted: str, *arguments: str, name: str | None = None) -> str:
         before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
         code, out, err = call(*arguments)
         assert code == 2, err
+        assert codes.pop() == wanted
         assert out == ""
         assert err.startswith("Error: ")
         assert err.count("Error: ") == 1

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,40 +15,24 @@ from notchflex.bench import processes
 Run = Callable[[], object]
 
 
-@dataclass(frozen=True)
-class Case:
-    """One thing to time in this process.
+class Case(NamedTuple):
+    """One thing to measure.
 
     Attributes:
         name: What it is; "per" names what the time is of.
-        target: Target, multiples of LU135, or of the time of another case; None for none.
-        make: Makes the function that is timed.
-        per: Number of solves or steps that it does.
-        of: Name of the case that the target is a multiple of; "" for LU135.
+        target: Target, in the unit, or in multiples of the time of another case; None for none.
+        make: Makes the function that is timed; with a unit of s or MiB it measures by itself.
+        per: Number of solves or steps that the function does.
+        of: Name of the case that the target is a multiple of.
+        unit: "LU135", or "s" and "MiB" for what is measured in a process of its own.
     """
 
     name: str
     target: float | None
-    make: Callable[[], Run]
+    make: Callable[[], Any]
     per: float = 1.0
     of: str = ""
-
-
-@dataclass(frozen=True)
-class ProcessCase:
-    """Something that is measured in a process of its own.
-
-    Attributes:
-        name: What it is.
-        target: Target, in its unit.
-        measure: Measures it.
-        unit: "s", or "MiB" for memory.
-    """
-
-    name: str
-    target: float
-    measure: Callable[[], float]
-    unit: str = "s"
+    unit: str = "LU135"
 
 
 _wrist = partial(nf.load_robot, "pacheco2021-a")
@@ -127,7 +110,7 @@ _FUNCTION = "links (Gao) as a JAX function"
 _TIP = {"tip_force": (0.05 * 9.81, 0.0, 0.0)}  # 50 g, N
 _FOUR: dict[str, Any] = {"tension": [0.1, 0.05, 0.0, 0.02], "tip_force": (0.002, 0.001, 0.0)}
 # fmt: off
-CASES: tuple[Case | ProcessCase, ...] = (
+CASES: tuple[Case, ...] = (
     Case("wrist, one solve", 0.7, _solve(_wrist, tension=2.0)),
     Case("wrist, one solve by stroke", 1.5, _solve(_wrist, stroke=1.0), of="wrist, one solve"),
     Case("wrist, 31 steps up and 31 down, whole path", 2.0, _follow(_wrist, 3.0, 31)),
@@ -145,12 +128,12 @@ CASES: tuple[Case | ProcessCase, ...] = (
     Case("its slope along one direction (jvp)", 1.6, _derivative("jvp"), of=_FUNCTION),
     Case("its slopes by three parameters", 2.5, _derivative("three"), of=_FUNCTION),
     Case("its gradient by all (reverse)", 3.0, _derivative("reverse"), of=_FUNCTION),
-    ProcessCase("first call, wrist, nothing compiled", 1.5,
-                partial(processes.first_call, "pacheco2021-a")),
-    ProcessCase("first call, links (Gao), nothing compiled", 5.0,
-                partial(processes.first_call, "gao2017")),
-    ProcessCase("simulate pacheco2021-a, second time, whole process", 3.0,
-                processes.second_command),
-    ProcessCase("memory, batch of 100,000 wrist paths", 2048.0, processes.memory, "MiB"),
+    Case("first call, wrist, nothing compiled", 1.5,
+         partial(processes.first_call, "pacheco2021-a"), unit="s"),
+    Case("first call, links (Gao), nothing compiled", 5.0,
+         partial(processes.first_call, "gao2017"), unit="s"),
+    Case("simulate pacheco2021-a, second time, whole process", 3.0,
+         processes.second_command, unit="s"),
+    Case("memory, batch of 100,000 wrist paths", 2048.0, processes.memory, unit="MiB"),
 )
 # fmt: on

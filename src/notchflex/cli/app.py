@@ -21,12 +21,13 @@ from notchflex.results.files.streams import let_go
 
 ABOUT = """Statics of tendon-driven notched-tube robots.
 
-Shapes, tensions and strains of notched-tube wrists under their tendons, with history-dependent
-friction, superelastic material and closing notches. Robots are described in TOML files in mm, N,
-MPa and degrees; `notchflex robots` lists those that come with the program.
+Shapes, tensions and strains of notched-tube wrists under their tendons, with
+history-dependent friction, superelastic material and closing notches. Robots
+are described in TOML files in mm, N, MPa and degrees; `notchflex robots` lists
+those that come with the program.
 """
 
-EPILOGUE = """**Examples**
+EPILOGUE = """[bold]Examples[/bold]
 
     notchflex show pacheco2021-a
     notchflex simulate pacheco2021-a --tension 0:3:31,3:0:31 --plot wrist.png
@@ -116,7 +117,7 @@ def build() -> App:
         version=__version__,
         help=ABOUT,
         help_epilogue=EPILOGUE,
-        help_format="markdown",
+        help_format="rich",  # reading markdown takes a fifth of the time of `--help`
         console=terminal.output(),
         error_console=terminal.messages(),
         result_action="return_value",
@@ -132,9 +133,34 @@ def build() -> App:
             name=verb,
             help=text,
             sort_key=order,
+            help_format="markdown",
             help_epilogue=f"**Example{plural}**\n\n    {examples}\n",
         )
     return app
+
+
+def execute(tokens: Sequence[str]) -> int:
+    """Run a verb.
+
+    Args:
+        tokens: What stands after `notchflex`.
+
+    Returns:
+        The exit code: 0 done, 1 not converged.
+
+    Raises:
+        InputError: Bad input: of the verb, or of an option that does not exist or is missing.
+    """
+    try:
+        return build()(tokens) or DONE
+    except CycloptsError as problem:
+        if isinstance(problem.__cause__, InputError):  # from a converter of our own
+            raise problem.__cause__ from None
+        verb = next((token for token in tokens if token in VERBS), "")
+        words = " ".join(str(problem).split())
+        words += "" if words.endswith((".", "?", "!")) else "."
+        help_ = " ".join(["notchflex", *([verb] if verb else []), "--help"])
+        raise InputError.UNKNOWN_NAME(f"{words} See {help_}.") from None
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -146,25 +172,17 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 1 not converged, 2 bad input (with one clear message).
     """
-    tokens = list(sys.argv[1:] if arguments is None else arguments)
     terminal.be_quiet(False)
     try:
-        code = build()(tokens) or DONE
+        code = execute(list(sys.argv[1:] if arguments is None else arguments))
         sys.stdout.flush()
         return code
     except InputError as problem:
         terminal.error(str(problem))
-    except CycloptsError as problem:
-        if isinstance(problem.__cause__, InputError):  # a converter of our own says it all
-            terminal.error(str(problem.__cause__))
-            return BAD_INPUT
-        verb = next((token for token in tokens if token in VERBS), None)
-        command = f"notchflex {verb} --help" if verb else "notchflex --help"
-        terminal.error(f"{_sentence(str(problem))} See {command}.")
     except KeyboardInterrupt:
         terminal.error("interrupted; nothing more is written.")
         return INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has gone
+    except BrokenPipeError:  # the reader of our output has gone
         let_go(sys.stdout)
         return DONE
     except OSError as problem:
@@ -191,8 +209,3 @@ def main() -> None:
         sys.stderr.flush()
         os._exit(code)
     sys.exit(code)
-
-
-def _sentence(text: str) -> str:
-    text = " ".join(text.split())
-    return text if text.endswith((".", "?", "!")) else f"{text}."

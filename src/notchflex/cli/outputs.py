@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import flag
 from notchflex.results.files.writing import (
     BROWSER,
     PAPER,
@@ -48,12 +49,9 @@ MovingPlotFile = Annotated[
 ]
 Quiet = Annotated[
     bool,
-    Parameter(
-        name="--quiet",
+    flag(
+        "Print no tables, notes or progress: only warnings, errors, and what `-` asks for.",
         group=OUTPUT,
-        negative=(),
-        show_default=False,
-        help="Print no tables, notes or progress: only warnings, errors, and what `-` asks for.",
     ),
 ]
 
@@ -67,9 +65,6 @@ class Outputs:
         pictures: Suffixes that `--plot` may have.
         folder: Option and files of a folder that is written, checked before.
         targets: What `--json`, `--csv`, `--plot` and others name; None where not given.
-
-    Raises:
-        InputError: A file cannot be written, is an input, or is named twice.
     """
 
     def __init__(

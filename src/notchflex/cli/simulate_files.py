@@ -22,12 +22,7 @@ def pictures(*, several: bool) -> tuple[str, ...]:
 
 
 def check(outputs: Outputs, *, steps: int) -> None:
-    """Check what a kind of file needs.
-
-    Raises:
-        InputError: An animation of one step, a binary file on standard output, or a package that
-            is missing.
-    """
+    """Check what a kind of file needs."""
     targets = outputs.targets
     if steps < 2 and _is_animation(targets.get("plot", "")):
         raise InputError.FILE_FORMAT(
@@ -53,9 +48,6 @@ def write(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str) ->
         paths: Label to path.
         outputs: What was asked for.
         title: The heading of the picture.
-
-    Raises:
-        InputError: A file cannot be written.
     """
     path = next(iter(paths.values()))
     outputs.write_json(lambda: _document(paths))

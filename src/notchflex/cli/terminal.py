@@ -8,7 +8,7 @@ import os
 import shutil
 import sys
 import unicodedata
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, TextIO
 
@@ -85,28 +85,37 @@ def messages() -> Console:
     return _console(sys.stderr)
 
 
-def table(*names: str, gap: int = 1, header: bool = True) -> Table:
-    """Return an empty table without lines.
+def table(
+    heads: Sequence[str], rows: Iterable[Sequence[str]] = (), *, gap: int = 1, colour: str = ""
+) -> Table:
+    """Return a table without lines.
 
     Args:
-        names: Heads of its first columns; what is long is folded there.
+        heads: Heads of the columns. `>` before one marks numbers, which are aligned to the right
+            and never broken; other cells are folded where they are too long. No head at all is
+            shown where all are empty.
+        rows: The cells of each row.
         gap: Blanks between two columns.
-        header: Whether heads are shown.
+        colour: Of the first column, on a terminal.
     """
     from rich.table import Table
 
     made = Table(
-        box=None, padding=(0, gap, 0, 0), header_style="bold", pad_edge=False, show_header=header
+        box=None,
+        padding=(0, gap, 0, 0),
+        header_style="bold",
+        pad_edge=False,
+        show_header=any(heads),
     )
-    for name in names:
-        made.add_column(name, overflow="fold")
+    for number, head in enumerate(heads):
+        style = colour if number == 0 else ""
+        if head.startswith(">"):
+            made.add_column(head[1:], justify="right", no_wrap=True, style=style)
+        else:
+            made.add_column(head, overflow="fold", style=style)
+    for row in rows:
+        made.add_row(*row)
     return made
-
-
-def number_columns(made: Table, *names: str) -> None:
-    """Add columns of numbers, which are never broken, to a table."""
-    for name in names:
-        made.add_column(name, justify="right", no_wrap=True)
 
 
 def note(text: str) -> None:

@@ -1,4 +1,7 @@
-"""From the words of an option to values: converters for cyclopts, and the forms that they read."""
+"""From the words of an option to values: converters for cyclopts, and the forms that they read.
+
+Whatever reads or checks arguments raises `InputError` for what cannot be used.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cyclopts import Parameter, Token
+from cyclopts import Group, Parameter, Token
 
 from notchflex.errors import InputError
 
@@ -53,6 +56,17 @@ def converted(
     )
 
 
+def flag(text: str, name: str | None = None, group: Group | None = None) -> Parameter:
+    """Return the parameter of an option without a value, which only sets something."""
+    return Parameter(name=name, group=group, negative=(), show_default=False, help=text)
+
+
+def texts(metavar: str, text: str, name: str | None = None) -> Parameter:
+    """Return the parameter of an option with a text that may be given several times."""
+    form = f"{metavar}..."
+    return Parameter(name=name, metavar=form, negative=(), show_default=False, help=text)
+
+
 def number(word: str, form: str, *, least: float = -math.inf) -> float:
     """Read a finite number.
 
@@ -60,9 +74,6 @@ def number(word: str, form: str, *, least: float = -math.inf) -> float:
         word: What was typed.
         form: What is allowed, for the message.
         least: The smallest value.
-
-    Raises:
-        InputError: Not a finite number, or too small.
     """
     try:
         value = float(word)
@@ -119,9 +130,6 @@ def vector(what: str) -> Callable[[str], Vector]:
 
 def parse_spec(text: str) -> list[float]:
     """Read values and ranges joined by commas.
-
-    Raises:
-        InputError: Not of this form, an empty range, or a number that is not finite.
 
     Example:
         >>> parse_spec("0,1:2:3")

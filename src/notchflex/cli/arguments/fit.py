@@ -74,11 +74,7 @@ class DataSources(NamedTuple):
 
     @classmethod
     def of(cls, sources: Sequence[DataSource]) -> DataSources:
-        """Gather the files of each robot.
-
-        Raises:
-            InputError: No source, one label for two robots, or a file that is given twice.
-        """
+        """Gather the files of each robot."""
         if not sources:
             raise InputError.MISSING_VALUE(f"Give a robot with its data: {PAIR}.")
         gathered = cls({}, {})
@@ -102,11 +98,7 @@ class DataSources(NamedTuple):
         return [*data, *(file for name in self.robots.values() for file in robot_files(name))]
 
     def load(self, settings: Sequence[str]) -> dict[str, Robot]:
-        """Load the robots with the values of `--set`: of all, or of the one whose label precedes.
-
-        Raises:
-            InputError: A robot, a label or a value that does not exist.
-        """
+        """Load the robots with the values of `--set`: of all, or of one whose label precedes."""
         own: dict[str, list[str]] = {label: [] for label in self.robots}
         for text in settings:
             label, colon, rest = text.partition(":")
@@ -123,9 +115,6 @@ class DataSources(NamedTuple):
         Args:
             label: The label.
             source: Where it was given, for the message.
-
-        Raises:
-            InputError: No robot has it.
         """
         if label not in self.robots:
             labels = ", ".join(self.robots)
@@ -212,23 +201,14 @@ class FitOptions:
     ] = 0
 
     def __post_init__(self) -> None:
-        """Check that the options belong together.
-
-        Raises:
-            InputError: `--huber` with another objective.
-        """
+        """Check that the options belong together."""
         if self.huber is not None and self.objective != "least-squares":
             raise InputError.CONFLICT(
                 f"--huber {self.huber:g} belongs to least-squares; leave out one of the two."
             )
 
     def constants(self) -> tuple[ParameterSpec, ...]:
-        """Return the constants with their limits and priors.
-
-        Raises:
-            InputError: No constant, one that is named twice, or limits or a prior of a constant
-                that is not fitted.
-        """
+        """Return the constants with their limits and priors."""
         names = [name.strip() for text in self.fit for name in text.split(",")]
         if not names or not all(names):
             raise InputError.MISSING_VALUE(
@@ -297,11 +277,7 @@ class BeyondFit:
     ] = 500
 
     def check(self, sources: DataSources, objective: str) -> None:
-        """Check what could not be done after the fit, before the time for the fit is spent.
-
-        Raises:
-            InputError: Options that need another one, a robot or a package that is missing.
-        """
+        """Check what could not be done after the fit, before the time for the fit is spent."""
         if (self.next_robot is not None or self.narrow) and not self.next:
             raise InputError.CONFLICT(
                 "--next-robot and --narrow belong to --next; give candidates with it."

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from cyclopts import Group, Parameter
 
-from notchflex.cli.arguments.conversion import Vector, converted, number, parse_spec, vector
+from notchflex.cli.arguments.conversion import (
+    Vector,
+    converted,
+    flag,
+    number,
+    parse_spec,
+    vector,
+)
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
@@ -69,10 +76,6 @@ def load_columns(
 
     Returns:
         Tensions [N] and strokes [mm], each (S, tendons), NaN where not commanded.
-
-    Raises:
-        InputError: A tendon that does not exist, that is named twice or not at all, or columns of
-            different lengths.
     """
     import numpy as np
 
@@ -194,19 +197,11 @@ class ExternalLoads:
     ] = None
     following: Annotated[
         bool,
-        Parameter(
-            negative=(),
-            show_default=False,
-            help="Forces and moments turn with the body they act on, and are given in its frame.",
-        ),
+        flag("Forces and moments turn with the body they act on, and are given in its frame."),
     ] = False
 
     def __post_init__(self) -> None:
-        """Refuse an option that has no effect without another one.
-
-        Raises:
-            InputError: `--following` or `--tip-point` without a load that it is for.
-        """
+        """Refuse an option that has no effect without another one."""
         if self.following and not (self.tip_force or self.tip_moment or self.body_force):
             raise InputError.CONFLICT(
                 "--following: nothing turns; give --tip-force, --tip-moment or --body-force."

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import texts
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,24 +28,18 @@ RobotName = Annotated[
 ]
 Settings = Annotated[
     tuple[str, ...],
-    Parameter(
-        name="--set",
-        metavar="PATH=VALUE...",
-        negative=(),
-        show_default=False,
-        help="Change a value of the robot, such as `material.elastic_modulus=9000`, "
+    texts(
+        "PATH=VALUE",
+        "Change a value of the robot, such as `material.elastic_modulus=9000`, "
         "`notch[2].depth=1.3` (the second notch from the base), `notch.depth=1.38` (every notch) "
         "or `material.kind=linear`. May be given several times, in any order.",
+        "--set",
     ),
 ]
 
 
 def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
-    """Load a robot with the values of `--set`; note the keys that a new kind drops.
-
-    Raises:
-        InputError: No such robot, a file that cannot be used, a bad `--set`.
-    """
+    """Load a robot with the values of `--set`; note the keys that a new kind drops."""
     from notchflex.robot import load_robot, parse_assignment, set_values
 
     robot = load_robot(name)
@@ -86,9 +81,6 @@ def variant(text: str, other: str) -> tuple[str, list[tuple[str, object]]]:
         text: What was given.
         other: What else may be given, as the message begins.
 
-    Raises:
-        InputError: Not of this form.
-
     Example:
         >>> variant("slick: friction.coefficient=0", "")
         ('slick', [('friction.coefficient', 0)])
@@ -111,9 +103,6 @@ def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, R
         first: The robot that was named, with its `--set`.
         name: How it was named, which is its label.
         beside: The values of `--beside`: `ROBOT`, `LABEL: ROBOT` or `LABEL: PATH=VALUE, ...`.
-
-    Raises:
-        InputError: Not of this form, too many, two of one label, or a robot that cannot be used.
     """
     if len(beside) > MOST_BESIDE:
         raise InputError.OUT_OF_RANGE(

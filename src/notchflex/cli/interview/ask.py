@@ -155,9 +155,7 @@ class Interview:
         try:
             return question.read(answer.strip())
         except InputError as problem:
-            raise InputError.BAD_SYNTAX(
-                f"{question.option} {answer}: {problem}", problem.code
-            ) from None
+            raise InputError(f"{question.option} {answer}: {problem}", problem.code) from None
 
 
 def _lines(text: str, indent: str = "") -> list[str]:

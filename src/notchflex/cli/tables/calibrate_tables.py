@@ -45,84 +45,84 @@ def print_left_out(left_out: LeftOut) -> None:
     """Print how well constants fitted without a part predict it."""
     from notchflex.fit.assessment.errors_of_parts import edge
 
-    console = terminal.output()
-    console.print(f"\nFitted without each {left_out.by}, and tried on it (root mean square):")
-    table = terminal.table("left out", "quantity")
-    terminal.number_columns(table, "error", "of fit to all")
-    table.add_column("unit")
+    rows: list[list[str]] = []
     for fold in left_out.folds:
-        if not fold.converged:
-            table.add_row(fold.label, "not solved", "-", "-", "")
+        rows += [] if fold.converged else [[fold.label, "not solved", "-", "-", ""]]
         for name, error in fold.errors.items():
             title, unit, scale = edge(name)
             of_all = fold.errors_of_all.get(name, math.nan) * scale
-            table.add_row(fold.label, title, f"{error * scale:.3g}", _plain(of_all), unit)
-    console.print(table)
+            rows.append([fold.label, title, f"{error * scale:.3g}", _plain(of_all), unit])
+    console = terminal.output()
+    console.print(f"\nFitted without each {left_out.by}, and tried on it (root mean square):")
+    console.print(
+        terminal.table(["left out", "quantity", ">error", ">of fit to all", "unit"], rows)
+    )
 
 
 def print_next(best: NextMeasurement) -> None:
     """Print how much each candidate would narrow the intervals."""
+    shown = range(len(best.gain))
+    if len(shown) > _ROWS:
+        thinned = np.unique(np.linspace(0, len(shown) - 1, _ROWS).round().astype(int)).tolist()
+        shown = sorted({*thinned, best.best})
+    loads = _loads(best)
+    rows: list[list[str]] = []
+    for row in shown:
+        gain = f"{best.gain[row]:.3f}" if best.converged[row] else "not solved"
+        mark = "  best" if row == best.best else ""
+        cells = [_plain(float(values[row]), 4) for _, values in loads]
+        rows.append([str(row + 1), *cells, gain + mark.ljust(6)])
     console = terminal.output()
     wanted = ", ".join(best.wanted) or "all constants together"
     console.print(f"\nNext measurement of {best.label}, to narrow {wanted}:")
-    rows = range(len(best.gain))
-    if len(rows) > _ROWS:
-        rows = np.unique(np.linspace(0, len(rows) - 1, _ROWS).round().astype(int)).tolist()
-        rows = sorted({*rows, best.best})
-    table = terminal.table()
-    terminal.number_columns(table, "candidate", *_load_heads(best), "interval after / before")
-    for row in rows:
-        gain = f"{best.gain[row]:.3f}" if best.converged[row] else "not solved"
-        mark = "  best" if row == best.best else ""
-        table.add_row(str(row + 1), *_load_cells(best, row), gain + mark.ljust(6))
-    console.print(table)
+    heads = ["candidate", *(head for head, _ in loads), "interval after / before"]
+    console.print(terminal.table([f">{head}" for head in heads], rows))
 
 
 def print_posterior(drawn: Posterior) -> None:
     """Print mean, interval and convergence of the draws of every constant."""
-    console = terminal.output()
-    chains, count, _ = drawn.draws.shape
-    console.print(f"\nPosterior, {chains} chains of {count} draws, {drawn.divergent} divergent:")
-    table = terminal.table("constant")
-    terminal.number_columns(table, "mean", "middle 95 %", "deviation", "draws worth", "R-hat")
-    for name in drawn.names:
-        low, high = drawn.intervals[name]
-        table.add_row(
+    rows = [
+        [
             name,
             f"{drawn.means[name]:.5g}",
-            f"{low:.4g} to {high:.4g}",
+            "{:.4g} to {:.4g}".format(*drawn.intervals[name]),
             f"{drawn.deviations[name]:.2g}",
             f"{drawn.effective[name]:.0f}",
             f"{drawn.unlike[name]:.3f}",
-        )
-    console.print(table)
+        ]
+        for name in drawn.names
+    ]
+    console = terminal.output()
+    chains, count, _ = drawn.draws.shape
+    console.print(f"\nPosterior, {chains} chains of {count} draws, {drawn.divergent} divergent:")
+    heads = ["constant", ">mean", ">middle 95 %", ">deviation", ">effective draws", ">R-hat"]
+    console.print(terminal.table(heads, rows))
 
 
 def _print_constants(console: Console, found: Calibration) -> None:
-    table = terminal.table("constant")
-    terminal.number_columns(table, "value")
-    table.add_column("unit")
-    if found.intervals:
-        terminal.number_columns(table, "95 % interval")
-    terminal.number_columns(table, "deviation")
-    for name, value in found.values.items():
-        ends = [_interval(found.intervals[name])] if name in found.intervals else []
-        table.add_row(
-            name, f"{value:.5g}", found.units[name], *ends, _plain(found.deviations[name], 2)
-        )
-    console.print(table)
+    interval = [">95 % interval"] if found.intervals else []
+    rows = [
+        [
+            name,
+            f"{value:.5g}",
+            found.units[name],
+            *([_interval(found.intervals[name])] if name in found.intervals else []),
+            _plain(found.deviations[name], 2),
+        ]
+        for name, value in found.values.items()
+    ]
+    console.print(terminal.table(["constant", ">value", "unit", *interval, ">deviation"], rows))
 
 
 def _print_errors(console: Console, found: Calibration) -> None:
     from notchflex.fit.assessment.errors_of_parts import errors_of_parts
 
-    table = terminal.table("robot", "measured")
-    terminal.number_columns(table, "rms error", "between repeats")
-    table.add_column("unit")
-    for one in errors_of_parts(found):
-        cells = _plain(one.error), _plain(one.repeats)
-        table.add_row(one.robot, one.title, *cells, one.unit)
-    console.print(table)
+    heads = ["robot", "measured", ">rms error", ">between repeats", "unit"]
+    rows = [
+        [one.robot, one.title, _plain(one.error), _plain(one.repeats), one.unit]
+        for one in errors_of_parts(found)
+    ]
+    console.print(terminal.table(heads, rows))
 
 
 def _numbers(found: Calibration) -> str:
@@ -144,19 +144,11 @@ def _plain(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
-def _load_heads(best: NextMeasurement) -> list[str]:
-    return [f"{name} {number + 1} {unit}" for name, unit, number, _ in _loads(best)]
-
-
-def _load_cells(best: NextMeasurement, row: int) -> list[str]:
-    return [_plain(float(values[row]), 4) for _, _, _, values in _loads(best)]
-
-
-def _loads(best: NextMeasurement) -> list[tuple[str, str, int, np.ndarray]]:
-    """Return name, unit, tendon and values of each commanded column."""
+def _loads(best: NextMeasurement) -> list[tuple[str, np.ndarray]]:
+    """Return head and values of each commanded column."""
     columns = (("tension", "N", best.loads.tension), ("stroke", "mm", best.loads.stroke))
     return [
-        (name, unit, tendon, table[:, tendon])
+        (f"{name} {tendon + 1} {unit}", table[:, tendon])
         for name, unit, table in columns
         for tendon in range(table.shape[1])
         if np.isfinite(table[:, tendon]).any()

@@ -30,14 +30,13 @@ def print_comparison(comparison: Comparison, others: dict[str, Comparison]) -> N
     models = {"model": comparison, **others}
     columns = _columns(models)
     for first in range(0, len(columns), MOST_COLUMNS):  # a wide robot in parts of 80 columns each
-        table = terminal.table()
-        table.add_column("root-mean-square error\n", no_wrap=True, max_width=24)
         some = columns[first : first + MOST_COLUMNS]
-        for head, _ in some:
-            table.add_column(head, justify="right")
-        for number, label in enumerate(models):
-            table.add_row(label, *(cells[number] for _, cells in some))
-        console.print(table)
+        heads = ["root-mean-square error\n", *(f">{head}" for head, _ in some)]
+        rows = [
+            [label if len(label) <= 24 else f"{label[:23]}…", *(cells[n] for _, cells in some)]
+            for n, label in enumerate(models)
+        ]
+        console.print(terminal.table(heads, rows))
     for name, error in comparison.others.items():
         title, unit, scale = edge(name)
         console.print(f"{title}: {error * scale:.3f} {unit}")

@@ -177,12 +177,8 @@ def _filled(heads: list[str], rows: list[list[str]]) -> Table:
         for place, head in enumerate(heads)
     ]
     gap = 2 if sum(widths) + 2 * len(widths) <= terminal.NARROW else 1
-    table = terminal.table(gap=gap)
-    for head in heads:
-        table.add_column("\n" * (deepest - head.count("\n")) + head, justify="right")
-    for row in rows:
-        table.add_row(*row)
-    return table
+    heads = ["\n" * (deepest - head.count("\n")) + head for head in heads]
+    return terminal.table([f">{head}" for head in heads], rows, gap=gap)
 
 
 def _summary(table: dict[str, Any]) -> str:

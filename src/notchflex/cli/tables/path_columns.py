@@ -129,9 +129,6 @@ def parse_columns(text: str) -> list[str]:
     Args:
         text: Names of the table of quantities, joined by commas.
 
-    Raises:
-        InputError: A name that is not known, twice the same, or none.
-
     Example:
         >>> parse_columns("tension, notch_angle")
         ['tension', 'notch_angle']

@@ -86,11 +86,7 @@ def _commanded(path: EquilibriumPath) -> list[np.ndarray]:
 
 
 def all_rows(path: EquilibriumPath) -> tuple[list[int], int]:
-    """Return every step of a path, as `shown_rows` does.
-
-    Raises:
-        InputError: The path is longer than a terminal can hold.
-    """
+    """Return every step of a path, as `shown_rows` does."""
     if len(path) > _MOST_ALL:
         raise InputError.UNSUPPORTED(
             f"--all: a table of {len(path):,} rows; write them with --csv FILE instead "

@@ -29,9 +29,6 @@ def print_path(
         columns: Quantities to show, by their names; none for the usual ones. The usual ones that
             do not fit are left out and named, those that were asked for are continued below.
         every_row: Whether all steps of a long path are shown.
-
-    Raises:
-        InputError: All rows of a path that is too long for a terminal.
     """
     rows, stride = all_rows(path) if every_row else shown_rows(path)
     room = terminal.width()
@@ -129,12 +126,11 @@ def _columns(groups: Sequence[Group]) -> list[Column]:
 def _print_block(
     console: Console, path: EquilibriumPath, rows: Sequence[int], columns: Sequence[Column]
 ) -> None:
-    table = terminal.table()
     # Units stand on one line at the foot of the heads.
     deepest = max(column.head.count("\n") for column in columns)
-    for column in columns:
-        above = "\n" * (deepest - column.head.count("\n"))
-        table.add_column(f"{above}{column.head}\n{column.unit}", justify="right", no_wrap=True)
+    above = ["\n" * (deepest - column.head.count("\n")) for column in columns]
+    heads = [f">{gap}{one.head}\n{one.unit}" for gap, one in zip(above, columns, strict=True)]
+    table = terminal.table(heads)
     for place, row in enumerate(rows):
         style = None if path.converged[row] else "red"
         table.add_row(*(column.cells[place] for column in columns), style=style)

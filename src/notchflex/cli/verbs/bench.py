@@ -43,23 +43,18 @@ def _print(rows: list[Row]) -> None:
     from notchflex.bench import MEASURED, PEERS
 
     console = terminal.output()
-    table = terminal.table(gap=2)
-    table.add_column("what", style="cyan")
-    terminal.number_columns(table, "time", "LU135", "target")
+    cells: list[list[str]] = []
     for row in rows:
-        table.add_row(row.name, _time(row.us), _multiple(row.lu135), _multiple(row.target))
-        if row.note:
-            table.add_row(f"  {row.note}")
-    console.print(table)
-    others = terminal.table(gap=2)
-    others.add_column("others", style="cyan")
-    others.add_column("what")
-    terminal.number_columns(others, "time")
-    for peer in PEERS:
-        span = [_time(1e3 * ms) for ms in dict.fromkeys(peer.ms)]
-        others.add_row(peer.name, peer.what, " to ".join(span))
+        cells.append([row.name, _time(row.us), _multiple(row.lu135), _multiple(row.target)])
+        cells += [[f"  {row.note}"]] if row.note else []
+    heads = ["what", ">time", ">LU135", ">target"]
+    console.print(terminal.table(heads, cells, gap=2, colour="cyan"))
     console.print()
-    console.print(others)
+    peers = [
+        [name, what, " to ".join(_time(1e3 * one) for one in dict.fromkeys(ms))]
+        for name, what, ms in PEERS
+    ]
+    console.print(terminal.table(["others", "what", ">time"], peers, gap=2, colour="cyan"))
     console.print(f"Others: {MEASURED}.")
 
 

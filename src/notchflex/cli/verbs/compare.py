@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import texts
 from notchflex.cli.arguments.measured import OnePath, from_rest, note_table
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files, variant
 from notchflex.cli.exit_codes import DONE, NOT_CONVERGED
@@ -31,14 +32,12 @@ def compare(
     path: OnePath = None,
     beside: Annotated[
         tuple[str, ...],
-        Parameter(
-            name="--beside",
-            metavar="VARIANT...",
-            negative=(),
-            show_default=False,
-            help="Also compare the same robot with other values, written "
+        texts(
+            "VARIANT",
+            "Also compare the same robot with other values, written "
             '`"LABEL: PATH=VALUE, PATH=VALUE"`, or `kinematics` for the model that shares the '
             "stroke equally over the notches. May be given several times.",
+            "--beside",
         ),
     ] = (),
     settings: Settings = (),

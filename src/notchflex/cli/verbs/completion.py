@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import flag
 from notchflex.errors import InputError
 from notchflex.results.files.streams import write_document
 
@@ -23,11 +24,9 @@ def completion(
     *,
     install: Annotated[
         bool,
-        Parameter(
-            negative=(),
-            show_default=False,
-            help="Write the script to its folder for this user, and a line that loads it to the "
-            "start-up file of the shell; prints the path.",
+        flag(
+            "Write the script to its folder for this user, and a line that loads it to the "
+            "start-up file of the shell; prints the path."
         ),
     ] = False,
 ) -> None:

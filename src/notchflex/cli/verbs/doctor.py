@@ -156,13 +156,9 @@ def _print(found: dict[str, Any]) -> None:
     console = terminal.output()
 
     def section(title: str, rows: Iterable[tuple[str, str]]) -> None:
-        table = terminal.table(gap=2, header=False)
-        table.add_column(style="cyan", no_wrap=True, min_width=14)
-        table.add_column(overflow="fold")
-        for row in rows:
-            table.add_row(*row)
         console.print(title, style="bold")
-        console.print(table)
+        cells = [(name.ljust(14), words) for name, words in rows]
+        console.print(terminal.table(["", ""], cells, gap=2, colour="cyan"))
 
     missing = "not installed"
     device = found["device"]

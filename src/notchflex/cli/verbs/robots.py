@@ -8,9 +8,5 @@ from notchflex.cli import terminal
 
 def robots() -> None:
     """List the robots that come with the program."""
-    table = terminal.table(gap=2)
-    table.add_column("robot", style="cyan", no_wrap=True)
-    table.add_column("what it is")
-    for name, title in list_robots().items():
-        table.add_row(name, title)
-    terminal.output().print(table)
+    rows = list_robots().items()
+    terminal.output().print(terminal.table(["robot", "what it is"], rows, gap=2, colour="cyan"))

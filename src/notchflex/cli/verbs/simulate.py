@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from notchflex.cli import simulate_files, terminal
-from notchflex.cli.arguments.conversion import Vector, converted, vector, whole
+from notchflex.cli.arguments.conversion import Vector, converted, flag, texts, vector, whole
 from notchflex.cli.arguments.loads import (
     ExternalLoads,
     TendonCommand,
@@ -72,10 +72,7 @@ def simulate(
     refinement: Annotated[
         int,
         converted(whole(0, 3), "N"),
-        Parameter(
-            help="0 to 3: more strain modes in every notch. A result that stays the same is "
-            "accurate.",
-        ),
+        Parameter(help="0 to 3: more strain modes in every notch, to check the accuracy."),
     ] = 0,
     settings: Settings = (),
     from_state: Annotated[
@@ -91,14 +88,12 @@ def simulate(
     ] = None,
     beside: Annotated[
         tuple[str, ...],
-        Parameter(
-            name="--beside",
-            metavar="ROBOT...",
-            negative=(),
-            show_default=False,
-            help="Also simulate another robot under the same load: `ROBOT`, `LABEL: ROBOT`, or "
-            "this one with other values, `LABEL: PATH=VALUE, PATH=VALUE`. May be given up to four "
-            "times. Table, picture and JSON have all of them, other files the first.",
+        texts(
+            "ROBOT",
+            "Also simulate another robot under the same load: `ROBOT`, `LABEL: ROBOT`, or this one "
+            "with other values, `LABEL: PATH=VALUE, PATH=VALUE`. May be given up to four times. "
+            "Table, picture and JSON have all of them, other files the first.",
+            "--beside",
         ),
     ] = (),
     columns: Annotated[
@@ -112,13 +107,10 @@ def simulate(
     ] = None,
     every_row: Annotated[
         bool,
-        Parameter(
-            name="--all",
-            group=OUTPUT,
-            negative=(),
-            show_default=False,
-            help="Show every step in the table; without it a path of more than 60 steps is "
-            "thinned.",
+        flag(
+            "Show every step in the table; without it a path of more than 60 steps is thinned.",
+            "--all",
+            OUTPUT,
         ),
     ] = False,
     json: JsonFile = None,

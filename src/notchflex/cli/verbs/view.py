@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, whole
+from notchflex.cli.arguments.conversion import converted, flag, whole
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.viewer import HOST, PORT, check_host, check_installed, exposed
 
@@ -33,10 +33,7 @@ def view(
         converted(whole(1, 65535), "N"),
         Parameter(help="Port to serve on, or the next one that is free."),
     ] = PORT,
-    open_browser: Annotated[
-        bool,
-        Parameter(name="--open", negative=(), show_default=False, help="Open a browser there."),
-    ] = False,
+    open_browser: Annotated[bool, flag("Open a browser there.", "--open")] = False,
 ) -> None:
     """Show a robot in the browser, with sliders for its tendons and loads.
 
