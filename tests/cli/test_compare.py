@@ -59,7 +59,7 @@ def test_the_table_says_how_the_rows_were_loaded(call, loop):
 
 def test_an_order_that_may_mean_two_things_is_refused(call, refused, tmp_path):
     (tmp_path / "d.csv").write_text("tendon_force_N,total_deg\n0.5,13\n1.5,70\n1.0,27\n1.2,40\n")
-    refused("compare", "pacheco2021-b", "d.csv")
+    refused("UNSUPPORTED", "compare", "pacheco2021-b", "d.csv")
     assert call("compare", "pacheco2021-b", "d.csv", "--from-rest")[0] == 0
     assert call("compare", "pacheco2021-b", "d.csv", "--path")[0] == 0
 

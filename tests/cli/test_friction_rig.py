@@ -59,15 +59,15 @@ def test_document(capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    ("code", "arguments"),
     [
-        ["none.csv"],
-        ["rig.csv", "--plot", "rig.txt"],
-        ["rig.csv", "--json", "rig.csv"],
-        ["wrong.csv"],
+        ("FILE_NOT_FOUND", ["none.csv"]),
+        ("FILE_FORMAT", ["rig.csv", "--plot", "rig.txt"]),
+        ("CONFLICT", ["rig.csv", "--json", "rig.csv"]),
+        ("OUT_OF_RANGE", ["wrong.csv"]),
     ],
 )
-def test_bad_input(refused, rig, arguments):
+def test_bad_input(refused, rig, code, arguments):
     head = TABLE.splitlines()[0].split(",weight_2_sd")[0]
     (rig / "wrong.csv").write_text(f"{head}\n200,150,90,90\n150,200,90,90\n")
-    refused("friction-rig", *arguments)
+    refused(code, "friction-rig", *arguments)

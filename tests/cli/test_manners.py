@@ -121,22 +121,25 @@ def test_robots_beside_each_other(call, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "given",
+    ("code", "given"),
     [
-        ["slick"],
-        ["a: friction.nothing=0"],
-        ["=1"],
-        ["pacheco2021-a"],
-        ["a: york2015", "a: pacheco2021-b"],
-        ["1: york2015", "2: york2015", "3: york2015", "4: york2015", "5: york2015"],
+        ("UNKNOWN_NAME", ["slick"]),
+        ("UNKNOWN_NAME", ["a: friction.nothing=0"]),
+        ("BAD_SYNTAX", ["=1"]),
+        ("CONFLICT", ["pacheco2021-a"]),
+        ("CONFLICT", ["a: york2015", "a: pacheco2021-b"]),
+        (
+            "OUT_OF_RANGE",
+            ["1: york2015", "2: york2015", "3: york2015", "4: york2015", "5: york2015"],
+        ),
     ],
 )
-def test_what_cannot_stand_beside_is_told(refused, given):
-    refused(*PULL, *(part for text in given for part in ("--beside", text)))
+def test_what_cannot_stand_beside_is_told(refused, code, given):
+    refused(code, *PULL, *(part for text in given for part in ("--beside", text)))
 
 
 def test_a_robot_with_fewer_tendons_cannot_be_pulled_alike(refused):
-    refused("simulate", "two-axis-wrist", "--tension", "2=1", "--beside", "york2015")
+    refused("WRONG_SHAPE", "simulate", "two-axis-wrist", "--tension", "2=1", "--beside", "york2015")
 
 
 def test_every_kind_of_file(call, tmp_path):
@@ -149,15 +152,15 @@ def test_every_kind_of_file(call, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("code", "options"),
     [
-        ("--nc", "-"),
-        ("--parquet", "-"),
-        ("--nc", "missing/a.nc"),
-        ("--plot", "a.jpg"),
-        ("--plot", "a.gif", "--beside", "york2015"),
-        ("--nc", "a", "--parquet", "a"),
+        ("FILE_FORMAT", ("--nc", "-")),
+        ("FILE_FORMAT", ("--parquet", "-")),
+        ("FILE_UNWRITABLE", ("--nc", "missing/a.nc")),
+        ("FILE_FORMAT", ("--plot", "a.jpg")),
+        ("FILE_FORMAT", ("--plot", "a.gif", "--beside", "york2015")),
+        ("CONFLICT", ("--nc", "a", "--parquet", "a")),
     ],
 )
-def test_files_that_cannot_be_written_are_told_first(refused, options):
-    refused(*PULL, *options)
+def test_files_that_cannot_be_written_are_told_first(refused, code, options):
+    refused(code, *PULL, *options)

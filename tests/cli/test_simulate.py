@@ -205,6 +205,9 @@ def test_loads_and_refinement_reach_the_solver_and_the_head_of_the_table(call, t
     assert step["base_force_N"] == pytest.approx([0.05, 0.0, 1.0], abs=1e-6)
 
 
-@pytest.mark.parametrize("value", ["4", "-1", "0.5", ""])
-def test_refinement_is_a_small_whole_number(refused, value):
-    refused(*LOOP, "--refinement", value)
+@pytest.mark.parametrize(
+    ("code", "value"),
+    [("OUT_OF_RANGE", "4"), ("OUT_OF_RANGE", "-1"), ("NOT_A_NUMBER", "0.5"), ("NOT_A_NUMBER", "")],
+)
+def test_refinement_is_a_small_whole_number(refused, code, value):
+    refused(code, *LOOP, "--refinement", value)

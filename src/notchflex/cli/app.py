@@ -11,7 +11,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentError
 
 from notchflex import __version__
 from notchflex.cli import terminal
@@ -109,6 +109,11 @@ VERBS = {
 }
 """Verb to its one-line help and its examples."""
 
+_CODES = {
+    MissingArgumentError: InputError.MISSING_VALUE,
+    RepeatArgumentError: InputError.CONFLICT,
+}
+
 
 def build() -> App:
     """Return the command line application; the verbs are loaded when they are called."""
@@ -160,7 +165,8 @@ def execute(tokens: Sequence[str]) -> int:
         words = " ".join(str(problem).split())
         words += "" if words.endswith((".", "?", "!")) else "."
         help_ = " ".join(["notchflex", *([verb] if verb else []), "--help"])
-        raise InputError.UNKNOWN_NAME(f"{words} See {help_}.") from None
+        code = _CODES.get(type(problem), InputError.UNKNOWN_NAME)
+        raise code(f"{words} See {help_}.") from None
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cyclopts import Group, Parameter, Token
+from cyclopts import Parameter, Token
 
 from notchflex.errors import InputError
 
@@ -56,15 +56,14 @@ def converted(
     )
 
 
-def flag(text: str, name: str | None = None, group: Group | None = None) -> Parameter:
-    """Return the parameter of an option without a value, which only sets something."""
-    return Parameter(name=name, group=group, negative=(), show_default=False, help=text)
+def flag(text: str, **options: Any) -> Parameter:
+    """Return the parameter of an option without a value."""
+    return Parameter(negative=(), show_default=False, help=text, **options)
 
 
-def texts(metavar: str, text: str, name: str | None = None) -> Parameter:
+def texts(name: str, metavar: str, text: str) -> Parameter:
     """Return the parameter of an option with a text that may be given several times."""
-    form = f"{metavar}..."
-    return Parameter(name=name, metavar=form, negative=(), show_default=False, help=text)
+    return flag(text, name=name, metavar=f"{metavar}...")
 
 
 def number(word: str, form: str, *, least: float = -math.inf) -> float:
@@ -78,9 +77,11 @@ def number(word: str, form: str, *, least: float = -math.inf) -> float:
     try:
         value = float(word)
     except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value >= least):
-        raise InputError.NOT_A_NUMBER(f"give {form}.")
+        raise InputError.NOT_A_NUMBER(f"give {form}.") from None
+    if not math.isfinite(value):
+        raise InputError.NOT_FINITE(f"give {form}.")
+    if value < least:
+        raise InputError.OUT_OF_RANGE(f"give {form}.")
     return value
 
 

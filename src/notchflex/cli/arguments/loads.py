@@ -137,10 +137,9 @@ def _read_body_force(text: str) -> BodyForceOption:
     def read(words: str, what: str) -> Vector:
         try:
             return vector(what)(words)
-        except InputError:
-            raise InputError.BAD_SYNTAX(
-                f"{words!r} is not three finite {what}; give {_BODY}."
-            ) from None
+        except InputError as problem:
+            message = f"{words!r} is not three finite {what}; give {_BODY}."
+            raise InputError(message, problem.code) from None
 
     where = read(point, "coordinates in mm") if at else None
     return BodyForceOption(int(body), read(force, "forces in N"), where)

@@ -29,11 +29,11 @@ RobotName = Annotated[
 Settings = Annotated[
     tuple[str, ...],
     texts(
+        "--set",
         "PATH=VALUE",
         "Change a value of the robot, such as `material.elastic_modulus=9000`, "
         "`notch[2].depth=1.3` (the second notch from the base), `notch.depth=1.38` (every notch) "
         "or `material.kind=linear`. May be given several times, in any order.",
-        "--set",
     ),
 ]
 

@@ -33,11 +33,11 @@ def compare(
     beside: Annotated[
         tuple[str, ...],
         texts(
+            "--beside",
             "VARIANT",
             "Also compare the same robot with other values, written "
             '`"LABEL: PATH=VALUE, PATH=VALUE"`, or `kinematics` for the model that shares the '
             "stroke equally over the notches. May be given several times.",
-            "--beside",
         ),
     ] = (),
     settings: Settings = (),

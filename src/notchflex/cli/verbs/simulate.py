@@ -89,11 +89,11 @@ def simulate(
     beside: Annotated[
         tuple[str, ...],
         texts(
+            "--beside",
             "ROBOT",
             "Also simulate another robot under the same load: `ROBOT`, `LABEL: ROBOT`, or this one "
             "with other values, `LABEL: PATH=VALUE, PATH=VALUE`. May be given up to four times. "
             "Table, picture and JSON have all of them, other files the first.",
-            "--beside",
         ),
     ] = (),
     columns: Annotated[
@@ -109,8 +109,8 @@ def simulate(
         bool,
         flag(
             "Show every step in the table; without it a path of more than 60 steps is thinned.",
-            "--all",
-            OUTPUT,
+            name="--all",
+            group=OUTPUT,
         ),
     ] = False,
     json: JsonFile = None,

@@ -33,7 +33,7 @@ def view(
         converted(whole(1, 65535), "N"),
         Parameter(help="Port to serve on, or the next one that is free."),
     ] = PORT,
-    open_browser: Annotated[bool, flag("Open a browser there.", "--open")] = False,
+    open_browser: Annotated[bool, flag("Open a browser there.", name="--open")] = False,
 ) -> None:
     """Show a robot in the browser, with sliders for its tendons and loads.
 
