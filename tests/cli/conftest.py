@@ -50,7 +50,7 @@ def refused(call, tmp_path, monkeypatch, wording) -> Callable[..., str]:
         assert "Traceback" not in err
         after = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
         assert after == before
-        short = [part if len(part) < 100 else f"{part[:9]}..." for part in arguments]
+        short = [part if len(part) < 100 else f"{part[:9]}...{part[-9:]}" for part in arguments]
         wording(name or " ".join(part or "''" for part in short), err.removeprefix("Error: "))
         return err
 

@@ -91,11 +91,11 @@ def test_robot_files(folder, refused, code, old, new):
         ("NOT_FINITE", ["simulate", "mine.toml", "--stroke", "inf"]),
         ("CONFLICT", ["simulate", "mine.toml", "--tension", "1", "--stroke", "1"]),
         ("BAD_SYNTAX", ["simulate", "mine.toml", "--tension", "1", "--base-rotation", "1,2"]),
-        ("NOT_A_NUMBER", ["simulate", "mine.toml", "--tension", "1", "--base-rotation", "0,0,nan"]),
+        ("NOT_FINITE", ["simulate", "mine.toml", "--tension", "1", "--base-rotation", "0,0,nan"]),
         ("BAD_SYNTAX", [*SIMULATE, "--tip-force", "0,1"]),
         ("BAD_SYNTAX", [*SIMULATE, "--body-force", "0,1,0"]),
         ("OUT_OF_RANGE", [*SIMULATE, "--body-force", "3:0,1,0"]),
-        ("NOT_A_NUMBER", [*SIMULATE, "--tip-mass", "-1"]),
+        ("OUT_OF_RANGE", [*SIMULATE, "--tip-mass", "-1"]),
         ("UNSUPPORTED", [*SIMULATE, "--gravity", "0,0,-9.81"]),
         ("UNKNOWN_NAME", [*SIMULATE, "--set", "material.elastic_modulu=1"]),
         ("OUT_OF_RANGE", [*SIMULATE, "--set", "notch[3].depth=1"]),
@@ -106,7 +106,7 @@ def test_robot_files(folder, refused, code, old, new):
         ("MISSING_VALUE", [*SIMULATE, "--from-state", ""]),
         ("FILE_UNREADABLE", [*SIMULATE, "--from-state", "folder"]),
         ("FILE_UNREADABLE", ["show", "folder"]),
-        ("FILE_UNREADABLE", ["show", "a" * 300]),
+        ("UNKNOWN_NAME", ["show", "a" * 300]),
         ("FILE_UNREADABLE", ["show", "a" * 300 + ".toml"]),
         ("FILE_UNWRITABLE", ["new", "a" * 300]),
         ("FILE_UNWRITABLE", ["new", "null\0"]),
@@ -146,21 +146,21 @@ CONFLICT --tip-point 0,0,1
 CONFLICT --tip-point 0,0,1 --tip-moment 0,0,1
 BAD_SYNTAX --gravity 9.81
 NOT_A_NUMBER --tip-mass heavy
-NOT_A_NUMBER --tip-mass nan
-NOT_A_NUMBER --tip-mass inf
+NOT_FINITE --tip-mass nan
+NOT_FINITE --tip-mass inf
 CONFLICT --following --tension 1
 CONFLICT --following --tip-mass 3
-BAD_SYNTAX --body-force 1:
+NOT_A_NUMBER --body-force 1:
 BAD_SYNTAX --body-force 1:0,1
 BAD_SYNTAX --body-force -1:0,0,1
 BAD_SYNTAX --body-force a:0,0,1
 BAD_SYNTAX --body-force 1.5:0,0,1
-BAD_SYNTAX --body-force 1:0,0,1@
+NOT_A_NUMBER --body-force 1:0,0,1@
 BAD_SYNTAX --body-force 1:0,0,1@0,0
-BAD_SYNTAX --body-force 1:0,0,inf
-BAD_SYNTAX --body-force 1:0,0,1@0,0,nan
-BAD_SYNTAX --body-force 1:0,0,1@0,0,0@0,0,0
-BAD_SYNTAX --body-force 1:2:0,0,1
+NOT_FINITE --body-force 1:0,0,inf
+NOT_FINITE --body-force 1:0,0,1@0,0,nan
+NOT_A_NUMBER --body-force 1:0,0,1@0,0,0@0,0,0
+NOT_A_NUMBER --body-force 1:2:0,0,1
 BAD_SYNTAX --body-force 1:0,0,1 --body-force 1:0,1
 BAD_SYNTAX --tension 1 --beside =1
 UNKNOWN_NAME --tension 1 --columns notch_angel
@@ -180,6 +180,10 @@ def test_options_of_simulate(refused, options):
 @pytest.mark.parametrize("option", ["--tip-force", "--tip-mass", "--base-rotation"])
 def test_empty_options(refused, option):
     refused("NOT_A_NUMBER", *SIMULATE, option, "")
+
+
+def test_an_empty_body_force(refused):
+    refused("BAD_SYNTAX", *SIMULATE, "--body-force", "")
 
 
 def test_numbers_of_thousands_of_digits(refused):

@@ -130,7 +130,7 @@ def test_robots_beside_each_other(call, tmp_path):
         ("CONFLICT", ["a: york2015", "a: pacheco2021-b"]),
         (
             "OUT_OF_RANGE",
-            ["1: york2015", "2: york2015", "3: york2015", "4: york2015", "5: york2015"],
+            [f"{number}: york2015" for number in range(5)],
         ),
     ],
 )

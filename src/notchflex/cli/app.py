@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentError
 
@@ -109,7 +109,7 @@ VERBS = {
 }
 """Verb to its one-line help and its examples."""
 
-_CODES = {
+_CODES: dict[type[CycloptsError], Callable[[str], InputError]] = {
     MissingArgumentError: InputError.MISSING_VALUE,
     RepeatArgumentError: InputError.CONFLICT,
 }

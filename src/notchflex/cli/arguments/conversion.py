@@ -36,7 +36,8 @@ def converted(
         try:
             return read(token.value)
         except InputError as problem:
-            words = [word for word in (token.keyword, token.value or "''") if word]
+            value = token.value if len(token.value) < 200 else f"{token.value[:80]}..."
+            words = [word for word in (token.keyword, value or "''") if word]
             raise InputError(f"{' '.join(words)}: {problem}", problem.code) from None
 
     def convert(_type: Any, tokens: Sequence[Token]) -> Any:
