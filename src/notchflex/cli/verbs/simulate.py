@@ -60,7 +60,7 @@ def simulate(
         tuple[TendonCommand, ...],
         tendon_command("--stroke", negative=True),
         Parameter(
-            help="Tendon length pulled out at the base [mm], step by step; written as --tension.",
+            help="Tendon length drawn out at the base [mm], step by step; written as --tension.",
         ),
     ] = (),
     base_rotation: Annotated[
