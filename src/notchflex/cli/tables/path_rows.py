@@ -80,7 +80,7 @@ def _extremes(path: EquilibriumPath) -> set[int]:
 
 
 def _commanded(path: EquilibriumPath) -> list[np.ndarray]:
-    """The columns of what was commanded; the tensions of what was not are no commands."""
+    """Return the commanded columns; the tension of a tendon with a stroke is not commanded."""
     columns = [*np.asarray(path.commanded_tension).T, *np.asarray(path.commanded_stroke).T]
     return [column for column in columns if np.isfinite(column).any()]
 

@@ -140,12 +140,12 @@ def _print_block(
 def _print_notes(
     console: Console, shown: Sequence[Group], left_out: Sequence[Group], room: int
 ) -> None:
-    """Say what the heads mean, and how to see what had no room."""
+    """Explain the heads, and how to see what had no room."""
     meanings = dict.fromkeys(group.meaning for group in shown if group.meaning and group.columns)
     empty = [name for group in shown if not group.columns for name in group.names]
     lines = [f"{'; '.join(meanings)}."] if meanings else []
     if empty:
-        lines.append(f"Nothing is known of {', '.join(empty)} on this path.")
+        lines.append(f"This path has no values of {', '.join(empty)}.")
     if left_out:
         names = ",".join(dict.fromkeys(name for group in left_out for name in group.names))
         titles = ", ".join(dict.fromkeys(_title(group) for group in left_out))
