@@ -11,6 +11,7 @@ from hypothesis import settings
 
 from chromium import browser  # noqa: F401
 from margins import margin, pytest_terminal_summary  # noqa: F401
+from wordings import pytest_addoption, wording  # noqa: F401
 
 # JAX compiles within a test, which no deadline should time; CI draws the same examples each time.
 settings.register_profile("here", deadline=None)

@@ -1,4 +1,4 @@
-"""Libraries that only some users need: which extra brings them, and what to say without them."""
+"""Optional libraries: the extra that installs each, and the error without it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def need(module: str, extra: str, what: str) -> None:
 
     Args:
         module: What would be imported.
-        extra: The extra that brings it.
+        extra: The extra that installs it.
         what: What needs it, as the message begins.
 
     Raises:

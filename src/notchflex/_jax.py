@@ -39,7 +39,7 @@ def jit(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def array_module(*values: Any) -> ModuleType:
-    """NumPy for plain numbers, so that nothing is compiled; JAX where it is traced or given.
+    """Return NumPy for plain numbers, so that nothing is compiled; JAX for its own arrays.
 
     Formulas that turn a robot into arrays run once per robot. Written with the module that this
     returns they take microseconds there, and can still be differentiated.
@@ -50,7 +50,7 @@ def array_module(*values: Any) -> ModuleType:
 
 
 def constant(value: ArrayLike) -> jax.Array:
-    """A NumPy array of floats, typed as the JAX array that a compiled program makes of it."""
+    """Return a NumPy array of floats, typed as the JAX array that a program makes of it."""
     return cast("jax.Array", np.asarray(value, float))
 
 

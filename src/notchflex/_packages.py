@@ -1,4 +1,4 @@
-"""Importing every file of a folder, so that a new part registers itself without a list."""
+"""Imports every file of a folder, so that a new part registers itself without a list."""
 
 from collections.abc import Iterable
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""`notchflex.plot`: a picture of whatever it is given; matplotlib is imported when it is called."""
+"""`notchflex.plot`: the usual picture of a result; matplotlib is imported when it is called."""
 
 from __future__ import annotations
 

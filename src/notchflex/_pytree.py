@@ -1,4 +1,4 @@
-"""Arrays that belong together, as one frozen dataclass that JAX sees through."""
+"""Frozen dataclasses of arrays that JAX can traverse (pytrees)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from notchflex._jax import jax
 
 
 def static(**options: Any) -> Any:
-    """A field that is no array: compiled programs are made for its value."""
+    """Return a field that is not an array: programs are compiled for its value."""
     return dataclasses.field(metadata={"static": True}, **options)
 
 
@@ -17,8 +17,8 @@ def static(**options: Any) -> Any:
 class Pytree:
     """Base of dataclasses whose fields are arrays, or trees of them.
 
-    Subclasses become frozen dataclasses, and pytrees of JAX, by being written. They are made
-    hundreds of times where a robot's numbers are varied: that must cost no more than their fields.
+    Every subclass becomes a frozen dataclass and a pytree of JAX. Varying the numbers of a robot
+    creates hundreds of instances, so creating one must cost no more than its fields.
 
     Example:
         >>> class Pair(Pytree):
@@ -29,10 +29,10 @@ class Pytree:
     """
 
     def __init_subclass__(cls, *, eq: bool = False, **options: Any) -> None:
-        """Make a dataclass of the subclass, and tell JAX which of its fields are arrays.
+        """Make the subclass a dataclass and register its arrays with JAX.
 
         Args:
-            eq: Whether equal fields make equals, as of plain numbers; arrays have no one answer.
+            eq: Whether instances with equal fields are equal; not for fields of arrays.
             options: For other bases.
         """
         super().__init_subclass__(**options)

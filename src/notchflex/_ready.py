@@ -1,4 +1,4 @@
-"""The robots that come with the program, by name; light, so that listing them is quick."""
+"""The robots that come with the program, by name; imports little, so that listing them is quick."""
 
 import tomllib
 from pathlib import Path
@@ -7,7 +7,7 @@ READY = Path(__file__).parent / "robot" / "ready"
 
 
 def ready_names() -> list[str]:
-    """Names of the ready robots, sorted."""
+    """Return the names of the ready robots, sorted."""
     return sorted(path.stem for path in READY.glob("*.toml"))
 
 

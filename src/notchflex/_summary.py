@@ -108,7 +108,7 @@ def course(values: Iterable[float], digits: int | None = None) -> str:
     series = [value for value in values if value == value]
     if not series:
         return "none"
-    # Rounding is no turn.
+    # Rounding errors are not turns.
     tolerance = 1e-9 * max(map(abs, series))
     ends = [series[0]]
     direction = 0.0

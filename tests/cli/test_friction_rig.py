@@ -59,18 +59,15 @@ def test_document(capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("code", "arguments"),
     [
-        (["none.csv"], "no such file"),
-        (["rig.csv", "--plot", "rig.txt"], "--plot rig.txt"),
-        (["rig.csv", "--json", "rig.csv"], "would replace the file that is read"),
-        (["wrong.csv"], "wrong.csv, line 3: weight 2 is larger"),
+        ("FILE_NOT_FOUND", ["none.csv"]),
+        ("FILE_FORMAT", ["rig.csv", "--plot", "rig.txt"]),
+        ("CONFLICT", ["rig.csv", "--json", "rig.csv"]),
+        ("OUT_OF_RANGE", ["wrong.csv"]),
     ],
 )
-def test_bad_input(capsys, rig, arguments, words):
+def test_bad_input(refused, rig, code, arguments):
     head = TABLE.splitlines()[0].split(",weight_2_sd")[0]
     (rig / "wrong.csv").write_text(f"{head}\n200,150,90,90\n150,200,90,90\n")
-    assert run(["friction-rig", *arguments]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert words in told.err
+    refused(code, "friction-rig", *arguments)

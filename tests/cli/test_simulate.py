@@ -7,21 +7,8 @@ import math
 import pytest
 
 import notchflex as nf
-from notchflex.cli import run
 
 LOOP = ["simulate", "pacheco2021-a", "--tension", "0:3:7,3:0:7"]
-
-
-@pytest.fixture
-def call(tmp_path, monkeypatch, capsys):
-    """Run the command in an empty folder; return exit code, standard output and error."""
-    monkeypatch.chdir(tmp_path)
-
-    def runner(*arguments):
-        code = run(list(arguments))
-        return (code, *capsys.readouterr())
-
-    return runner
 
 
 def test_json_alone_on_standard_output(call):
@@ -218,8 +205,9 @@ def test_loads_and_refinement_reach_the_solver_and_the_head_of_the_table(call, t
     assert step["base_force_N"] == pytest.approx([0.05, 0.0, 1.0], abs=1e-6)
 
 
-@pytest.mark.parametrize("value", ["4", "-1", "0.5"])
-def test_refinement_is_a_small_whole_number(call, value):
-    code, _, err = call(*LOOP, "--refinement", value)
-    assert code == 2
-    assert f"--refinement {value}: give a whole number from 0 to 3" in err
+@pytest.mark.parametrize(
+    ("code", "value"),
+    [("OUT_OF_RANGE", "4"), ("OUT_OF_RANGE", "-1"), ("NOT_A_NUMBER", "0.5"), ("NOT_A_NUMBER", "")],
+)
+def test_refinement_is_a_small_whole_number(refused, code, value):
+    refused(code, *LOOP, "--refinement", value)

@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from notchflex.cli import run
+
 QUICK = (
     ["--help"],
     ["robots"],
@@ -102,6 +104,13 @@ def test_help_of_every_verb_has_an_example():
         done = notchflex(verb, "--help")
         assert done.returncode == 0
         assert f"notchflex {verb}" in done.stdout.partition("Example")[2]
+
+
+@pytest.mark.parametrize("verb", ROOT_VERBS)
+def test_options_that_users_type_stay(wording, capsys, verb):
+    assert run([verb, "--help"]) == 0
+    options = re.findall(r"(?<![\w-])--?[a-z][a-z-]*", capsys.readouterr().out)
+    wording(f"options of {verb}", " ".join(sorted({*options})))
 
 
 def test_help_names_every_verb_and_the_exit_codes():

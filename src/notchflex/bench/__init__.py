@@ -1,21 +1,6 @@
-"""How fast the solver is, in multiples of a time that every machine knows."""
+"""Speed of the solver, in multiples of a reference time that every machine can measure."""
 
-from notchflex.bench.cases import CASES, Case
-from notchflex.bench.clock import Clock, Row
-from notchflex.bench.document import bench_document, measured
-from notchflex.bench.peers import MEASURED, PEERS, Peer
-from notchflex.bench.processes import PROCESSES, Process
+from notchflex.bench.document import MEASURED, PEERS, bench_document
+from notchflex.bench.measure import Row, measured
 
-__all__ = [
-    "CASES",
-    "MEASURED",
-    "PEERS",
-    "PROCESSES",
-    "Case",
-    "Clock",
-    "Peer",
-    "Process",
-    "Row",
-    "bench_document",
-    "measured",
-]
+__all__ = ["MEASURED", "PEERS", "Row", "bench_document", "measured"]

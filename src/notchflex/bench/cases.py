@@ -1,106 +1,100 @@
-"""What is timed inside one process: the loads and robots of the table."""
+"""What `notchflex bench` times: robots and loads in this process, and whole processes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import notchflex as nf
 from notchflex._jax import jax
+from notchflex.bench import processes
 
-_HUNG = 0.05 * 9.81  # 50 g, N
+Run = Callable[[], object]
 
 
-@dataclass(frozen=True)
-class Case:
-    """One thing to time.
+class Case(NamedTuple):
+    """One thing to measure.
 
     Attributes:
-        name: What it is; "per" says of what the time is.
-        target: What is aimed at, multiples of LU135, or of the time of another case.
-        make: Makes the function that is timed.
-        per: How many solves or steps it does.
-        of: Name of the case that the target is a multiple of; none for LU135.
+        name: What it is; "per" names what the time is of.
+        target: Target, in the unit, or in multiples of the time of another case; None for none.
+        make: Makes the function that is timed; with a unit of s or MiB it measures by itself.
+        per: Number of solves or steps that the function does.
+        of: Name of the case that the target is a multiple of.
+        unit: "LU135", or "s" and "MiB" for what is measured in a process of its own.
     """
 
     name: str
     target: float | None
-    make: Callable[[], Callable[[], object]]
+    make: Callable[[], Any]
     per: float = 1.0
     of: str = ""
+    unit: str = "LU135"
 
 
-def _wrist() -> nf.Robot:
-    return nf.load_robot("pacheco2021-a")
-
-
-def _links() -> nf.Robot:
-    return nf.load_robot("gao2017")
-
-
-def _solve(robot: Callable[[], nf.Robot], **load: Any) -> Callable[[], Callable[[], object]]:
-    def make() -> Callable[[], object]:
-        made = robot()
-        return lambda: nf.solve(made, nf.Load(**load)).total_angle
-
-    return make
-
-
-def _follow(robot: Callable[[], nf.Robot], path: Callable[[], nf.LoadPath]) -> Any:
-    def make() -> Callable[[], object]:
-        made, loads = robot(), path()
-        return lambda: nf.simulate(made, loads).total_angle
-
-    return make
-
-
-def _batch(robot: Callable[[], nf.Robot], highest: float, count: int, **tip: Any) -> Any:
-    def make() -> Callable[[], object]:
-        made, loads = robot(), nf.pull(0.0, highest, steps=count).loaded(**tip)
-        return lambda: nf.solve_batch(made, loads)
-
-    return make
+_wrist = partial(nf.load_robot, "pacheco2021-a")
+_links = partial(nf.load_robot, "gao2017")
 
 
 def _thirty() -> nf.Robot:
-    """Thirty notches of two directions, four tendons to the tip."""
+    """Return a robot with thirty notches of two directions and four tendons to the tip."""
     short = nf.load_robot("two-axis-wrist")
     notches = tuple(short.notches[number % short.number_of_notches] for number in range(30))
     tendons = (nf.Tendon(t.radius, t.direction_deg, end_body=30, path=t.path) for t in short.tendon)
     return short.replace(notch=notches, tendon=tuple(tendons))
 
 
-def _arcs(count: int) -> Callable[[], nf.Robot]:
-    def make() -> nf.Robot:
-        notch = nf.ArcNotch("on-axis", 1.40, 0.8, uncut_length=1.2, repeat=count)
-        return _wrist().replace(notch=(notch,), tendon=(nf.Tendon(0.70),))
+def _arcs(count: int) -> nf.Robot:
+    notch = nf.ArcNotch("on-axis", 1.40, 0.8, uncut_length=1.2, repeat=count)
+    return _wrist().replace(notch=(notch,), tendon=(nf.Tendon(0.70),))
+
+
+def _solve(robot: Callable[[], nf.Robot], **load: Any) -> Callable[[], Run]:
+    def make() -> Run:
+        made = robot()
+        return lambda: nf.solve(made, nf.Load(**load)).total_angle
 
     return make
 
 
-def _slopes(kind: str) -> Callable[[], Callable[[], object]]:
-    """The function whose slopes are timed, or the slopes, on the robot with 27 links."""
+def _follow(robot: Callable[[], nf.Robot], highest: float, steps: int) -> Callable[[], Run]:
+    """Time loading and unloading."""
 
-    def make() -> Callable[[], object]:
+    def make() -> Run:
+        made, loads = robot(), nf.pull(0.0, highest, steps=steps).release()
+        return lambda: nf.simulate(made, loads).total_angle
+
+    return make
+
+
+def _batch(robot: Callable[[], nf.Robot], highest: float, count: int, **tip: Any) -> Any:
+    return lambda: partial(
+        nf.solve_batch, robot(), nf.pull(0.0, highest, steps=count).loaded(**tip)
+    )
+
+
+def _derivative(kind: str) -> Callable[[], Run]:
+    """Time a function of the robot with 27 links, or derivatives of it."""
+
+    def make() -> Run:
         numbers = ["material.elastic_modulus", "friction.coefficient", "notch[1].strip_thickness"]
         bend = nf.differentiable(_links(), nf.pull(6.0, 6.0, steps=1), [*numbers, "tension"])
 
         def angle(values: dict[str, jax.Array]) -> jax.Array:
             return bend(values)["total_angle"][-1]
 
+        def along(tangent: dict[str, jax.Array]) -> jax.Array:
+            return jax.jvp(angle, (start,), (tangent,))[1]
+
         start = bend.start
         pulled = jax.tree.map(np.zeros_like, start) | {"tension": np.ones((1, 1))}
         units = [jax.tree.map(np.zeros_like, start) | {name: np.ones(())} for name in numbers]
         three = jax.tree.map(lambda *rows: np.stack(rows), *units)
-
-        def along(tangent: dict[str, jax.Array]) -> jax.Array:
-            return jax.jvp(angle, (start,), (tangent,))[1]
-
         functions: dict[str, tuple[Callable[..., Any], Any]] = {
-            "solve": (angle, start),
+            "value": (angle, start),
             "jvp": (along, pulled),
             "three": (jax.vmap(along), three),
             "reverse": (jax.grad(angle), start),
@@ -113,45 +107,33 @@ def _slopes(kind: str) -> Callable[[], Callable[[], object]]:
 
 
 _FUNCTION = "links (Gao) as a JAX function"
-_TIP = {"tip_force": (_HUNG, 0.0, 0.0)}
-CASES = (
+_TIP = {"tip_force": (0.05 * 9.81, 0.0, 0.0)}  # 50 g, N
+_FOUR: dict[str, Any] = {"tension": [0.1, 0.05, 0.0, 0.02], "tip_force": (0.002, 0.001, 0.0)}
+# fmt: off
+CASES: tuple[Case, ...] = (
     Case("wrist, one solve", 0.7, _solve(_wrist, tension=2.0)),
     Case("wrist, one solve by stroke", 1.5, _solve(_wrist, stroke=1.0), of="wrist, one solve"),
-    Case(
-        "wrist, 31 steps up and 31 down, whole path",
-        2.0,
-        _follow(_wrist, lambda: nf.pull(0.0, 3.0, steps=31).release()),
-    ),
+    Case("wrist, 31 steps up and 31 down, whole path", 2.0, _follow(_wrist, 3.0, 31)),
     Case("wrist, batch of 10,000, per solve", 0.004, _batch(_wrist, 2.5, 10_000), 1e4),
     Case("links (Gao), 6 N", 2.0, _solve(_links, tension=6.0)),
     Case("links (Gao), 6 N and 50 g", 2.5, _solve(_links, tension=6.0, **_TIP)),
-    Case(
-        "links (Gao), 13 to 0 N after loading, per step",
-        1.5,
-        _follow(_links, lambda: nf.pull(0.0, 13.0, steps=14).release()),
-        28.0,
-    ),
+    Case("links (Gao), 13 to 0 N after loading, per step", 1.5, _follow(_links, 13.0, 14), 28.0),
     Case("links (Gao), batch of 1,000, per solve", 0.45, _batch(_links, 8.0, 1000), 1e3),
-    Case(
-        "links (Gao), batch of 1,000 with 50 g, per solve",
-        0.5,
-        _batch(_links, 8.0, 1000, **_TIP),
-        1e3,
-    ),
-    Case(
-        "30 notches in space, 4 tendons, tip force",
-        5.0,
-        _solve(_thirty, tension=[0.1, 0.05, 0.0, 0.02], tip_force=(0.002, 0.001, 0.0)),
-    ),
-    Case("100 arcs", None, _solve(_arcs(100), tension=0.02)),
-    Case("300 arcs", 3.0**1.1, _solve(_arcs(300), tension=0.02), of="100 arcs"),
-    Case("links (Gao) as a JAX function", None, _slopes("solve")),
-    Case(
-        "its slope along one direction (jvp)",
-        1.6,
-        _slopes("jvp"),
-        of=_FUNCTION,
-    ),
-    Case("its slopes by three parameters", 2.5, _slopes("three"), of=_FUNCTION),
-    Case("its gradient by all (reverse)", 3.0, _slopes("reverse"), of=_FUNCTION),
+    Case("links (Gao), batch of 1,000 with 50 g, per solve", 0.5,
+         _batch(_links, 8.0, 1000, **_TIP), 1e3),
+    Case("30 notches in space, 4 tendons, tip force", 5.0, _solve(_thirty, **_FOUR)),
+    Case("100 arcs", None, _solve(partial(_arcs, 100), tension=0.02)),
+    Case("300 arcs", 3.0**1.1, _solve(partial(_arcs, 300), tension=0.02), of="100 arcs"),
+    Case(_FUNCTION, None, _derivative("value")),
+    Case("its slope along one direction (jvp)", 1.6, _derivative("jvp"), of=_FUNCTION),
+    Case("its slopes by three parameters", 2.5, _derivative("three"), of=_FUNCTION),
+    Case("its gradient by all (reverse)", 3.0, _derivative("reverse"), of=_FUNCTION),
+    Case("first call, wrist, nothing compiled", 1.5,
+         partial(processes.first_call, "pacheco2021-a"), unit="s"),
+    Case("first call, links (Gao), nothing compiled", 5.0,
+         partial(processes.first_call, "gao2017"), unit="s"),
+    Case("simulate pacheco2021-a, second time, whole process", 3.0,
+         processes.second_command, unit="s"),
+    Case("memory, batch of 100,000 wrist paths", 2048.0, processes.memory, unit="MiB"),
 )
+# fmt: on

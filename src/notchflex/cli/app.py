@@ -1,4 +1,4 @@
-"""The verbs, what their exit codes mean, and how bad input is told.
+"""The verbs, their exit codes, and the messages of bad input.
 
 Each verb is a module of its own, imported only when it is called: `notchflex --help` reads none of
 them, and only those that compute import JAX.
@@ -9,29 +9,25 @@ from __future__ import annotations
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentError
 
 from notchflex import __version__
 from notchflex.cli import terminal
+from notchflex.cli.exit_codes import BAD_INPUT, DONE, INTERNAL_ERROR, INTERRUPTED
 from notchflex.errors import InputError
 from notchflex.results.files.streams import let_go
 
-DONE = 0
-NOT_CONVERGED = 1
-BAD_INPUT = 2
-INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
-INTERRUPTED = 130  # 128 + SIGINT, as shells expect
-
 ABOUT = """Statics of tendon-driven notched-tube robots.
 
-Shapes, tensions and strains of notched-tube wrists under their tendons, with friction that
-remembers the way it was pulled, superelastic material and closing notches. Robots are described
-in TOML files in mm, N, MPa and degrees; `notchflex robots` lists those that come with the program.
+Shapes, tensions and strains of notched-tube wrists under their tendons, with
+history-dependent friction, superelastic material and closing notches. Robots
+are described in TOML files in mm, N, MPa and degrees; `notchflex robots` lists
+those that come with the program.
 """
 
-EPILOGUE = """**Examples**
+EPILOGUE = """[bold]Examples[/bold]
 
     notchflex show pacheco2021-a
     notchflex simulate pacheco2021-a --tension 0:3:31,3:0:31 --plot wrist.png
@@ -83,7 +79,7 @@ VERBS = {
         "        --plot compare.png",
     ),
     "calibrate": (
-        "Find constants of robots from measurements, with how far to trust them.",
+        "Find constants of robots from measurements, with confidence intervals.",
         "notchflex simulate pacheco2021-a --tension 0.2:1.6:8 --csv a.csv\n"
         "    notchflex simulate pacheco2021-b --tension 0.2:1.2:6 --csv b.csv\n"
         "    notchflex calibrate pacheco2021-a=a.csv \\\n"
@@ -103,7 +99,7 @@ VERBS = {
         "notchflex bench --json bench.json\n    notchflex bench --only wrist",
     ),
     "doctor": (
-        "Check the installation: versions, device, extras, a sum that some JAX get wrong.",
+        "Check the installation: versions, device, extras, a sum that some JAX versions get wrong.",
         "notchflex doctor\n    notchflex doctor --json -",
     ),
     "completion": (
@@ -113,6 +109,11 @@ VERBS = {
 }
 """Verb to its one-line help and its examples."""
 
+_CODES: dict[type[CycloptsError], Callable[[str], InputError]] = {
+    MissingArgumentError: InputError.MISSING_VALUE,
+    RepeatArgumentError: InputError.CONFLICT,
+}
+
 
 def build() -> App:
     """Return the command line application; the verbs are loaded when they are called."""
@@ -121,12 +122,12 @@ def build() -> App:
         version=__version__,
         help=ABOUT,
         help_epilogue=EPILOGUE,
-        help_format="markdown",
+        help_format="rich",  # reading markdown takes a fifth of the time of `--help`
         console=terminal.output(),
         error_console=terminal.messages(),
         result_action="return_value",
         exit_on_error=False,
-        suppress_keyboard_interrupt=False,  # told by `run`
+        suppress_keyboard_interrupt=False,  # `run` reports it
         print_error=False,
     )
     for order, (verb, (text, examples)) in enumerate(VERBS.items()):
@@ -137,9 +138,35 @@ def build() -> App:
             name=verb,
             help=text,
             sort_key=order,
+            help_format="markdown",
             help_epilogue=f"**Example{plural}**\n\n    {examples}\n",
         )
     return app
+
+
+def execute(tokens: Sequence[str]) -> int:
+    """Run a verb.
+
+    Args:
+        tokens: What stands after `notchflex`.
+
+    Returns:
+        The exit code: 0 done, 1 not converged.
+
+    Raises:
+        InputError: Bad input: of the verb, or of an option that does not exist or is missing.
+    """
+    try:
+        return build()(tokens) or DONE
+    except CycloptsError as problem:
+        if isinstance(problem.__cause__, InputError):  # from a converter of our own
+            raise problem.__cause__ from None
+        verb = next((token for token in tokens if token in VERBS), "")
+        words = " ".join(str(problem).split())
+        words += "" if words.endswith((".", "?", "!")) else "."
+        help_ = " ".join(["notchflex", *([verb] if verb else []), "--help"])
+        code = _CODES.get(type(problem), InputError.UNKNOWN_NAME)
+        raise code(f"{words} See {help_}.") from None
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -149,24 +176,19 @@ def run(arguments: Sequence[str] | None = None) -> int:
         arguments: What stands after `notchflex`; None for those of this process.
 
     Returns:
-        The exit code: 0 done, 1 not converged, 2 bad input (told in one clear message).
+        The exit code: 0 done, 1 not converged, 2 bad input (with one clear message).
     """
-    tokens = list(sys.argv[1:] if arguments is None else arguments)
     terminal.be_quiet(False)
     try:
-        code = build()(tokens) or DONE
+        code = execute(list(sys.argv[1:] if arguments is None else arguments))
         sys.stdout.flush()
         return code
     except InputError as problem:
         terminal.error(str(problem))
-    except CycloptsError as problem:
-        verb = next((token for token in tokens if token in VERBS), None)
-        command = f"notchflex {verb} --help" if verb else "notchflex --help"
-        terminal.error(f"{_sentence(str(problem))} See {command}.")
     except KeyboardInterrupt:
         terminal.error("interrupted; nothing more is written.")
         return INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has gone
+    except BrokenPipeError:  # the reader of our output has gone
         let_go(sys.stdout)
         return DONE
     except OSError as problem:
@@ -188,14 +210,8 @@ def main() -> None:
         terminal.error("this is a bug in notchflex; please report it with the lines above.")
         code = INTERNAL_ERROR
     if code == INTERRUPTED:
-        # What is being compiled goes on in threads of its own, and would crash where Python is
-        # taken down below it. All that was written is written.
+        # Threads that compile would crash while Python shuts down. All output is written.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
     sys.exit(code)
-
-
-def _sentence(text: str) -> str:
-    text = " ".join(text.split())
-    return text if text.endswith((".", "?", "!")) else f"{text}."

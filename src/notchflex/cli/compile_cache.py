@@ -1,4 +1,4 @@
-"""Keeping what XLA compiles between runs of the command line, so that only the first is slow."""
+"""Keeps what XLA compiles between runs of the command line, so that only the first is slow."""
 
 from __future__ import annotations
 

@@ -1,125 +1,98 @@
-"""The files that `notchflex simulate` writes: checked before anything is computed."""
+"""The files of `notchflex simulate` beside JSON: what is special to each, and writing them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from notchflex._extras import need
 from notchflex.cli import terminal
+from notchflex.cli.outputs import Outputs
 from notchflex.errors import InputError
-from notchflex.results.files.writing import (
-    BROWSER,
-    MOVING,
-    PAPER,
-    STANDARD_OUTPUT,
-    check_distinct,
-    check_output,
-    check_picture,
-    replacing,
-)
+from notchflex.results.files.writing import BROWSER, MOVING, PAPER, STANDARD_OUTPUT, replacing
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
-Outputs = Mapping[str, str | None]
-"""Option, such as `--json`, to the file that it names; None where it was not given."""
+
+def pictures(*, several: bool) -> tuple[str, ...]:
+    """Return the suffixes of pictures; several robots beside each other are not animated."""
+    return PAPER + BROWSER + (() if several else MOVING)
 
 
-def check_files(outputs: Outputs, inputs: Sequence[FilePath], *, steps: int, several: bool) -> None:
-    """Check that every file can be written.
+def check(outputs: Outputs, *, steps: int) -> None:
+    """Check what a kind of file needs."""
+    targets = outputs.targets
+    if steps < 2 and _is_animation(targets.get("plot", "")):
+        raise InputError.FILE_FORMAT(
+            f"--plot {targets['plot']}: one step cannot be animated; write a .png, .svg or .pdf."
+        )
+    for name in ("nc", "parquet"):
+        if targets.get(name) == STANDARD_OUTPUT:
+            raise InputError.FILE_FORMAT(
+                f"--{name} - : a binary file cannot go to standard output; name a file."
+            )
+    if "nc" in targets:
+        from notchflex.results.files.io import need_netcdf
 
-    Args:
-        outputs: What is to be written.
-        inputs: Files that are read, and must not be replaced.
-        steps: How many steps the path has.
-        several: Whether there are other robots beside the first.
-
-    Raises:
-        InputError: One of them cannot be written, or two are the same.
-    """
-    check_distinct(dict(outputs))
-    for option, target in outputs.items():
-        if target is None:
-            continue
-        if option == "--plot":
-            kinds = PAPER + BROWSER + (() if several else MOVING)
-            check_picture(target, option, inputs=inputs, kinds=kinds)
-            if steps < 2 and _moves(target):
-                raise InputError.FILE_FORMAT(
-                    f"--plot {target}: one step does not move; write a .png, .svg or .pdf."
-                )
-            continue
-        if option in ("--nc", "--parquet") and target == STANDARD_OUTPUT:
-            raise InputError.FILE_FORMAT(f"{option} - : this is no text; name a file.")
-        check_output(target, option, inputs=inputs)
-        if option == "--nc":
-            from notchflex.results.files.io import need_netcdf
-
-            need_netcdf(option)
-        if option == "--parquet":
-            need("polars", "data", option)
+        need_netcdf("--nc")
+    if "parquet" in targets:
+        need("polars", "data", "--parquet")
 
 
-def write_files(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str) -> None:
-    """Write what was asked for: table, JSON and picture of all paths, other files of the first.
+def write(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str) -> None:
+    """Write what was asked for: JSON and picture of all paths, other files of the first.
 
     Args:
         paths: Label to path.
-        outputs: What is to be written.
+        outputs: What was asked for.
         title: The heading of the picture.
-
-    Raises:
-        InputError: A file cannot be written.
     """
-    path, *others = paths.values()
-    if target := outputs["--json"]:
-        from notchflex.results.files.io import whole_document
-        from notchflex.results.files.json import write_json
-
-        document = whole_document(path)
-        if others:
-            rest = list(paths.items())[1:]
-            document["beside"] = {label: whole_document(other) for label, other in rest}
-        write_json(target, document)
-    if target := outputs["--csv"]:
+    path = next(iter(paths.values()))
+    outputs.write_json(lambda: _document(paths))
+    if target := outputs.targets.get("csv"):
         from notchflex.results.files.csv import write_path_csv
 
         write_path_csv(target, path)
-    if target := outputs["--nc"]:
+    if target := outputs.targets.get("nc"):
         from notchflex.results.files.io import write_netcdf
 
         write_netcdf(target, path)
-    if target := outputs["--parquet"]:
+    if target := outputs.targets.get("parquet"):
         from notchflex.results.files.parquet import write_parquet
 
         write_parquet(target, path)
-    if target := outputs["--plot"]:
-        _draw(paths, target, title)
-    if target := outputs["--save-state"]:
-        with replacing(target) as temporary:
-            path.state.save(temporary)
-
-
-def _moves(target: str) -> bool:
-    return FilePath(target).suffix.lower() in MOVING
-
-
-def _draw(paths: Mapping[str, EquilibriumPath], target: str, title: str) -> None:
-    path, *others = paths.values()
-    if _moves(target):
+    target = outputs.targets.get("plot", "")
+    if _is_animation(target):
         with terminal.counting(f"drawing {target}") as counted:
             from notchflex.plotting import save_animation
 
             save_animation(path, target, title=title, progress=counted)
-        return
-    with terminal.working(f"drawing {target}"):
-        from notchflex.plotting import beside_picture, path_picture
+    else:
+        outputs.save_picture(lambda: _picture(paths, title))
+    if target := outputs.targets.get("save_state"):
+        with replacing(target) as temporary:
+            path.state.save(temporary)
 
-        if others:
-            names = [title, *(other.robot.name for other in others)]
-            picture = beside_picture(paths, title="; ".join(dict.fromkeys(names)))
-        else:
-            picture = path_picture(path, title=title)
-        picture.save(target)
+
+def _document(paths: Mapping[str, EquilibriumPath]) -> dict[str, Any]:
+    from notchflex.results.files.io import whole_document
+
+    (_, first), *others = paths.items()
+    beside = {label: whole_document(other) for label, other in others}
+    return whole_document(first) | ({"beside": beside} if beside else {})
+
+
+def _picture(paths: Mapping[str, EquilibriumPath], title: str) -> Any:
+    from notchflex.plotting import beside_picture, path_picture
+
+    first, *others = paths.values()
+    if not others:
+        return path_picture(first, title=title)
+    names = [title, *(other.robot.name for other in others)]
+    return beside_picture(paths, title="; ".join(dict.fromkeys(names)))
+
+
+def _is_animation(target: str) -> bool:
+    return Path(target).suffix.lower() in MOVING

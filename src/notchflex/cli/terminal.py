@@ -1,4 +1,4 @@
-"""What a person sees: tables on standard output, everything else on standard error."""
+"""Output for people: tables on standard output, everything else on standard error."""
 
 from __future__ import annotations
 
@@ -8,32 +8,36 @@ import os
 import shutil
 import sys
 import unicodedata
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, TextIO
 
 from notchflex.results.files.streams import let_go
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import TaskID
+    from rich.table import Table
+
+Counted = Callable[[int, int], None]
+"""Takes what is done and all there is."""
 
 NARROW = 80
-"""Columns that tables of fixed shape fit; also what is taken for a terminal of unknown width."""
+"""Columns that tables of fixed shape fit; also the width of a terminal of unknown width."""
 
 WIDE = 160
-"""Columns of tables that are as wide as the terminal, where none shows them."""
+"""Columns of tables as wide as the terminal where there is no terminal."""
 
 NARROWEST = 40
-"""Tables are never made for fewer columns: a line that breaks is better than no table."""
+"""Tables are never made for fewer columns: a broken line is better than no table."""
 
 _PLAIN = {"–": "-", "—": "-", "−": "-", "…": ".", "·": "."}
 
 
 def prepare_streams() -> None:
-    """Make the standard streams of this process fit to be used, whatever they are.
+    """Make the standard streams of this process usable.
 
-    A stream that the caller closed (`>&-`) goes nowhere. Where an encoding lacks a character, one
-    that is near stands in for it: `mm4` for `mm⁴`, and `?` where none is near.
+    A stream that the caller closed (`>&-`) is replaced by the null device. A character that the
+    encoding lacks is replaced by a similar one: `mm4` for `mm⁴`, and `?` where there is none.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -59,7 +63,7 @@ def width() -> int:
     """Return how many columns a table on standard output may have.
 
     Those of the terminal; in a pipe or file a fixed number (`WIDE`), so that the same call writes
-    the same text everywhere. The variable `COLUMNS` says otherwise.
+    the same text everywhere. The variable `COLUMNS` overrides both.
     """
     fallback = NARROW if sys.stdout.isatty() else WIDE
     if sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdecimal():
@@ -81,48 +85,72 @@ def messages() -> Console:
     return _console(sys.stderr)
 
 
+def table(
+    heads: Sequence[str], rows: Iterable[Sequence[str]] = (), *, gap: int = 1, colour: str = ""
+) -> Table:
+    """Return a table without lines.
+
+    Args:
+        heads: Heads of the columns. `>` before one marks numbers, which are aligned to the right
+            and never broken; other cells are folded where they are too long. No head at all is
+            shown where all are empty.
+        rows: The cells of each row.
+        gap: Blanks between two columns.
+        colour: Of the first column, on a terminal.
+    """
+    from rich.table import Table
+
+    made = Table(
+        box=None,
+        padding=(0, gap, 0, 0),
+        header_style="bold",
+        pad_edge=False,
+        show_header=any(heads),
+    )
+    for number, head in enumerate(heads):
+        style = colour if number == 0 else ""
+        if head.startswith(">"):
+            made.add_column(head[1:], justify="right", no_wrap=True, style=style)
+        else:
+            made.add_column(head, overflow="fold", style=style)
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
 def note(text: str) -> None:
     """Write one line of information to standard error; nothing with `--quiet`."""
-    if not _Manner.quiet:
-        _say("Note:", "cyan", text)
+    if not _Quiet.on:
+        _write("Note:", "cyan", text)
 
 
 def warn(text: str) -> None:
     """Write one line of warning to standard error."""
-    _say("Warning:", "yellow", text)
+    _write("Warning:", "yellow", text)
 
 
 def error(text: str) -> None:
-    """Write what is wrong to standard error."""
-    _say("Error:", "bold red", text)
+    """Write an error to standard error."""
+    _write("Error:", "bold red", text)
 
 
-class _Manner:
-    """How this call was asked to behave: set by `be_quiet`, once for each call."""
+class _Quiet:
+    """Whether `--quiet` was given: set by `be_quiet`, once for each call."""
 
-    quiet = False
+    on = False
 
 
 def be_quiet(quiet: bool) -> None:
-    """Say whether only warnings, errors and documents that were asked for are written."""
-    _Manner.quiet = quiet
-
-
-def is_quiet() -> bool:
-    """Tell whether `--quiet` was given: no tables, notes and progress."""
-    return _Manner.quiet
+    """Set whether notes, tables and progress are left out."""
+    _Quiet.on = quiet
 
 
 @contextlib.contextmanager
-def working(text: str) -> Generator[None]:
-    """Show that something is being computed, on a terminal only, and take it away afterwards."""
-    with progress(text):
-        yield
+def working(text: str) -> Generator[Callable[[str], None]]:
+    """Show that something is being computed, on a terminal only, and take it away afterwards.
 
-
-@contextlib.contextmanager
-def progress(text: str) -> Generator[Callable[[str], None]]:
-    """As `working`, for what takes minutes: yields a function that tells what is done now."""
+    Yields a function that shows what is being done now.
+    """
     if not _is_watched():
         yield lambda step: None
         return
@@ -131,25 +159,17 @@ def progress(text: str) -> Generator[Callable[[str], None]]:
 
 
 @contextlib.contextmanager
-def counting(text: str) -> Generator[Callable[[int, int], None]]:
+def counting(text: str) -> Generator[Counted]:
     """Show a bar, on a terminal only: yields a function that takes what is done and all there is.
 
     The bar goes when the work is done; in a pipe, in a log or with `--quiet` there is none.
     """
-    if not _is_watched():
-        yield lambda done, total: None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-    from rich.progress import TimeRemainingColumn as Remaining
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Remaining())
-    with Progress(*columns, console=messages(), transient=True) as bar:
-        task = bar.add_task(text, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+    with bars(text) as tell:
+        yield (lambda done, total: None) if tell is None else partial(tell, text)
 
 
 @contextlib.contextmanager
-def bars() -> Generator[Callable[[str, int, int], None] | None]:
+def bars(first: str = "searching") -> Generator[Callable[[str, int, int], None] | None]:
     """Show how far each stage of a long computation is, on a terminal only.
 
     Yields a function that is called with the stage, how much of it is done, and how much there is;
@@ -162,26 +182,25 @@ def bars() -> Generator[Callable[[str, int, int], None] | None]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, TimeElapsedColumn(), console=messages(), transient=True) as shown:
-        stages: dict[str, TaskID] = {}
+        stages = {first: shown.add_task(first, total=None)}
 
         def tell(stage: str, done: int, total: int) -> None:
             if stage not in stages:
                 stages[stage] = shown.add_task(stage, total=total)
             shown.update(stages[stage], completed=done, total=total)
 
-        tell("searching", 0, 1)
         yield tell
 
 
 def _is_watched() -> bool:
-    return not _Manner.quiet and sys.stderr.isatty()
+    return not _Quiet.on and sys.stderr.isatty()
 
 
-def _say(head: str, style: str, text: str) -> None:
+def _write(head: str, style: str, text: str) -> None:
     from rich.text import Text
 
-    # soft_wrap: a terminal wraps long lines itself, and a log keeps one line a message.
-    with contextlib.suppress(OSError):  # a full disk under a log: nobody can be told
+    # soft_wrap: a terminal wraps long lines itself, and a log keeps one line per message.
+    with contextlib.suppress(OSError):  # a full disk under a log: nowhere to report it
         messages().print(Text.assemble((head, style), " ", text), soft_wrap=True)
         return
     let_go(sys.stderr)
@@ -191,7 +210,7 @@ def _console(stream: TextIO, columns: int | None = None) -> Console:
     from rich.console import Console
 
     class ForgivingConsole(Console):
-        """A console whose reader may go away: what was begun goes on, with its exit code."""
+        """A console whose reader may go away: the work continues, with its exit code."""
 
         def on_broken_pipe(self) -> None:  # rich would end the process with code 1
             del self._buffer[:]

@@ -1,4 +1,4 @@
-"""What `compare` and `calibrate` share: how rows were loaded, and what is said of a table."""
+"""Measurements for `compare` and `calibrate`: how rows were loaded, and notes on a table."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ OnePath = Annotated[
         negative="--from-rest",
         show_default=False,
         help="Take the rows of each pull as one loading path with friction history, or each row as "
-        "loaded from rest. Without either as the file says (column `from_rest`), else as the order "
-        "of its rows says: a force that falls step by step within a pull makes it a path.",
+        "loaded from rest. Without either the column `from_rest` of the file decides, else the "
+        "order of its rows: a force that falls step by step within a pull makes it a path.",
     ),
 ]
 
 
 def from_rest(path: bool | None) -> bool | None:
-    """Return what `read_measurements` takes; None where neither option is given."""
+    """Return the argument of `read_measurements`; None where neither option is given."""
     return None if path is None else not path
 
 
 def note_table(measured: Measurements) -> None:
-    """Say how the rows were understood and what was not used."""
+    """Write how the rows were interpreted and what was not used."""
     if measured.order:
         terminal.note(f"{measured.source}: {measured.order}.")
     if measured.ignored:
@@ -39,6 +39,6 @@ def note_table(measured: Measurements) -> None:
         count = measured.negative_forces
         are = "force is" if count == 1 else "forces are"
         terminal.note(
-            f"{measured.source}: {count} measured {are} negative (sensor offset); the model is "
-            "given 0 N."
+            f"{measured.source}: {count} measured {are} negative (sensor offset); the model "
+            "uses 0 N."
         )

@@ -1,4 +1,4 @@
-"""What `notchflex calibrate` prints."""
+"""Tables of `notchflex calibrate`."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from notchflex.cli import terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from notchflex.fit import Calibration, Interval, LeftOut, NextMeasurement, Posterior
 
-# More candidates than that are thinned.
 _ROWS = 16
+"""More candidates than that are thinned."""
 
 
 def print_calibration(found: Calibration) -> None:
-    """Print constants, how far to trust them, and the errors of every part."""
+    """Print constants, their intervals, problems found, and the errors of every part."""
     from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose
     from notchflex.fit.documents import data_of
 
@@ -31,8 +30,8 @@ def print_calibration(found: Calibration) -> None:
     count = len(found.searches)
     console.print(f"{_numbers(found)}; {count} search{'es' if count > 1 else ''}")
     chi = found.reduced_chi_squared
-    told = f"; reduced chi squared {chi:.3g} (about 1: as noise)" if math.isfinite(chi) else ""
-    console.print(f"{kind} {found.cost:.6g}{told}")
+    noise = f"; reduced chi squared {chi:.3g} (about 1: as noise)" if math.isfinite(chi) else ""
+    console.print(f"{kind} {found.cost:.6g}{noise}")
     console.print()
     _print_constants(console, found)
     console.print()
@@ -43,91 +42,91 @@ def print_calibration(found: Calibration) -> None:
 
 
 def print_left_out(left_out: LeftOut) -> None:
-    """Print what constants fitted without a part make of it."""
+    """Print how well constants fitted without a part predict it."""
     from notchflex.fit.assessment.errors_of_parts import edge
 
-    console = terminal.output()
-    console.print(f"\nFitted without each {left_out.by}, and tried on it (root mean square):")
-    table = _table("left out", "quantity")
-    _number_columns(table, "error", "of fit to all")
-    table.add_column("unit")
+    rows: list[list[str]] = []
     for fold in left_out.folds:
-        if not fold.converged:
-            table.add_row(fold.label, "not solved", "-", "-", "")
+        rows += [] if fold.converged else [[fold.label, "not solved", "-", "-", ""]]
         for name, error in fold.errors.items():
             title, unit, scale = edge(name)
             of_all = fold.errors_of_all.get(name, math.nan) * scale
-            table.add_row(fold.label, title, f"{error * scale:.3g}", _plain(of_all), unit)
-    console.print(table)
-
-
-def print_next(told: NextMeasurement) -> None:
-    """Print how much each candidate would narrow the intervals."""
+            rows.append([fold.label, title, f"{error * scale:.3g}", _plain(of_all), unit])
     console = terminal.output()
-    wanted = ", ".join(told.wanted) or "all constants together"
-    console.print(f"\nNext measurement of {told.label}, to narrow {wanted}:")
-    rows = range(len(told.gain))
-    if len(rows) > _ROWS:
-        rows = np.unique(np.linspace(0, len(rows) - 1, _ROWS).round().astype(int)).tolist()
-        rows = sorted({*rows, told.best})
-    table = _table()
-    _number_columns(table, "candidate", *_load_heads(told), "interval after / before")
-    for row in rows:
-        gain = f"{told.gain[row]:.3f}" if told.converged[row] else "not solved"
-        best = "  best" if row == told.best else ""
-        table.add_row(str(row + 1), *_load_cells(told, row), gain + best.ljust(6))
-    console.print(table)
+    console.print(f"\nFitted without each {left_out.by}, and tried on it (root mean square):")
+    console.print(
+        terminal.table(["left out", "quantity", ">error", ">of fit to all", "unit"], rows)
+    )
+
+
+def print_next(best: NextMeasurement) -> None:
+    """Print how much each candidate would narrow the intervals."""
+    shown = range(len(best.gain))
+    if len(shown) > _ROWS:
+        thinned = np.unique(np.linspace(0, len(shown) - 1, _ROWS).round().astype(int)).tolist()
+        shown = sorted({*thinned, best.best})
+    loads = _loads(best)
+    rows: list[list[str]] = []
+    for row in shown:
+        gain = f"{best.gain[row]:.3f}" if best.converged[row] else "not solved"
+        mark = "  best" if row == best.best else ""
+        cells = [_plain(float(values[row]), 4) for _, values in loads]
+        rows.append([str(row + 1), *cells, gain + mark.ljust(6)])
+    console = terminal.output()
+    wanted = ", ".join(best.wanted) or "all constants together"
+    console.print(f"\nNext measurement of {best.label}, to narrow {wanted}:")
+    heads = ["candidate", *(head for head, _ in loads), "interval after / before"]
+    console.print(terminal.table([f">{head}" for head in heads], rows))
 
 
 def print_posterior(drawn: Posterior) -> None:
-    """Print what the draws tell of every constant."""
-    console = terminal.output()
-    chains, count, _ = drawn.draws.shape
-    console.print(f"\nPosterior, {chains} chains of {count} draws, {drawn.divergent} divergent:")
-    table = _table("constant")
-    _number_columns(table, "mean", "middle 95 %", "deviation", "draws worth", "R-hat")
-    for name in drawn.names:
-        low, high = drawn.intervals[name]
-        table.add_row(
+    """Print mean, interval and convergence of the draws of every constant."""
+    rows = [
+        [
             name,
             f"{drawn.means[name]:.5g}",
-            f"{low:.4g} to {high:.4g}",
+            "{:.4g} to {:.4g}".format(*drawn.intervals[name]),
             f"{drawn.deviations[name]:.2g}",
             f"{drawn.effective[name]:.0f}",
             f"{drawn.unlike[name]:.3f}",
-        )
-    console.print(table)
+        ]
+        for name in drawn.names
+    ]
+    console = terminal.output()
+    chains, count, _ = drawn.draws.shape
+    console.print(f"\nPosterior, {chains} chains of {count} draws, {drawn.divergent} divergent:")
+    heads = ["constant", ">mean", ">middle 95 %", ">deviation", ">effective draws", ">R-hat"]
+    console.print(terminal.table(heads, rows))
 
 
 def _print_constants(console: Console, found: Calibration) -> None:
-    table = _table("constant")
-    _number_columns(table, "value")
-    table.add_column("unit")
-    if found.intervals:
-        _number_columns(table, "95 % interval")
-    _number_columns(table, "deviation")
-    for name, value in found.values.items():
-        ends = [_interval(found.intervals[name])] if name in found.intervals else []
-        table.add_row(
-            name, f"{value:.5g}", found.units[name], *ends, _plain(found.deviations[name], 2)
-        )
-    console.print(table)
+    interval = [">95 % interval"] if found.intervals else []
+    rows = [
+        [
+            name,
+            f"{value:.5g}",
+            found.units[name],
+            *([_interval(found.intervals[name])] if name in found.intervals else []),
+            _plain(found.deviations[name], 2),
+        ]
+        for name, value in found.values.items()
+    ]
+    console.print(terminal.table(["constant", ">value", "unit", *interval, ">deviation"], rows))
 
 
 def _print_errors(console: Console, found: Calibration) -> None:
     from notchflex.fit.assessment.errors_of_parts import errors_of_parts
 
-    table = _table("robot", "measured")
-    _number_columns(table, "rms error", "between repeats")
-    table.add_column("unit")
-    for one in errors_of_parts(found):
-        cells = _plain(one.error), _plain(one.repeats)
-        table.add_row(one.robot, one.title, *cells, one.unit)
-    console.print(table)
+    heads = ["robot", "measured", ">rms error", ">between repeats", "unit"]
+    rows = [
+        [one.robot, one.title, _plain(one.error), _plain(one.repeats), one.unit]
+        for one in errors_of_parts(found)
+    ]
+    console.print(terminal.table(heads, rows))
 
 
 def _numbers(found: Calibration) -> str:
-    """How many numbers count, and how many do not."""
+    """Return how many numbers count, and how many do not."""
     counted = found.counted
     words = f"{counted} number{'s' * (counted > 1)} measured"
     rest = len(found.residuals) - counted
@@ -145,34 +144,12 @@ def _plain(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
-def _load_heads(told: NextMeasurement) -> list[str]:
-    return [f"{name} {number + 1} {unit}" for name, unit, number, _ in _loads(told)]
-
-
-def _load_cells(told: NextMeasurement, row: int) -> list[str]:
-    return [_plain(float(values[row]), 4) for _, _, _, values in _loads(told)]
-
-
-def _loads(told: NextMeasurement) -> list[tuple[str, str, int, np.ndarray]]:
-    """What is commanded of each tendon: its name, unit, number and values."""
-    columns = (("tension", "N", told.loads.tension), ("stroke", "mm", told.loads.stroke))
+def _loads(best: NextMeasurement) -> list[tuple[str, np.ndarray]]:
+    """Return head and values of each commanded column."""
+    columns = (("tension", "N", best.loads.tension), ("stroke", "mm", best.loads.stroke))
     return [
-        (name, unit, tendon, table[:, tendon])
+        (f"{name} {tendon + 1} {unit}", table[:, tendon])
         for name, unit, table in columns
         for tendon in range(table.shape[1])
         if np.isfinite(table[:, tendon]).any()
     ]
-
-
-def _table(*names: str) -> Table:
-    from rich.table import Table
-
-    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
-    for name in names:  # what is long is folded, so that the numbers stay whole
-        table.add_column(name, overflow="fold")
-    return table
-
-
-def _number_columns(table: Table, *names: str) -> None:
-    for name in names:
-        table.add_column(name, justify="right", no_wrap=True)

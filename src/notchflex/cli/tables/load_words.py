@@ -16,7 +16,7 @@ MOST_LOADS = 3
 
 
 def load_sentences(external: Sequence[ExternalLoad]) -> list[str]:
-    """Return lines that say what acts from outside, and at which steps if not at all of them."""
+    """Return lines with the external loads, and their steps if not at all of them."""
     different = list(dict.fromkeys(external))
     if all(one.is_nothing for one in different):
         return []
@@ -40,7 +40,7 @@ def _steps(steps: list[int]) -> str:
 
 
 def in_words(load: ExternalLoad) -> str:
-    """Say what acts from outside.
+    """Return external loads in words.
 
     Example:
         >>> from notchflex.loads import ExternalLoad

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import textwrap
 from itertools import groupby, pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.table import Table
 
 from notchflex.cli import terminal
 from notchflex.robot import Robot
+from notchflex.robot.robot import to_table
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 NO_NUMBER = "–"
 CLOSES, NEVER, NOT_FOUND = "closes", "never", "not found"
@@ -18,8 +22,49 @@ _MEANINGS = {
     NOT_FOUND: "the solver did not converge at the tensions in question, so the notch may close; "
     "`notchflex simulate` shows how far it bends",
 }
+_UNITS = {
+    "elastic_modulus": "MPa",
+    "superelastic_modulus": "MPa",
+    "plastic_modulus": "MPa",
+    "density": "kg/m3",
+}
 SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
 """Heads for what every notch has, so that there is room for what is its own."""
+
+
+def print_robot(robot: Robot, title: str, length: float, notches: list[dict[str, Any]]) -> None:
+    """Print what `notchflex show` shows.
+
+    Args:
+        robot: The robot.
+        title: The first line.
+        length: Length of the robot, mm.
+        notches: The rows of `analysis.notch_table`.
+    """
+    console = terminal.output()
+    tube = robot.tube
+    console.print(title, style="bold", soft_wrap=True)
+    console.print(
+        f"tube      outer diameter {tube.outer_diameter:g} mm, inner diameter "
+        f"{tube.inner_diameter:g} mm, length {length:g} mm"
+    )
+    for title in ("material", "friction"):
+        console.print(_hanging(title, _summary(to_table(robot)[title])))
+    for index, tendon in enumerate(robot.tendon, start=1):
+        number = f" {index}" if len(robot.tendon) > 1 else ""
+        end = robot.number_of_notches if tendon.end_body is None else tendon.end_body
+        console.print(
+            f"tendon{number}".ljust(10)
+            + f"radius {tendon.radius:g} mm, direction {tendon.direction_deg:g} deg, "
+            f"{tendon.path}, ends behind notch {end}"
+        )
+    console.print()
+    for table in description_tables(robot):
+        console.print(table)
+        console.print()
+    console.print(closing_table(notches))
+    console.print()
+    console.print(textwrap.fill(closing_legend(notches), width=terminal.NARROW - 1))
 
 
 def description_tables(robot: Robot) -> list[Table]:
@@ -132,9 +177,21 @@ def _filled(heads: list[str], rows: list[list[str]]) -> Table:
         for place, head in enumerate(heads)
     ]
     gap = 2 if sum(widths) + 2 * len(widths) <= terminal.NARROW else 1
-    table = Table(box=None, padding=(0, gap, 0, 0), header_style="bold", pad_edge=False)
-    for head in heads:
-        table.add_column("\n" * (deepest - head.count("\n")) + head, justify="right")
-    for row in rows:
-        table.add_row(*row)
-    return table
+    heads = ["\n" * (deepest - head.count("\n")) + head for head in heads]
+    return terminal.table([f">{head}" for head in heads], rows, gap=gap)
+
+
+def _summary(table: dict[str, Any]) -> str:
+    """Return the values of a part in one line."""
+    words = [str(table["kind"])]
+    for key, value in table.items():
+        if key != "kind":
+            shown = value if isinstance(value, str) else f"{value:g}"
+            words.append(f"{key.replace('_', ' ')} {shown} {_UNITS.get(key, '')}".strip())
+    return ", ".join(words)
+
+
+def _hanging(title: str, text: str) -> str:
+    return textwrap.fill(
+        text, width=terminal.NARROW, initial_indent=title.ljust(10), subsequent_indent=" " * 10
+    )

@@ -43,7 +43,7 @@ MEANINGS = {
     "tip_position": "tip position in the world",
     "strain": "largest strain of all notches",
 }
-"""What the legend says; other quantities are called by their titles."""
+"""Texts of the legend; other quantities have their titles there."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Group:
         names: The quantities, as `--columns` takes them; none for the number of the step.
         rank: Groups of a low rank are shown first.
         columns: The columns, in their place in the table.
-        meaning: What the legend says of them, "" for nothing.
+        meaning: Their text in the legend, "" for none.
     """
 
     names: tuple[str, ...]
@@ -109,7 +109,7 @@ def usual_groups(path: EquilibriumPath, rows: Sequence[int]) -> list[Group]:
     groups.append(_group(path, rows, "total_angle", 2))
     tip = _group(path, rows, "tip_position", 2)
     if not np.nanmax(np.abs(path.tip_position[:, 1]), initial=0.0) > 1e-9:
-        del tip.columns[1]  # what stays in its plane has nothing across it
+        del tip.columns[1]  # a planar robot has no coordinate across its plane
     groups.append(tip)
     peak = np.abs(path.peak_strain).max(axis=1)
     cells = [f"{100 * peak[row]:.2f}" if path.converged[row] else NO_NUMBER for row in rows]
@@ -128,9 +128,6 @@ def parse_columns(text: str) -> list[str]:
 
     Args:
         text: Names of the table of quantities, joined by commas.
-
-    Raises:
-        InputError: A name that is not known, twice the same, or none.
 
     Example:
         >>> parse_columns("tension, notch_angle")
@@ -175,7 +172,7 @@ def _components(path: EquilibriumPath, rows: Sequence[int], quantity: Quantity) 
         if quantity.per in (("tendon", "span"), ("tendon", "contact")) and not _any(component):
             continue  # a tendon that ends before the others has fewer
         cells = [
-            _cell(quantity, component[row]) if _is_told(path, quantity, row) else NO_NUMBER
+            _cell(quantity, component[row]) if _is_valid(path, quantity, row) else NO_NUMBER
             for row in rows
         ]
         columns.append(_marked(path, rows, quantity, index, cells))
@@ -215,7 +212,7 @@ def _unit(quantity: Quantity) -> str:
     return "%" if quantity.name in PERCENT else quantity.unit
 
 
-def _is_told(path: EquilibriumPath, quantity: Quantity, row: int) -> bool:
+def _is_valid(path: EquilibriumPath, quantity: Quantity, row: int) -> bool:
     always = ("commanded_tension", "commanded_stroke", "converged", "reason", "residual")
     return bool(path.converged[row]) or quantity.name in (*always, "iterations")
 

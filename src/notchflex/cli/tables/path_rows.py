@@ -80,17 +80,13 @@ def _extremes(path: EquilibriumPath) -> set[int]:
 
 
 def _commanded(path: EquilibriumPath) -> list[np.ndarray]:
-    """The columns of what was commanded; the tensions of what was not are no commands."""
+    """Return the commanded columns; the tension of a tendon with a stroke is not commanded."""
     columns = [*np.asarray(path.commanded_tension).T, *np.asarray(path.commanded_stroke).T]
     return [column for column in columns if np.isfinite(column).any()]
 
 
 def all_rows(path: EquilibriumPath) -> tuple[list[int], int]:
-    """Return every step of a path, as `shown_rows` does.
-
-    Raises:
-        InputError: The path is longer than a terminal can hold.
-    """
+    """Return every step of a path, as `shown_rows` does."""
     if len(path) > _MOST_ALL:
         raise InputError.UNSUPPORTED(
             f"--all: a table of {len(path):,} rows; write them with --csv FILE instead "

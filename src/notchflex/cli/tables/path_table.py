@@ -6,8 +6,6 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-
 from notchflex.cli import terminal
 from notchflex.cli.tables.load_words import load_sentences
 from notchflex.cli.tables.path_columns import Column, Group, named_groups, step_group, usual_groups
@@ -31,9 +29,6 @@ def print_path(
         columns: Quantities to show, by their names; none for the usual ones. The usual ones that
             do not fit are left out and named, those that were asked for are continued below.
         every_row: Whether all steps of a long path are shown.
-
-    Raises:
-        InputError: All rows of a path that is too long for a terminal.
     """
     rows, stride = all_rows(path) if every_row else shown_rows(path)
     room = terminal.width()
@@ -131,12 +126,11 @@ def _columns(groups: Sequence[Group]) -> list[Column]:
 def _print_block(
     console: Console, path: EquilibriumPath, rows: Sequence[int], columns: Sequence[Column]
 ) -> None:
-    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
     # Units stand on one line at the foot of the heads.
     deepest = max(column.head.count("\n") for column in columns)
-    for column in columns:
-        above = "\n" * (deepest - column.head.count("\n"))
-        table.add_column(f"{above}{column.head}\n{column.unit}", justify="right", no_wrap=True)
+    above = ["\n" * (deepest - column.head.count("\n")) for column in columns]
+    heads = [f">{gap}{one.head}\n{one.unit}" for gap, one in zip(above, columns, strict=True)]
+    table = terminal.table(heads)
     for place, row in enumerate(rows):
         style = None if path.converged[row] else "red"
         table.add_row(*(column.cells[place] for column in columns), style=style)
@@ -146,12 +140,12 @@ def _print_block(
 def _print_notes(
     console: Console, shown: Sequence[Group], left_out: Sequence[Group], room: int
 ) -> None:
-    """Say what the heads mean, and how to see what had no room."""
+    """Explain the heads, and how to see what had no room."""
     meanings = dict.fromkeys(group.meaning for group in shown if group.meaning and group.columns)
     empty = [name for group in shown if not group.columns for name in group.names]
     lines = [f"{'; '.join(meanings)}."] if meanings else []
     if empty:
-        lines.append(f"Nothing is known of {', '.join(empty)} on this path.")
+        lines.append(f"This path has no values of {', '.join(empty)}.")
     if left_out:
         names = ",".join(dict.fromkeys(name for group in left_out for name in group.names))
         titles = ", ".join(dict.fromkeys(_title(group) for group in left_out))

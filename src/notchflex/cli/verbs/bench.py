@@ -5,40 +5,37 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
-from rich.table import Table
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.options import JsonFile, Quiet
-from notchflex.results.files.writing import STANDARD_OUTPUT, check_output
+from notchflex.cli.outputs import JsonFile, Outputs, Quiet
 
 if TYPE_CHECKING:
     from notchflex.bench import Row
 
-Only = Annotated[
-    str | None,
-    Parameter(help="Time only what has this text in its name, such as `wrist`."),
-]
 
-
-def bench(*, only: Only = None, json: JsonFile = None, quiet: Quiet = False) -> None:
+def bench(
+    *,
+    only: Annotated[
+        str | None,
+        Parameter(metavar="TEXT", help="Time only cases with this text in their name: `wrist`."),
+    ] = None,
+    json: JsonFile = None,
+    quiet: Quiet = False,
+) -> None:
     """Time the solver on this machine.
 
     Times are medians in multiples of LU135, one solution of 135 linear equations by NumPy on one
-    core in the same run. All of it takes some minutes, on a machine that should do nothing else.
+    core in the same run. All cases take some minutes, on a machine that should be otherwise idle.
     """
-    terminal.be_quiet(quiet)
-    if json is not None:
-        check_output(json, "--json")
-    with terminal.progress("timing") as told:
+    outputs = Outputs(quiet=quiet, json=json)
+    with terminal.working("timing") as progress:
         from notchflex.bench import bench_document, measured
         from notchflex.cli.compile_cache import use_compile_cache
-        from notchflex.results.files.json import write_json
 
         use_compile_cache()
-        rows = measured(only, told)
-    if json is not None:
-        write_json(json, bench_document(rows))
-    if json != STANDARD_OUTPUT and not quiet:
+        rows = measured(only, progress)
+    outputs.write_json(lambda: bench_document(rows))
+    if outputs.prints_tables:
         _print(rows)
 
 
@@ -46,24 +43,18 @@ def _print(rows: list[Row]) -> None:
     from notchflex.bench import MEASURED, PEERS
 
     console = terminal.output()
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    table.add_column("what", style="cyan")
-    for name in ("time", "LU135", "target"):
-        table.add_column(name, justify="right", no_wrap=True)
+    cells: list[list[str]] = []
     for row in rows:
-        table.add_row(row.name, _time(row.us), _multiple(row.lu135), _multiple(row.target))
-        if row.note:
-            table.add_row(f"  {row.note}", "", "", "")
-    console.print(table)
-    others = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    others.add_column("others", style="cyan")
-    others.add_column("what")
-    others.add_column("time", justify="right", no_wrap=True)
-    for peer in PEERS:
-        span = [_time(1e3 * ms) for ms in dict.fromkeys(peer.ms)]
-        others.add_row(peer.name, peer.what, " to ".join(span))
+        cells.append([row.name, _time(row.us), _multiple(row.lu135), _multiple(row.target)])
+        cells += [[f"  {row.note}"]] if row.note else []
+    heads = ["what", ">time", ">LU135", ">target"]
+    console.print(terminal.table(heads, cells, gap=2, colour="cyan"))
     console.print()
-    console.print(others)
+    peers = [
+        [name, what, " to ".join(_time(1e3 * one) for one in dict.fromkeys(ms))]
+        for name, what, ms in PEERS
+    ]
+    console.print(terminal.table(["others", "what", ">time"], peers, gap=2, colour="cyan"))
     console.print(f"Others: {MEASURED}.")
 
 

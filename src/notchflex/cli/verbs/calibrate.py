@@ -1,142 +1,66 @@
-"""`notchflex calibrate`: from measurements to constants with error bars."""
+"""`notchflex calibrate`: from measurements to constants with confidence intervals."""
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Generator
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.calibrate_words import (
-    PAIR,
-    Given,
-    check_beyond,
-    check_options,
-    check_sensor,
-    parse_fit,
-    parse_pairs,
-    robots_of,
+from notchflex.cli.arguments.fit import (
+    BeyondFit,
+    DataSources,
+    FitOptions,
+    ParameterSpec,
+    Sources,
 )
+from notchflex.cli.arguments.loads import load_columns
 from notchflex.cli.arguments.measured import OnePath, from_rest, note_table
-from notchflex.cli.arguments.options import OUTPUT, JsonFile, PlotFile, Settings, robot_files
-from notchflex.cli.arguments.spec import load_columns
+from notchflex.cli.arguments.robots import Settings
+from notchflex.cli.exit_codes import BAD_INPUT, DONE, NOT_CONVERGED
+from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
 from notchflex.errors import InputError
-from notchflex.results.files.writing import (
-    STANDARD_OUTPUT,
-    check_distinct,
-    check_folder,
-    check_output,
-    check_picture,
-)
+from notchflex.results.files.writing import check_folder
 
 if TYPE_CHECKING:
-    from notchflex.fit import Calibration, LeftOut, NextMeasurement, Posterior
-    from notchflex.fit.estimation.objective import FitObjective
-
-MORE = Group("Beyond the fit", sort_key=8)
-
-_MANY: Any = Parameter(negative=(), show_default=False)
-Named = Annotated[tuple[str, ...], _MANY]
+    from notchflex.fit import Calibration
+    from notchflex.loads import LoadPath
 
 
 def calibrate(
-    *pairs: Annotated[
-        str,
-        Parameter(
-            help=f"{PAIR}: a robot (ready, or a file) and what was measured of it (the columns of "
-            "`notchflex.read_measurements`). The same robot again adds more data; a label tells "
-            "two robots of one file apart."
-        ),
-    ],
-    fit: Annotated[
-        Named,
-        Parameter(
-            help="Constants to find, joined by commas: values of the robot file, shared by all "
-            "robots; `LABEL:` before one for a single robot, `each:` for one in every robot, "
-            "`notch[each].` for one in every notch; `sensor.force_offset`, `sensor.stroke_slack`."
-        ),
-    ],
-    bounds: Annotated[
-        Named, Parameter(help="Limits of a constant, `NAME=LOW:HIGH`, in its unit.")
-    ] = (),
-    prior: Annotated[
-        Named, Parameter(help="What is known of a constant beforehand, `NAME=MEAN+-SD`.")
-    ] = (),
-    objective: Annotated[
-        Literal["least-squares", "robot-errors", "distances"],
-        Parameter(
-            help="What is made small: squares over their noise; eq. 17 of Pacheco 2021; the sum of "
-            "distances of points (Gao 2017, eq. 27). Only the first gives intervals."
-        ),
-    ] = "least-squares",
-    huber: Annotated[
-        float | None,
-        Parameter(help="Outliers beyond so many standard deviations count less; about 1.5."),
-    ] = None,
-    starts: Annotated[int, Parameter(help="From how many places to search.")] = 4,
-    seed: Annotated[int, Parameter(help="Of the places.")] = 0,
+    *pairs: Sources,
+    search: FitOptions,
     path: OnePath = None,
-    leave_out: Annotated[
-        Literal["pull", "robot"] | None,
-        Parameter(group=MORE, help="Also fit without each pull or robot, and try that on it."),
-    ] = None,
-    next_: Annotated[
-        Named,
-        Parameter(
-            name="--next",
-            group=MORE,
-            help="Candidates for the next measurement: tensions [N] as in `simulate --tension`. "
-            "Tells which narrows the intervals most.",
-        ),
-    ] = (),
-    next_robot: Annotated[
-        str | None,
-        Parameter(group=MORE, help="Label of the robot of `--next`; the first if left out."),
-    ] = None,
-    narrow: Annotated[
-        Named,
-        Parameter(
-            group=MORE, help="Constant that `--next` is to narrow; all together if left out."
-        ),
-    ] = (),
-    posterior: Annotated[
-        bool,
-        Parameter(negative=(), group=MORE, help="Also draw from the posterior (extra `bayes`)."),
-    ] = False,
-    draws: Annotated[
-        int, Parameter(group=MORE, help="Draws of each of the two chains of `--posterior`.")
-    ] = 500,
+    beyond: BeyondFit = BeyondFit(),  # noqa: B008 - frozen
     settings: Settings = (),
     output: Annotated[
         str | None,
         Parameter(
             name=("--output", "-o"),
             group=OUTPUT,
+            metavar="FOLDER",
             help="Write the fitted robots into this folder, LABEL.toml each, with their comments.",
         ),
     ] = None,
     json: JsonFile = None,
     plot: PlotFile = None,
 ) -> int:
-    """Find constants of robots from measurements, with how far to trust them.
+    """Find constants of robots from measurements, with confidence intervals.
 
-    Prints every constant with its 95 % interval (profile likelihood; `open` where the data set no
-    end), what the data cannot tell, and the errors of every notch beside how well it repeats.
+    Prints every constant with its 95 % interval (profile likelihood; `open` where the data do not
+    bound it), what the data cannot determine, and the errors of every notch beside their
+    repeatability.
     """
-    given = parse_pairs(pairs)
-    wanted = parse_fit(fit, bounds, prior)
-    check_options(objective, huber, starts, seed, next_, next_robot, narrow, given)
-    check_beyond(objective, posterior, draws, leave_out, given)
-    inputs = _inputs(given)
-    _check_targets(given, inputs, output, json, plot)
-    robots = robots_of(given, settings)
+    sources = DataSources.of(pairs)
+    constants = search.constants()
+    beyond.check(sources, search.objective)
+    outputs = Outputs(sources.files, files=_fitted_files(sources, output), json=json, plot=plot)
+    robots = sources.load(settings)
     candidates = None
-    if next_:
-        one = robots[next_robot or next(iter(robots))]
-        candidates = load_columns(next_, (), one.number_of_tendons, option="--next")
+    if beyond.next:
+        robot = robots[beyond.next_robot or next(iter(robots))]
+        candidates = load_columns(beyond.next, (), robot.number_of_tendons)
 
     with terminal.working("loading the solver"):
         from notchflex.cli.compile_cache import use_compile_cache
@@ -145,145 +69,128 @@ def calibrate(
         import notchflex.fit as fitting
         from notchflex.loads import LoadPath
 
-    check_sensor([one.name for one in wanted])
+    _check_sensor(constants)
     measured = {
         label: [
             fitting.read_measurements(file, robots[label], from_rest=from_rest(path))
             for file in files
         ]
-        for label, files in given.data.items()
+        for label, files in sources.data.items()
     }
     for one in (one for every in measured.values() for one in every):
         note_table(one)
-    constants = [fitting.Constant(*one) for one in wanted]
-    aim = _objective(objective, huber)
-    told: NextMeasurement | None = None
-    drawn: Posterior | None = None
-    left: LeftOut | None = None
     with terminal.bars() as progress:
-        ways: dict[str, Any] = {"objective": aim, "seed": seed, "progress": progress}
-        found = fitting.calibrate(robots, measured, constants, starts=starts, **ways)
-        # What the fit turns out not to allow beyond it must not lose the fit.
-        undone: list[str] = []
-        if leave_out is not None:
-            with _noting(undone, "--leave-out"):
-                left = fitting.leave_out(found, by=leave_out, seed=seed, progress=progress)
-        if candidates is not None:
-            loads = LoadPath(*candidates)
-            with _noting(undone, "--next"):
-                told = fitting.next_measurement(found, loads, robot=next_robot, narrow=narrow)
-        if posterior:
-            with _noting(undone, "--posterior"):
-                drawn = fitting.sample_posterior(found, draws=draws, seed=seed, progress=progress)
-    _write(found, left, told, drawn, inputs, output=output, json=json, plot=plot)
-    if json != STANDARD_OUTPUT:
-        _print(found, left, told, drawn)
-    code = _say_what_matters(found)
-    if not undone:
-        return code
-    from notchflex.cli.app import BAD_INPUT
-
-    for problem in undone:
-        terminal.error(problem)
-    return BAD_INPUT
-
-
-@contextlib.contextmanager
-def _noting(undone: list[str], option: str) -> Generator[None]:
-    """Keep what an option cannot do, to be told after the fit."""
-    try:
-        yield
-    except InputError as problem:
-        undone.append(f"{option}: {problem}")
-
-
-def _inputs(given: Given) -> list[Path]:
-    """The files that are read."""
-    data = [Path(file) for files in given.data.values() for file in files]
-    return data + [file for name in given.robot.values() for file in robot_files(name)]
-
-
-def _check_targets(
-    given: Given, inputs: list[Path], output: str | None, json: str | None, plot: str | None
-) -> None:
-    """Check where results go; no file that is read may be replaced."""
-    targets = {"--json": json, "--plot": plot}
-    if output is not None:
-        names = [f"{label}.toml" for label in given.robot]
-        files = check_folder(output, names, "--output", inputs=inputs)
-        targets |= {f"--output ({file.name})": str(file) for file in files}
-    check_distinct(targets)
-    if json is not None:
-        check_output(json, "--json", inputs=inputs)
-    if plot is not None:
-        check_picture(plot, "--plot", inputs=inputs)
-
-
-def _objective(name: str, huber: float | None) -> FitObjective:
-    from notchflex.fit import LeastSquares, SumOfDistances, SumOfRobotErrors
-
-    if name == "robot-errors":
-        return SumOfRobotErrors()
-    return SumOfDistances() if name == "distances" else LeastSquares(huber)
-
-
-def _write(
-    found: Calibration,
-    left: LeftOut | None,
-    told: NextMeasurement | None,
-    drawn: Posterior | None,
-    inputs: list[Path],
-    *,
-    output: str | None,
-    json: str | None,
-    plot: str | None,
-) -> None:
-    from notchflex.fit import documents
-
+        found = fitting.calibrate(
+            robots,
+            measured,
+            [fitting.Constant(*one) for one in constants],
+            starts=search.starts,
+            objective=search.fit_objective(),
+            seed=search.seed,
+            progress=progress,
+        )
+        loads = None if candidates is None else LoadPath(*candidates)
+        analyses, problems = _analyse(found, beyond, loads, search.seed, progress)
     if output is not None:
         from notchflex.fit.fitted_robots import write_fitted
 
-        files = write_fitted(found, output, inputs=inputs)
+        files = write_fitted(found, output, inputs=sources.files)
         terminal.note(f"written: {', '.join(map(str, files))}.")
-    if json is not None:
-        from notchflex.results.files.json import write_json
-
-        document = documents.calibration_document(found)
-        if left is not None:
-            document["left_out"] = documents.left_out_document(left)
-        if told is not None:
-            document["next_measurement"] = documents.next_measurement_document(told)
-        if drawn is not None:
-            document["posterior"] = documents.posterior_document(drawn)
-        write_json(json, document)
-    if plot is not None:
-        with terminal.working(f"drawing {plot}"):
-            from notchflex.plotting import calibration_picture
-
-            calibration_picture(found).save(plot)
+    _write(found, analyses, outputs)
+    for problem in problems:
+        terminal.error(problem)
+    if not found.converged:
+        terminal.error(f"not converged: {found.reason}. Try --starts or --bounds.")
+    return BAD_INPUT if problems else DONE if found.converged else NOT_CONVERGED
 
 
-def _print(
+def _check_sensor(constants: Sequence[ParameterSpec]) -> None:
+    """Refuse an unknown constant of the measurement, which is in no robot file."""
+    from notchflex.fit.model.rows import SENSOR
+
+    for name, *_ in constants:
+        path = name.rpartition(":")[2]
+        if path.startswith("sensor.") and path not in SENSOR:
+            raise InputError.UNKNOWN_NAME(f"--fit {name}: give {' or '.join(SENSOR)}.")
+
+
+def _fitted_files(sources: DataSources, folder: str | None) -> dict[str, str]:
+    """Return the files of `--output`, checked, by the words that messages call them by."""
+    if folder is None:
+        return {}
+    names = [f"{label}.toml" for label in sources.robots]
+    files = check_folder(folder, names, "--output", inputs=sources.files)
+    return {f"--output ({file.name})": str(file) for file in files}
+
+
+def _analyse(
     found: Calibration,
-    left: LeftOut | None,
-    told: NextMeasurement | None,
-    drawn: Posterior | None,
-) -> None:
+    beyond: BeyondFit,
+    candidates: LoadPath | None,
+    seed: int,
+    progress: Callable[[str, int, int], None] | None,
+) -> tuple[dict[str, Any], list[str]]:
+    """Make the analyses beyond the fit; one that fails must not lose the fit.
+
+    Returns:
+        The results by their JSON keys, and what failed.
+    """
+    import notchflex.fit as fitting
+
+    wanted: dict[str, tuple[str, Callable[[], object]]] = {}
+    if beyond.leave_out is not None:
+        by = beyond.leave_out
+        wanted["left_out"] = (
+            "--leave-out",
+            lambda: fitting.leave_out(found, by=by, seed=seed, progress=progress),
+        )
+    if candidates is not None:
+        wanted["next_measurement"] = (
+            "--next",
+            lambda: fitting.next_measurement(
+                found, candidates, robot=beyond.next_robot, narrow=beyond.narrow
+            ),
+        )
+    if beyond.posterior:
+        wanted["posterior"] = (
+            "--posterior",
+            lambda: fitting.sample_posterior(
+                found, draws=beyond.draws, seed=seed, progress=progress
+            ),
+        )
+    results: dict[str, Any] = {}
+    problems: list[str] = []
+    for key, (option, compute) in wanted.items():
+        try:
+            results[key] = compute()
+        except InputError as problem:
+            problems.append(f"{option}: {problem}")
+    return results, problems
+
+
+def _write(found: Calibration, analyses: dict[str, Any], outputs: Outputs) -> None:
     from notchflex.cli.tables import calibrate_tables as tables
+    from notchflex.fit import documents
 
-    tables.print_calibration(found)
-    if left is not None:
-        tables.print_left_out(left)
-    if told is not None:
-        tables.print_next(told)
-    if drawn is not None:
-        tables.print_posterior(drawn)
+    make: dict[str, tuple[Callable[[Any], Any], Callable[[Any], None]]] = {
+        "left_out": (documents.left_out_document, tables.print_left_out),
+        "next_measurement": (documents.next_measurement_document, tables.print_next),
+        "posterior": (documents.posterior_document, tables.print_posterior),
+    }
 
+    def picture() -> Any:
+        from notchflex.plotting import calibration_picture
 
-def _say_what_matters(found: Calibration) -> int:
-    from notchflex.cli.app import DONE, NOT_CONVERGED
+        return calibration_picture(found)
 
-    if found.converged:
-        return DONE
-    terminal.error(f"not converged: {found.reason}. Try --starts or --bounds.")
-    return NOT_CONVERGED
+    outputs.write_json(
+        lambda: (
+            documents.calibration_document(found)
+            | {key: make[key][0](value) for key, value in analyses.items()}
+        )
+    )
+    outputs.save_picture(picture)
+    if outputs.prints_tables:
+        tables.print_calibration(found)
+        for key, value in analyses.items():
+            make[key][1](value)

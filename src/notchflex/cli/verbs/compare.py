@@ -2,37 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
-from notchflex._quantity import DEGREES
 from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import texts
 from notchflex.cli.arguments.measured import OnePath, from_rest, note_table
-from notchflex.cli.arguments.options import (
-    CsvFile,
-    JsonFile,
-    PlotFile,
-    Quiet,
-    RobotName,
-    Settings,
-    chosen_robot,
-    robot_files,
-    variant,
-)
-from notchflex.results.files.writing import (
-    STANDARD_OUTPUT,
-    check_distinct,
-    check_output,
-    check_picture,
-)
+from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files, variant
+from notchflex.cli.exit_codes import DONE, NOT_CONVERGED
+from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
 
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison
-
-MOST_COLUMNS = 8
-"""Numbers side by side in one table; more of them go below."""
 
 
 def compare(
@@ -41,7 +23,7 @@ def compare(
         str,
         Parameter(
             help="CSV of measurements: `tendon_force_N` or `tendon_displacement_mm`, with some of "
-            "`notch_1_deg`, `notch_2_deg`, ... base to tip, `total_deg` and `tip_x_mm`; if wanted "
+            "`notch_1_deg`, `notch_2_deg`, ... base to tip, `total_deg` and `tip_x_mm`; optionally "
             "`trial`. All columns that `notchflex.read_measurements` reads."
         ),
     ],
@@ -50,11 +32,10 @@ def compare(
     path: OnePath = None,
     beside: Annotated[
         tuple[str, ...],
-        Parameter(
-            name="--beside",
-            negative=(),
-            show_default=False,
-            help="Also compare the same robot with other values, written "
+        texts(
+            "--beside",
+            "VARIANT",
+            "Also compare the same robot with other values, written "
             '`"LABEL: PATH=VALUE, PATH=VALUE"`, or `kinematics` for the model that shares the '
             "stroke equally over the notches. May be given several times.",
         ),
@@ -69,27 +50,17 @@ def compare(
 
     Prints the root-mean-square error of every notch, of the total angle and of the tip, as far as
     they were measured. Where the tip was not measured it is the forward kinematics of the measured
-    angles. A negative force is the offset of a sensor: it stays in the table, and the model is
-    given 0 N.
+    angles. A negative force is the offset of a sensor: it stays in the table, and the model uses
+    0 N.
     """
-    terminal.be_quiet(quiet)
-    inputs = [*robot_files(robot), data]
-    check_distinct({"--json": json, "--csv": csv, "--plot": plot})
-    for option, target in (("--json", json), ("--csv", csv)):
-        if target is not None:
-            check_output(target, option, inputs=inputs)
-    if plot is not None:
-        check_picture(plot, "--plot", inputs=inputs)
+    outputs = Outputs([*robot_files(robot), data], quiet=quiet, json=json, csv=csv, plot=plot)
     chosen = chosen_robot(robot, settings)
-    variants = [_variant(text) for text in beside]
+    values = dict(_variant(text) for text in beside)
 
     from notchflex.fit.measurements.csv import read_measurements
 
     measured = read_measurements(data, chosen, from_rest=from_rest(path))
-    robots = {
-        label: chosen if values is None else chosen.with_values(values)
-        for label, values in variants
-    }
+    robots = {label: chosen.with_values(one) for label, one in values.items() if one is not None}
     with terminal.counting(f"solving {len(measured)} rows of {chosen.name}") as counted:
         from notchflex.cli.compile_cache import use_compile_cache
 
@@ -98,105 +69,51 @@ def compare(
 
         comparison = comparing.compare(chosen, measured)
         others: dict[str, Comparison] = {}
-        for number, (label, values) in enumerate(variants, 1):
-            counted(number, 1 + len(variants))
+        for number, label in enumerate(values, 1):
+            counted(number, 1 + len(values))
             others[label] = (
-                comparing.compare_kinematics(comparison)
-                if values is None
-                else comparing.compare(robots[label], measured)
+                comparing.compare(robots[label], measured)
+                if label in robots
+                else comparing.compare_kinematics(comparison)
             )
-    _write(comparison, others, json=json, csv=csv, plot=plot)
-    if STANDARD_OUTPUT not in (json, csv) and not quiet:
-        _print(comparison, others)
-    return _say_what_matters(comparison, others)
+    _write(comparison, others, outputs)
+    if outputs.prints_tables:
+        from notchflex.cli.tables.compare_table import print_comparison
+
+        print_comparison(comparison, others)
+    return _report(comparison, others)
 
 
 def _variant(text: str) -> tuple[str, list[tuple[str, object]] | None]:
-    """Read what stands beside; None stands for the kinematic model."""
+    """Read one `--beside`; no values stand for the kinematic model."""
     if text.strip() == "kinematics":
         return "kinematics", None
     return variant(text, "kinematics, or ")
 
 
-def _write(
-    comparison: Comparison,
-    others: dict[str, Comparison],
-    *,
-    json: str | None,
-    csv: str | None,
-    plot: str | None,
-) -> None:
+def _write(comparison: Comparison, others: dict[str, Comparison], outputs: Outputs) -> None:
     from notchflex.comparison import comparison_columns, comparison_document, errors_document
 
-    if json is not None:
-        from notchflex.results.files.json import write_json
+    def document() -> dict[str, Any]:
+        beside = {label: errors_document(other) for label, other in others.items()}
+        return comparison_document(comparison) | ({"beside": beside} if beside else {})
 
-        document = comparison_document(comparison)
-        if others:
-            document["beside"] = {label: errors_document(other) for label, other in others.items()}
-        write_json(json, document)
-    if csv is not None:
+    def picture() -> Any:
+        from notchflex.plotting import comparison_picture
+
+        return comparison_picture(comparison, others)
+
+    outputs.write_json(document)
+    if target := outputs.targets.get("csv"):
         from notchflex.results.files.csv import write_csv
 
         columns = comparison_columns(comparison)
-        write_csv(csv, list(columns), zip(*columns.values(), strict=True))
-    if plot is not None:
-        with terminal.working(f"drawing {plot}"):
-            from notchflex.plotting import comparison_picture
-
-            comparison_picture(comparison, others).save(plot)
+        write_csv(target, list(columns), zip(*columns.values(), strict=True))
+    outputs.save_picture(picture)
 
 
-def _print(comparison: Comparison, others: dict[str, Comparison]) -> None:
-    from rich.table import Table
-
-    from notchflex.fit.assessment.errors_of_parts import edge
-
-    console = terminal.output()
-    measured = comparison.measured
-    trials = len(measured.pulls)
-    console.print(f"{comparison.robot.name}, {measured.source}", soft_wrap=True)
-    console.print(
-        f"{comparison.points} points of {trials} trial{'s' if trials > 1 else ''}, each "
-        f"{'pulled from rest' if measured.from_rest else 'trial one loading path'}"
-    )
-    models = {"model": comparison, **others}
-    columns = _columns(models)
-    for first in range(0, len(columns), MOST_COLUMNS):  # a wide robot in parts, each of 80 columns
-        table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold", pad_edge=False)
-        table.add_column("root-mean-square error\n", no_wrap=True, max_width=24)
-        some = columns[first : first + MOST_COLUMNS]
-        for head, _ in some:
-            table.add_column(head, justify="right")
-        for number, label in enumerate(models):
-            table.add_row(label, *(cells[number] for _, cells in some))
-        console.print(table)
-    for name, error in comparison.others.items():
-        title, unit, scale = edge(name)
-        console.print(f"{title}: {error * scale:.3f} {unit}")
-    for sentence in comparison.diagnosis:
-        console.print(sentence)
-
-
-def _columns(models: dict[str, Comparison]) -> list[tuple[str, list[str]]]:
-    """Head and one number for each model, of every notch, the total and the tip if measured."""
-    first = next(iter(models.values()))
-    notches = first.robot.number_of_notches
-    columns = [
-        (f"n{n + 1}\ndeg", [f"{one.rmse_notches[n] * DEGREES:.2f}" for one in models.values()])
-        for n in range(notches)
-        if np.isfinite(first.measured_notch_angle[:, n]).any()
-    ]
-    if np.isfinite(first.measured_total_angle).any():
-        numbers = [f"{one.rmse_total * DEGREES:.2f}" for one in models.values()]
-        columns.append(("total\ndeg", numbers))
-    if np.isfinite(first.measured_tip).any():
-        columns.append(("tip\nmm", [f"{one.tip_rmse:.3f}" for one in models.values()]))
-    return columns
-
-
-def _say_what_matters(comparison: Comparison, others: dict[str, Comparison]) -> int:
-    from notchflex.cli.app import DONE, NOT_CONVERGED
+def _report(comparison: Comparison, others: dict[str, Comparison]) -> int:
+    """Write notes and failures; return the exit code."""
     from notchflex.comparison.tables import takes_stroke_of_model
 
     measured = comparison.measured
@@ -208,8 +125,8 @@ def _say_what_matters(comparison: Comparison, others: dict[str, Comparison]) -> 
             "angle, and so its error, is that of the model by construction; compare the notches "
             "and the tip."
         )
-    failed = np.flatnonzero(~comparison.converged)
-    if not len(failed):
+    failed = [row for row, converged in enumerate(comparison.converged) if not converged]
+    if not failed:
         return DONE
     terminal.error(
         f"not converged: {len(failed)} of {len(measured)} points, first row {failed[0] + 1}: "

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import flag
 from notchflex.errors import InputError
 from notchflex.results.files.streams import write_document
 
@@ -17,17 +18,15 @@ Shell = Literal["bash", "zsh", "fish", "powershell"]
 def completion(
     shell: Annotated[
         Shell | None,
-        Parameter(help="bash, zsh, fish or powershell; the one that runs if left out."),
+        Parameter(help="bash, zsh, fish or powershell; the current one if left out."),
     ] = None,
     /,
     *,
     install: Annotated[
         bool,
-        Parameter(
-            negative=(),
-            show_default=False,
-            help="Write the script to its place for this user, and a line that reads it to the "
-            "start-up file of the shell; what was written is told.",
+        flag(
+            "Write the script to its folder for this user, and a line that loads it to the "
+            "start-up file of the shell; prints the path."
         ),
     ] = False,
 ) -> None:
@@ -45,7 +44,7 @@ def completion(
         written.write_text(_with_files(written.read_text(encoding="utf-8")), encoding="utf-8")
     except ShellDetectionError:
         raise InputError.MISSING_VALUE(
-            "which shell this is cannot be told; name it: notchflex completion bash (or zsh, fish, "
+            "the current shell is not known; name it: notchflex completion bash (or zsh, fish, "
             "powershell)."
         ) from None
     except OSError as problem:
@@ -58,5 +57,5 @@ def completion(
 
 
 def _with_files(script: str) -> str:
-    """Where nothing else fits, bash proposes files: robots and data are files too."""
+    """Let bash propose files where nothing else fits: robots and data are files too."""
     return script.replace("complete -F _notchflex", "complete -o default -F _notchflex")

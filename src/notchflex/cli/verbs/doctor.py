@@ -1,4 +1,4 @@
-"""`notchflex doctor`: what this installation is made of, and whether it computes right."""
+"""`notchflex doctor`: what this installation consists of, and whether it computes right."""
 
 from __future__ import annotations
 
@@ -14,11 +14,14 @@ from cyclopts import Parameter
 from notchflex import __version__
 from notchflex._extras import install_command
 from notchflex.cli import terminal
-from notchflex.cli.arguments.options import JsonFile, Quiet
-from notchflex.results.files.writing import STANDARD_OUTPUT, check_output
+from notchflex.cli.exit_codes import DONE
+from notchflex.cli.outputs import JsonFile, Outputs, Quiet
 
-BUILDERS = ("test", "dev", "docs", "all")
-"""Extras for those who change the program, or of all others together."""
+WRONG_SUMS = 1
+"""Exit code where JAX computes wrong numbers."""
+
+DEVELOPMENT = ("test", "dev", "docs", "all")
+"""Extras for developers, or of all others together."""
 
 _BACKENDS = {
     "native": "native: lanewise and LLVM {llvm} at level {optimisation} compile for {processor}",
@@ -26,49 +29,46 @@ _BACKENDS = {
 }
 
 
-ClearCache = Annotated[
-    bool,
-    Parameter(
-        help="Remove the compiled programs kept on disk; they are compiled anew when needed."
-    ),
-]
-
-
-def doctor(*, clear_cache: ClearCache = False, json: JsonFile = None, quiet: Quiet = False) -> int:
+def doctor(
+    *,
+    clear_cache: Annotated[
+        bool,
+        Parameter(
+            help="Remove the compiled programs kept on disk; they are compiled again when needed."
+        ),
+    ] = False,
+    json: JsonFile = None,
+    quiet: Quiet = False,
+) -> int:
     """Check the installation: versions, the device of JAX, extras, the kept programs.
 
     JAX 0.10.2 and 0.11.0 compute wrong sums on the processor; one such sum is computed and
     compared. The exit code is 1 where it is wrong: no number of this program can be trusted then.
     """
-    terminal.be_quiet(quiet)
-    if json is not None:
-        check_output(json, "--json")
+    outputs = Outputs(quiet=quiet, json=json)
     if clear_cache:
         from notchflex.solver.programs import store
 
         removed = store.clear()
         terminal.note(f"removed {removed.programs} programs, {removed.size / 1e6:.1f} MB")
-    with terminal.working("computing a sum that is known"):
+    with terminal.working("computing a known sum"):
         found = examination()
-    if json is not None:
-        from notchflex.results.files.json import write_json
-
-        write_json(json, found)
-    if json != STANDARD_OUTPUT and not quiet:
+    outputs.write_json(lambda: found)
+    if outputs.prints_tables:
         _print(found)
     if found["healthy"]:
-        return 0
+        return DONE
     canary = found["canary"]
     terminal.error(
         f"JAX {found['packages']['jax']} computes wrong numbers on this machine: a sum that is "
         f"{canary['expected']:.0f} came out as {canary['computed']:.0f}. Install another version: "
         "pip install 'jax!=0.10.2,!=0.11.0'"
     )
-    return 1
+    return WRONG_SUMS
 
 
 def examination() -> dict[str, Any]:
-    """Return what `doctor` has found out, as plain values."""
+    """Return the findings of `doctor` as plain values."""
     from notchflex.cli.compile_cache import use_compile_cache
     from notchflex.solver.programs import shipped, store
 
@@ -163,23 +163,17 @@ def _extras() -> dict[str, Any]:
             "install": install_command(extra),
         }
         for extra, packages in requirements().items()
-        if extra and extra not in BUILDERS and packages
+        if extra and extra not in DEVELOPMENT and packages
     }
 
 
 def _print(found: dict[str, Any]) -> None:
-    from rich.table import Table
-
     console = terminal.output()
 
     def section(title: str, rows: Iterable[tuple[str, str]]) -> None:
-        table = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
-        table.add_column(style="cyan", no_wrap=True, min_width=14)
-        table.add_column(overflow="fold")
-        for row in rows:
-            table.add_row(*row)
         console.print(title, style="bold")
-        console.print(table)
+        cells = [(name.ljust(14), words) for name, words in rows]
+        console.print(terminal.table(["", ""], cells, gap=2, colour="cyan"))
 
     missing = "not installed"
     device = found["device"]

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.options import JsonFile, PlotFile
-from notchflex.results.files.writing import (
-    STANDARD_OUTPUT,
-    check_distinct,
-    check_output,
-    check_picture,
-)
+from notchflex.cli.outputs import JsonFile, Outputs, PlotFile
 
 
 def friction_rig(
@@ -33,29 +27,24 @@ def friction_rig(
 
     Every row is a reading: weight 1 is just about to lift weight 2, the tendon turning over two
     edges in between (Liu 2022, eq. 21). Prints the coefficient with its 95 % interval, the spread
-    of the readings, those that stand out, and whether a constant coefficient is enough.
+    of the readings, outliers, and whether a constant coefficient is enough.
     """
-    check_distinct({"--json": json, "--plot": plot})
-    if json is not None:
-        check_output(json, "--json", inputs=[data])
-    if plot is not None:
-        check_picture(plot, "--plot", inputs=[data])
+    outputs = Outputs([data], json=json, plot=plot)
 
     from notchflex.fit.friction_rig.documents import friction_document
     from notchflex.fit.friction_rig.readings import read_friction_rig
     from notchflex.fit.friction_rig.rig import friction_rig as estimate
 
     rig = estimate(read_friction_rig(data))
-    if json is not None:
-        from notchflex.results.files.json import write_json
 
-        write_json(json, friction_document(rig))
-    if plot is not None:
-        with terminal.working(f"drawing {plot}"):
-            from notchflex.plotting import friction_picture
+    def picture() -> Any:
+        from notchflex.plotting import friction_picture
 
-            friction_picture(rig).save(plot)
-    if json != STANDARD_OUTPUT:
+        return friction_picture(rig)
+
+    outputs.write_json(lambda: friction_document(rig))
+    outputs.save_picture(picture)
+    if outputs.prints_tables:
         console = terminal.output()
         console.print(data, soft_wrap=True)
         for sentence in rig.words:

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from rich.table import Table
-
 from notchflex._ready import list_robots
 from notchflex.cli import terminal
 
 
 def robots() -> None:
     """List the robots that come with the program."""
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    table.add_column("robot", style="cyan", no_wrap=True)
-    table.add_column("what it is")
-    for name, title in dict(list_robots()).items():
-        table.add_row(name, title)
-    terminal.output().print(table)
+    rows = list_robots().items()
+    terminal.output().print(terminal.table(["robot", "what it is"], rows, gap=2, colour="cyan"))

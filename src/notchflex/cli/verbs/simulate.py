@@ -2,45 +2,43 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from cyclopts import Parameter
 
-from notchflex.cli import terminal
-from notchflex.cli.arguments.beside import beside_files, beside_robots
+from notchflex.cli import simulate_files, terminal
+from notchflex.cli.arguments.conversion import Vector, converted, flag, texts, vector, whole
 from notchflex.cli.arguments.loads import (
-    BodyForces,
-    Following,
-    Gravity,
-    TipForce,
-    TipMass,
-    TipMoment,
-    TipPoint,
-    parse_loads,
-    put_on,
+    ExternalLoads,
+    TendonCommand,
+    load_columns,
+    tendon_command,
 )
-from notchflex.cli.arguments.options import (
-    OUTPUT,
-    CsvFile,
-    JsonFile,
-    MovingPlotFile,
-    NetcdfFile,
-    ParquetFile,
-    Quiet,
+from notchflex.cli.arguments.robots import (
     RobotName,
     Settings,
+    beside_files,
+    beside_robots,
     changed_title,
     chosen_robot,
     robot_files,
 )
-from notchflex.cli.arguments.spec import load_columns, parse_vector
-from notchflex.cli.simulate_files import check_files, write_files
-from notchflex.errors import InputError
-from notchflex.results.files.writing import STANDARD_OUTPUT
+from notchflex.cli.exit_codes import DONE, NOT_CONVERGED
+from notchflex.cli.outputs import (
+    OUTPUT,
+    CsvFile,
+    JsonFile,
+    MovingPlotFile,
+    Outputs,
+    Quiet,
+    output_file,
+)
 
 if TYPE_CHECKING:
+    from notchflex.loads import LoadPath
     from notchflex.results import EquilibriumPath, SavedState
+    from notchflex.robot import Robot
 
 SPEC = (
     "Values or `start:stop:count` ranges joined by commas: `2`, `0,1,2.5`, `0:3:31,3:0:31`. "
@@ -54,61 +52,46 @@ def simulate(
     /,
     *,
     tension: Annotated[
-        tuple[str, ...],
-        Parameter(
-            negative=(),
-            show_default=False,
-            allow_leading_hyphen=True,
-            help=f"Tension at the base of a tendon [N], step by step. {SPEC}",
-        ),
+        tuple[TendonCommand, ...],
+        tendon_command("--tension"),
+        Parameter(help=f"Tension at the base of a tendon [N], step by step. {SPEC}"),
     ] = (),
     stroke: Annotated[
-        tuple[str, ...],
+        tuple[TendonCommand, ...],
+        tendon_command("--stroke", negative=True),
         Parameter(
-            negative=(),
-            show_default=False,
-            allow_leading_hyphen=True,
             help="Tendon length drawn out at the base [mm], step by step; written as --tension.",
         ),
     ] = (),
     base_rotation: Annotated[
-        str | None,
-        Parameter(
-            allow_leading_hyphen=True,
-            help="Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`.",
-        ),
+        Vector | None,
+        converted(vector("angles in deg"), "RX,RY,RZ"),
+        Parameter(help="Turn the base by a rotation vector RX,RY,RZ [deg], for example `90,0,0`."),
     ] = None,
-    tip_force: TipForce = None,
-    tip_moment: TipMoment = None,
-    tip_point: TipPoint = None,
-    body_force: BodyForces = (),
-    tip_mass: TipMass = None,
-    gravity: Gravity = None,
-    following: Following = False,
+    external: ExternalLoads = ExternalLoads(),  # noqa: B008 - frozen
     refinement: Annotated[
-        str,
-        Parameter(
-            allow_leading_hyphen=True,
-            help="0 to 3: more strain modes in every notch. A result that stays the same can be "
-            "trusted.",
-        ),
-    ] = "0",
+        int,
+        converted(whole(0, 3), "N"),
+        Parameter(help="0 to 3: more strain modes in every notch, to check the accuracy."),
+    ] = 0,
     settings: Settings = (),
     from_state: Annotated[
         str | None,
-        Parameter(help="Go on from a state that `--save-state` wrote, with its friction."),
+        Parameter(
+            metavar="FILE",
+            help="Continue from a state that `--save-state` wrote, with its friction history.",
+        ),
     ] = None,
     save_state: Annotated[
         str | None,
-        Parameter(group=OUTPUT, help="Write the last state to this file, to go on from it later."),
+        output_file("--save-state", "Write the last state to this file, for `--from-state`."),
     ] = None,
     beside: Annotated[
         tuple[str, ...],
-        Parameter(
-            name="--beside",
-            negative=(),
-            show_default=False,
-            help="Also pull another robot in the same way: `ROBOT`, `LABEL: ROBOT`, or this one "
+        texts(
+            "--beside",
+            "ROBOT",
+            "Also simulate another robot under the same load: `ROBOT`, `LABEL: ROBOT`, or this one "
             "with other values, `LABEL: PATH=VALUE, PATH=VALUE`. May be given up to four times. "
             "Table, picture and JSON have all of them, other files the first.",
         ),
@@ -117,34 +100,47 @@ def simulate(
         str | None,
         Parameter(
             group=OUTPUT,
+            metavar="NAMES",
             help="Quantities that the table shows, joined by commas, such as "
             "`tension,notch_angle,gap`. A wrong name lists all names.",
         ),
     ] = None,
     every_row: Annotated[
         bool,
-        Parameter(
+        flag(
+            "Show every step in the table; without it a path of more than 60 steps is thinned.",
             name="--all",
             group=OUTPUT,
-            negative=(),
-            show_default=False,
-            help="Show every step in the table; without it a path of more than 60 steps is "
-            "thinned.",
         ),
     ] = False,
     json: JsonFile = None,
     csv: CsvFile = None,
-    nc: NetcdfFile = None,
-    parquet: ParquetFile = None,
+    nc: Annotated[
+        str | None,
+        output_file(
+            "--nc",
+            "Write the whole result as NetCDF to this file (extra `data`); "
+            "`notchflex.read_path` reads it back.",
+        ),
+    ] = None,
+    parquet: Annotated[
+        str | None,
+        output_file(
+            "--parquet",
+            "Write the columns of the CSV as a Parquet table to this file (extra `data`).",
+        ),
+    ] = None,
     plot: MovingPlotFile = None,
     quiet: Quiet = False,
 ) -> int:
     """Pull the tendons of a robot through a series of tensions or strokes.
 
     The steps are one path with friction history: at the same tension, unloading differs from
-    loading. Prints a table as wide as the terminal (the variable COLUMNS says otherwise) unless
+    loading. Prints a table as wide as the terminal (the variable COLUMNS overrides it) unless
     `--json -` or `--csv -` prints something else.
     """
+    import numpy as np
+
     from notchflex.cli.tables.path_columns import parse_columns
 
     terminal.be_quiet(quiet)
@@ -152,91 +148,83 @@ def simulate(
     chosen = chosen_robot(robot, settings)
     title = changed_title(chosen, settings)
     robots = beside_robots(chosen, robot, beside)
-    loads = parse_loads(
-        tip_force=tip_force,
-        tip_moment=tip_moment,
-        tip_point=tip_point,
-        body_force=body_force,
-        tip_mass=tip_mass,
-        gravity=gravity,
-        following=following,
-    )
-    if loads and not tension and not stroke:  # the tendons hang slack, in one step
+    if external and not tension and not stroke:  # the tendons hang slack, in one step
         tensions = strokes = np.full((1, chosen.number_of_tendons), np.nan)
     else:
         tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
-    outputs = {
-        "--json": json,
-        "--csv": csv,
-        "--nc": nc,
-        "--parquet": parquet,
-        "--plot": plot,
-        "--save-state": save_state,
-    }
-    inputs = [*robot_files(robot), *(file for text in beside for file in beside_files(text))]
-    check_files(outputs, inputs, steps=len(tensions), several=bool(beside))
-    finer = _refinement(refinement)
-    turn = np.zeros(3)
-    if base_rotation is not None:
-        turn = np.radians(parse_vector(base_rotation, "--base-rotation", "angles in deg"))
-
+    outputs = Outputs(
+        [*robot_files(robot), *beside_files(beside)],
+        quiet=quiet,
+        pictures=simulate_files.pictures(several=bool(beside)),
+        json=json,
+        csv=csv,
+        nc=nc,
+        parquet=parquet,
+        plot=plot,
+        save_state=save_state,
+    )
+    simulate_files.check(outputs, steps=len(tensions))
     with terminal.counting(f"solving {len(tensions)} steps of {chosen.name}") as counted:
-        from notchflex import analysis
         from notchflex.cli.compile_cache import use_compile_cache
         from notchflex.loads import LoadPath
 
         use_compile_cache()
         start = None if from_state is None else _start(from_state)
-        pulled = LoadPath(tension=tensions, stroke=strokes, base_rotation=turn)
-        pulled = put_on(pulled, loads)
-        paths: dict[str, EquilibriumPath] = {}
-        for number, (label, one) in enumerate(robots.items()):
-            if number:
-                counted(number, len(robots))
-            state = None if number else start
-            paths[label] = analysis.simulate(one, pulled, from_state=state, refinement=finer)
-    write_files(paths, outputs, title)
-    if STANDARD_OUTPUT not in (json, csv) and not quiet:
+        turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
+        load = external.on(LoadPath(tension=tensions, stroke=strokes, base_rotation=turn))
+        paths = _solve(robots, load, start, refinement, counted)
+    simulate_files.write(paths, outputs, title)
+    if outputs.prints_tables:
         from notchflex.cli.tables.path_table import print_beside, print_path
 
-        shown: dict[str, Any] = {"columns": named, "every_row": every_row}
-        print_path(next(iter(paths.values())), title, **shown)
+        print_path(next(iter(paths.values())), title, columns=named, every_row=every_row)
         if beside:
-            print_beside(paths, **shown)
-    codes = [_say_what_matters(path, label if beside else "") for label, path in paths.items()]
-    return max(codes)
+            print_beside(paths, columns=named, every_row=every_row)
+    return max(_report(path, label if beside else "") for label, path in paths.items())
+
+
+def _solve(
+    robots: Mapping[str, Robot],
+    load: LoadPath,
+    start: SavedState | None,
+    refinement: int,
+    counted: terminal.Counted,
+) -> dict[str, EquilibriumPath]:
+    """Return the path of every robot; only the first starts from a saved state."""
+    from notchflex import analysis
+
+    paths: dict[str, EquilibriumPath] = {}
+    for number, (label, robot) in enumerate(robots.items()):
+        if number:
+            counted(number, len(robots))
+        state = None if number else start
+        paths[label] = analysis.simulate(robot, load, from_state=state, refinement=refinement)
+    return paths
 
 
 def _start(file: str) -> SavedState:
-    """Read the state to go on from; warn where nothing shows which robot it belongs to."""
+    """Read the state to continue from; warn where nothing shows which robot it belongs to."""
     from notchflex.results import State
 
     state = State.load(file)
     if state.description is None:
         terminal.warn(
-            f"{file} was written by an older notchflex and does not hold the values of its robot; "
-            "make sure that they are the same. --save-state writes a file that does."
+            f"{file} was written by an older notchflex and does not contain the values of its "
+            "robot; make sure that they are the same. --save-state writes a file that does."
         )
     return state
 
 
-def _refinement(text: str) -> int:
-    if text not in ("0", "1", "2", "3"):
-        raise InputError.OUT_OF_RANGE(f"--refinement {text}: give a whole number from 0 to 3.")
-    return int(text)
-
-
-def _say_what_matters(path: EquilibriumPath, label: str) -> int:
-    """Tell warnings and failures, of one of several with its label; return the exit code."""
-    from notchflex.cli.app import DONE, NOT_CONVERGED
+def _report(path: EquilibriumPath, label: str) -> int:
+    """Write warnings and the first failure, after the label if given; return the exit code."""
     from notchflex.results.warnings import path_warnings
 
-    whose = f"{label}: " if label else ""
+    prefix = f"{label}: " if label else ""
     for sentence in path_warnings(path):
-        terminal.warn(f"{whose}{sentence}")
-    failed = np.flatnonzero(~np.asarray(path.converged))
-    if not len(failed):
+        terminal.warn(f"{prefix}{sentence}")
+    failed = [row for row, converged in enumerate(path.converged) if not converged]
+    if not failed:
         return DONE
-    first = int(failed[0])
-    terminal.error(f"{whose}not converged: step {first + 1} of {len(path)}: {path.reason[first]}.")
+    first = failed[0]
+    terminal.error(f"{prefix}not converged: step {first + 1} of {len(path)}: {path.reason[first]}.")
     return NOT_CONVERGED

@@ -9,8 +9,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.options import RobotName, Settings, chosen_robot, robot_files
-from notchflex.errors import InputError
+from notchflex.cli.arguments.conversion import converted, flag, whole
+from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.viewer import HOST, PORT, check_host, check_installed, exposed
 
 
@@ -23,29 +23,25 @@ def view(
         str,
         Parameter(
             allow_leading_hyphen=True,
+            metavar="ADDRESS",
             help="Address to serve on. The default can be reached from this machine only; "
             "`0.0.0.0` from everywhere.",
         ),
     ] = HOST,
     port: Annotated[
-        str,
-        Parameter(
-            allow_leading_hyphen=True, help="Port to serve on, or the next one that is free."
-        ),
-    ] = str(PORT),
-    open_browser: Annotated[
-        bool,
-        Parameter(name="--open", negative=(), show_default=False, help="Open a browser there."),
-    ] = False,
+        int,
+        converted(whole(1, 65535), "N"),
+        Parameter(help="Port to serve on, or the next one that is free."),
+    ] = PORT,
+    open_browser: Annotated[bool, flag("Open a browser there.", name="--open")] = False,
 ) -> None:
     """Show a robot in the browser, with sliders for its tendons and loads.
 
-    Sliders leave the robot where they were moved to: friction remembers, and a loop grows beside
-    it. A robot file is read again when it is saved. Ends with Ctrl+C.
+    The robot stays where the sliders left it: friction is history-dependent, and the page draws the
+    hysteresis loop. A robot file is read again when it is saved. Ends with Ctrl+C.
     """
     check_installed()
-    number = _port(port)
-    check_host(host, number)
+    check_host(host, port)
     chosen = chosen_robot(robot, settings)
     files = robot_files(robot)
     if warning := exposed(host):
@@ -60,7 +56,7 @@ def view(
             read=(lambda: chosen_robot(robot, settings)) if files else None,
             file=files[0] if files else None,
             host=host,
-            port=number,
+            port=port,
         )
     terminal.output().print(f"{chosen.name}: {viewer.address} (Ctrl+C ends)", soft_wrap=True)
 
@@ -74,9 +70,3 @@ def view(
 
         webbrowser.open(viewer.address)
     viewer.run()
-
-
-def _port(text: str) -> int:
-    if not text.isdecimal() or len(text) > 5:
-        raise InputError.OUT_OF_RANGE(f"--port {text}: give a whole number from 1 to 65535.")
-    return int(text)

@@ -1,0 +1,297 @@
+"""Options of `notchflex calibrate`: robots with their data, constants to find, further analyses."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, TypeVar
+
+from cyclopts import Group, Parameter
+
+from notchflex._extras import need
+from notchflex.cli.arguments.conversion import converted, number, whole
+from notchflex.cli.arguments.loads import TendonCommand, tendon_command
+from notchflex.cli.arguments.robots import chosen_robot, robot_files, robot_label
+from notchflex.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from notchflex.fit.estimation.objective import FitObjective
+    from notchflex.robot import Robot
+
+PAIR = "ROBOT=DATA.csv or LABEL=ROBOT=DATA.csv"
+BEYOND = Group("Beyond the fit", sort_key=8)
+Names = Annotated[tuple[str, ...], Parameter(metavar="NAME...", negative=(), show_default=False)]
+Numbers = TypeVar("Numbers")
+
+
+class DataSource(NamedTuple):
+    """A robot, by name or file, under its label, with a file of measurements."""
+
+    label: str
+    robot: str
+    data: str
+
+
+def _read_source(text: str) -> DataSource:
+    words = [word.strip() for word in text.split("=")]
+    if len(words) not in (2, 3) or not all(words):
+        raise InputError.BAD_SYNTAX(f"give a robot with its data: {PAIR}.")
+    robot, data = words[-2:]
+    label = words[0] if len(words) == 3 else robot_label(robot)
+    if ":" in label or os.sep in label:
+        raise InputError.BAD_SYNTAX(f"a label must not contain `:` or `{os.sep}`; choose another.")
+    if label == "each":
+        raise InputError.CONFLICT("the label `each` stands for every robot; choose another.")
+    return DataSource(label, robot, data)
+
+
+Sources = Annotated[
+    DataSource,
+    converted(_read_source, "[LABEL=]ROBOT=DATA.csv"),
+    Parameter(
+        help=f"{PAIR}: a robot (ready, or a file) and its measurements (the columns of "
+        "`notchflex.read_measurements`). The same robot again adds more data; a label tells "
+        "two robots of one file apart."
+    ),
+]
+
+
+class DataSources(NamedTuple):
+    """By label, the name or file of each robot and its files of measurements.
+
+    Example:
+        >>> DataSources.of([DataSource("a", "a.toml", "1.csv"), DataSource("a", "a.toml", "2.csv")])
+        DataSources(robots={'a': 'a.toml'}, data={'a': ['1.csv', '2.csv']})
+    """
+
+    robots: dict[str, str]
+    data: dict[str, list[str]]
+
+    @classmethod
+    def of(cls, sources: Sequence[DataSource]) -> DataSources:
+        """Gather the files of each robot."""
+        if not sources:
+            raise InputError.MISSING_VALUE(f"Give a robot with its data: {PAIR}.")
+        gathered = cls({}, {})
+        for label, robot, data in sources:
+            other = gathered.robots.setdefault(label, robot)
+            if other != robot:
+                raise InputError.CONFLICT(
+                    f"{other} and {robot} are both called {label}; give one of them another "
+                    f"label: LABEL={robot}={data}."
+                )
+            files = gathered.data.setdefault(label, [])
+            if data in files:
+                raise InputError.CONFLICT(f"{data} is given twice for {label}; give it once.")
+            files.append(data)
+        return gathered
+
+    @property
+    def files(self) -> list[str | Path]:
+        """All files that are read."""
+        data = [file for files in self.data.values() for file in files]
+        return [*data, *(file for name in self.robots.values() for file in robot_files(name))]
+
+    def load(self, settings: Sequence[str]) -> dict[str, Robot]:
+        """Load the robots with the values of `--set`: of all, or of one whose label precedes."""
+        own: dict[str, list[str]] = {label: [] for label in self.robots}
+        for text in settings:
+            label, colon, rest = text.partition(":")
+            labelled = colon and "=" not in label
+            if labelled:
+                self.check_label(label, f"--set {text}")
+            for one in [label] if labelled else own:
+                own[one].append(rest if labelled else text)
+        return {label: chosen_robot(name, own[label]) for label, name in self.robots.items()}
+
+    def check_label(self, label: str, source: str) -> None:
+        """Raise if no robot has a label.
+
+        Args:
+            label: The label.
+            source: Where it was given, for the message.
+        """
+        if label not in self.robots:
+            labels = ", ".join(self.robots)
+            raise InputError.UNKNOWN_NAME(
+                f"{source}: no robot of this fit is called {label}; allowed: {labels}."
+            )
+
+
+class ParameterSpec(NamedTuple):
+    """A constant to find, with limits and prior (mean, standard deviation) where given."""
+
+    name: str
+    lower: float | None = None
+    upper: float | None = None
+    prior: tuple[float, float] | None = None
+
+
+_BOUNDS = "NAME=LOW:HIGH, such as friction.coefficient=0:0.5; one of the two may be left out"
+_PRIOR = "NAME=MEAN+-SD, such as material.elastic_modulus=10000+-500"
+
+
+def _of_constant(form: str, read: Callable[[str], Numbers], text: str) -> tuple[str, Numbers]:
+    name, equals, values = (word.strip() for word in text.partition("="))
+    if not (name and equals and values):
+        raise InputError.BAD_SYNTAX(f"give {form}.")
+    return name, read(values)
+
+
+def _read_limits(values: str) -> tuple[float | None, float | None]:
+    low, colon, high = values.partition(":")
+    if not colon or not (low.strip() or high.strip()):
+        raise InputError.BAD_SYNTAX(f"give {_BOUNDS}.")
+    lower, upper = (number(word, _BOUNDS) if word.strip() else None for word in (low, high))
+    return lower, upper
+
+
+def _read_prior(values: str) -> tuple[float, float]:
+    words = re.split(r"\+-|±", values)
+    if len(words) != 2:
+        raise InputError.BAD_SYNTAX(f"give {_PRIOR}.")
+    return number(words[0], _PRIOR), number(words[1], _PRIOR)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class FitOptions:
+    """What is found, and how."""
+
+    fit: Annotated[
+        Names,
+        Parameter(
+            help="Constants to find, joined by commas: values of the robot file, shared by all "
+            "robots; `LABEL:` before one for a single robot, `each:` for one in every robot, "
+            "`notch[each].` for one in every notch; `sensor.force_offset`, `sensor.stroke_slack`."
+        ),
+    ]
+    bounds: Annotated[
+        tuple[tuple[str, tuple[float | None, float | None]], ...],
+        converted(partial(_of_constant, _BOUNDS, _read_limits), "NAME=LOW:HIGH", several=True),
+        Parameter(name="--bounds", help="Limits of a constant, `NAME=LOW:HIGH`, in its unit."),
+    ] = ()
+    prior: Annotated[
+        tuple[tuple[str, tuple[float, float]], ...],
+        converted(partial(_of_constant, _PRIOR, _read_prior), "NAME=MEAN+-SD", several=True),
+        Parameter(name="--prior", help="Prior of a constant, `NAME=MEAN+-SD`, in its unit."),
+    ] = ()
+    objective: Annotated[
+        Literal["least-squares", "robot-errors", "distances"],
+        Parameter(
+            help="What is minimised: squared residuals over their noise; eq. 17 of Pacheco 2021; "
+            "the sum of distances of points (Gao 2017, eq. 27). Only the first gives intervals."
+        ),
+    ] = "least-squares"
+    huber: Annotated[
+        float | None,
+        converted(partial(number, form="a number of standard deviations"), "SD"),
+        Parameter(help="Outliers beyond so many standard deviations count less; about 1.5."),
+    ] = None
+    starts: Annotated[
+        int, converted(whole(1), "N"), Parameter(help="Number of starting points.")
+    ] = 4
+    seed: Annotated[
+        int, converted(whole(0), "N"), Parameter(help="Seed of the starting points.")
+    ] = 0
+
+    def __post_init__(self) -> None:
+        """Check that the options belong together."""
+        if self.huber is not None and self.objective != "least-squares":
+            raise InputError.CONFLICT(
+                f"--huber {self.huber:g} belongs to least-squares; leave out one of the two."
+            )
+
+    def constants(self) -> tuple[ParameterSpec, ...]:
+        """Return the constants with their limits and priors."""
+        names = [name.strip() for text in self.fit for name in text.split(",")]
+        if not names or not all(names):
+            raise InputError.MISSING_VALUE(
+                "--fit needs names of constants joined by commas, such as "
+                "friction.coefficient,material.elastic_modulus."
+            )
+        _once(names, "--fit")
+        for option, values in (("--bounds", self.bounds), ("--prior", self.prior)):
+            _once([name for name, _ in values], option)
+            for name in (name for name, _ in values if name not in names):
+                raise InputError.UNKNOWN_NAME(
+                    f"{option} {name}: this constant is not fitted; --fit names {', '.join(names)}."
+                )
+        limits, priors = dict(self.bounds), dict(self.prior)
+        return tuple(
+            ParameterSpec(name, *limits.get(name, (None, None)), priors.get(name)) for name in names
+        )
+
+    def fit_objective(self) -> FitObjective:
+        """Return the objective of the library."""
+        from notchflex.fit import LeastSquares, SumOfDistances, SumOfRobotErrors
+
+        if self.objective == "robot-errors":
+            return SumOfRobotErrors()
+        return SumOfDistances() if self.objective == "distances" else LeastSquares(self.huber)
+
+
+def _once(names: Sequence[str], option: str) -> None:
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError.CONFLICT(f"{option} {twice} is given twice; give it once.")
+
+
+@Parameter(name="*", group=BEYOND)
+@dataclass(frozen=True)
+class BeyondFit:
+    """Further analyses of a finished fit."""
+
+    leave_out: Annotated[
+        Literal["pull", "robot"] | None,
+        Parameter(help="Also fit without each pull or robot, and predict what was left out."),
+    ] = None
+    next: Annotated[
+        tuple[TendonCommand, ...],
+        tendon_command("--next"),
+        Parameter(
+            name="--next",
+            help="Candidates for the next measurement: tensions [N] as in `simulate --tension`. "
+            "Shows which narrows the intervals most.",
+        ),
+    ] = ()
+    next_robot: Annotated[
+        str | None,
+        Parameter(metavar="LABEL", help="Label of the robot of `--next`; the first if left out."),
+    ] = None
+    narrow: Annotated[
+        Names, Parameter(help="Constant that `--next` is to narrow; all together if left out.")
+    ] = ()
+    posterior: Annotated[
+        bool, Parameter(negative=(), help="Also sample the posterior (extra `bayes`).")
+    ] = False
+    draws: Annotated[
+        int,
+        converted(whole(4), "N"),
+        Parameter(help="Draws of each of the two chains of `--posterior`."),
+    ] = 500
+
+    def check(self, sources: DataSources, objective: str) -> None:
+        """Check what could not be done after the fit, before the time for the fit is spent."""
+        if (self.next_robot is not None or self.narrow) and not self.next:
+            raise InputError.CONFLICT(
+                "--next-robot and --narrow belong to --next; give candidates with it."
+            )
+        if self.next_robot is not None:
+            sources.check_label(self.next_robot, f"--next-robot {self.next_robot}")
+        if self.posterior:
+            if objective != "least-squares":
+                raise InputError.CONFLICT(
+                    f"--posterior needs least-squares: {objective} is not a likelihood. Leave out "
+                    "one of the two."
+                )
+            need("numpyro", "bayes", "--posterior")
+        if self.leave_out == "robot" and len(sources.robots) < 2:
+            raise InputError.TOO_FEW_DATA(
+                "--leave-out robot: there is only one robot; give two or more."
+            )

@@ -1,0 +1,144 @@
+"""Robots on the command line: by name or file, with changed values, and variants beside them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import texts
+from notchflex.errors import InputError
+
+if TYPE_CHECKING:
+    from notchflex.robot import Robot
+
+MOST_BESIDE = 4
+"""Robots beside the first: five can be told apart by colour."""
+
+_MOST_CHANGES = 4
+"""More values of `--set` than this are only counted in a title."""
+
+RobotName = Annotated[
+    str,
+    Parameter(help="A ready robot (`notchflex robots` lists them) or the path of a robot file."),
+]
+Settings = Annotated[
+    tuple[str, ...],
+    texts(
+        "--set",
+        "PATH=VALUE",
+        "Change a value of the robot, such as `material.elastic_modulus=9000`, "
+        "`notch[2].depth=1.3` (the second notch from the base), `notch.depth=1.38` (every notch) "
+        "or `material.kind=linear`. May be given several times, in any order.",
+    ),
+]
+
+
+def chosen_robot(name: str, settings: Sequence[str]) -> Robot:
+    """Load a robot with the values of `--set`; note the keys that a new kind drops."""
+    from notchflex.robot import load_robot, parse_assignment, set_values
+
+    robot = load_robot(name)
+    if settings:
+        robot, dropped = set_values(robot, [parse_assignment(text) for text in settings])
+        if dropped:
+            terminal.note(f"the new kind has no {', '.join(dropped)}; dropped.")
+    return robot
+
+
+def robot_files(name: str) -> list[Path]:
+    """Return the file that a robot is read from, if it is one: outputs must not replace it."""
+    path = Path(name)
+    return [path] if path.suffix and os.path.exists(path) else []
+
+
+def changed_title(robot: Robot, settings: Sequence[str]) -> str:
+    """Return the name of a robot with what `--set` changed, for heads of tables and pictures.
+
+    Example:
+        >>> from notchflex.robot import load_robot
+        >>> changed_title(load_robot("pacheco2021-a"), ["notch.depth=1.38"])
+        'Pacheco 2021, wrist A with notch.depth = 1.38'
+    """
+    from notchflex.robot import parse_assignment
+
+    pairs = map(parse_assignment, settings)
+    changes = [f"{path} = {value}" for path, value in pairs if path != "name"]
+    more = len(changes) - _MOST_CHANGES
+    if more > 0:
+        changes = [*changes[:_MOST_CHANGES], f"{more} more"]
+    return f"{robot.name} with {', '.join(changes)}" if changes else robot.name
+
+
+def variant(text: str, other: str) -> tuple[str, list[tuple[str, object]]]:
+    """Read `LABEL: PATH=VALUE, PATH=VALUE` of `--beside`.
+
+    Args:
+        text: What was given.
+        other: What else may be given, as the message begins.
+
+    Example:
+        >>> variant("slick: friction.coefficient=0", "")
+        ('slick', [('friction.coefficient', 0)])
+    """
+    from notchflex.robot import parse_assignment
+
+    label, colon, values = text.partition(":")
+    if not colon or not label.strip():
+        raise InputError.BAD_SYNTAX(
+            f'--beside {text}: give {other}"LABEL: PATH=VALUE, PATH=VALUE", for example '
+            '"linear: material.kind=linear".'
+        )
+    return label.strip(), [parse_assignment(part) for part in values.split(",")]
+
+
+def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, Robot]:
+    """Return the robots of `simulate`, the first one first, each under its label.
+
+    Args:
+        first: The robot that was named, with its `--set`.
+        name: How it was named, which is its label.
+        beside: The values of `--beside`: `ROBOT`, `LABEL: ROBOT` or `LABEL: PATH=VALUE, ...`.
+    """
+    if len(beside) > MOST_BESIDE:
+        raise InputError.OUT_OF_RANGE(
+            f"--beside may be given {MOST_BESIDE} times at most; got {len(beside)}."
+        )
+    robots = {robot_label(name): first}
+    for text in beside:
+        if "=" in text:
+            label, values = variant(text, "ROBOT, LABEL: ROBOT, or ")
+            robot = first.with_values(values)
+        else:
+            label, other = _label_and_robot(text)
+            robot = chosen_robot(other, ())
+        if label in robots:
+            raise InputError.CONFLICT(
+                f"--beside {text}: there is already a robot called {label}; put another label "
+                'before it, such as "second: ROBOT".'
+            )
+        robots[label] = robot
+    return robots
+
+
+def beside_files(beside: Sequence[str]) -> list[Path]:
+    """Return the robot files that `--beside` names: outputs must not replace them."""
+    names = [_label_and_robot(text)[1] for text in beside if "=" not in text]
+    return [file for name in names for file in robot_files(name)]
+
+
+def robot_label(name: str) -> str:
+    """Return the label of a robot that is given without one: the name, of a file its stem."""
+    return Path(name).stem if name.endswith(".toml") else Path(name).name
+
+
+def _label_and_robot(text: str) -> tuple[str, str]:
+    """Split `LABEL: ROBOT` or `ROBOT`; a colon without a blank belongs to a path."""
+    label, colon, name = text.partition(": ")
+    if colon:
+        return label.strip(), name.strip()
+    return robot_label(text.strip()), text.strip()

@@ -1,0 +1,60 @@
+"""The table of `notchflex compare`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from notchflex._quantity import DEGREES
+from notchflex.cli import terminal
+from notchflex.fit.assessment.errors_of_parts import edge
+
+if TYPE_CHECKING:
+    from notchflex.comparison import Comparison
+
+MOST_COLUMNS = 8
+"""Numbers side by side in one table; more of them go below."""
+
+
+def print_comparison(comparison: Comparison, others: dict[str, Comparison]) -> None:
+    """Print the errors of a model, and of others beside it, of every part that was measured."""
+    console = terminal.output()
+    measured = comparison.measured
+    trials = len(measured.pulls)
+    console.print(f"{comparison.robot.name}, {measured.source}", soft_wrap=True)
+    console.print(
+        f"{comparison.points} points of {trials} trial{'s' if trials > 1 else ''}, each "
+        f"{'pulled from rest' if measured.from_rest else 'trial one loading path'}"
+    )
+    models = {"model": comparison, **others}
+    columns = _columns(models)
+    for first in range(0, len(columns), MOST_COLUMNS):  # a wide robot in parts of 80 columns each
+        some = columns[first : first + MOST_COLUMNS]
+        heads = ["root-mean-square error\n", *(f">{head}" for head, _ in some)]
+        rows = [
+            [label if len(label) <= 24 else f"{label[:23]}…", *(cells[n] for _, cells in some)]
+            for n, label in enumerate(models)
+        ]
+        console.print(terminal.table(heads, rows))
+    for name, error in comparison.others.items():
+        title, unit, scale = edge(name)
+        console.print(f"{title}: {error * scale:.3f} {unit}")
+    for sentence in comparison.diagnosis:
+        console.print(sentence)
+
+
+def _columns(models: dict[str, Comparison]) -> list[tuple[str, list[str]]]:
+    """Head and one number for each model, of every notch, the total and the tip if measured."""
+    first = next(iter(models.values()))
+    columns = [
+        (f"n{n + 1}\ndeg", [f"{one.rmse_notches[n] * DEGREES:.2f}" for one in models.values()])
+        for n in range(first.robot.number_of_notches)
+        if np.isfinite(first.measured_notch_angle[:, n]).any()
+    ]
+    if np.isfinite(first.measured_total_angle).any():
+        numbers = [f"{one.rmse_total * DEGREES:.2f}" for one in models.values()]
+        columns.append(("total\ndeg", numbers))
+    if np.isfinite(first.measured_tip).any():
+        columns.append(("tip\nmm", [f"{one.tip_rmse:.3f}" for one in models.values()]))
+    return columns
