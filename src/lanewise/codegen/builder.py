@@ -240,6 +240,3 @@ class IRBuilder:
         """End a block: jump to a label and begin it."""
         self.line(f"br label %{label}")
         self.line(f"{label}:")
-
-
-__all__ = ["IRBuilder", "literal", "type_name"]

@@ -260,5 +260,3 @@ PRIMITIVES: dict[str, Callable[..., References]] = {
     "cummin": _cumulative("min"),
 }
 """Functions by the name of JAX's primitive."""
-
-__all__ = ["ELEMENTWISE", "PRIMITIVES", "kind_of"]
