@@ -19,18 +19,10 @@ from lanewise.lowering.data_movement import DATA_MOVEMENT
 from lanewise.lowering.primitives import ELEMENTWISE, PRIMITIVES, kind_of
 from lanewise.lowering.scan_inputs import ScanInputs
 
-# Primitives that call another function, and the parameter that holds it.
-_CALLS = {
-    "jit": "jaxpr",
-    "pjit": "jaxpr",
-    "closed_call": "call_jaxpr",
-    "core_call": "call_jaxpr",
-    "custom_jvp_call": "call_jaxpr",
-    "custom_vjp_call": "call_jaxpr",
-    "remat": "jaxpr",
-    "remat2": "jaxpr",
-    "checkpoint": "jaxpr",
-}
+# Primitives that call another function.
+_CALLS = {"jit", "pjit", "closed_call", "core_call", "remat", "remat2", "checkpoint"}.union(
+    ("custom_jvp_call", "custom_vjp_call")
+)
 
 
 class JaxprLowering:
@@ -116,7 +108,7 @@ class JaxprLowering:
                     operands[at] = self.arrays.elementwise("to_float", operands[at])
             return self.function(_elementary(name, len(operands)), operands, scalar=True)
         if name in _CALLS:
-            inner = params[_CALLS[name]]
+            inner = params["jaxpr" if "jaxpr" in params else "call_jaxpr"]
             if hasattr(inner, "consts"):
                 return self.function(inner, operands, scalar=scalar)
             return self._jaxpr(inner, [], operands, scalar)

@@ -246,17 +246,10 @@ PRIMITIVES: dict[str, Callable[..., References]] = {
     "scatter": _scatter(None),
     "scatter-add": _scatter("add"),
     "scatter_add": _scatter("add"),
-    "reduce_sum": _reduce("add"),
-    "reduce_prod": _reduce("mul"),
-    "reduce_max": _reduce("max"),
-    "reduce_min": _reduce("min"),
-    "reduce_and": _reduce("and"),
-    "reduce_or": _reduce("or"),
     "argmax": _argument_of_extreme("gt"),
     "argmin": _argument_of_extreme("lt"),
-    "cumsum": _cumulative("add"),
-    "cumprod": _cumulative("mul"),
-    "cummax": _cumulative("max"),
-    "cummin": _cumulative("min"),
 }
+_COMBINED = {"sum": "add", "prod": "mul", "max": "max", "min": "min", "and": "and", "or": "or"}
+PRIMITIVES.update({f"reduce_{name}": _reduce(op) for name, op in _COMBINED.items()})
+PRIMITIVES.update({f"cum{name}": _cumulative(op) for name, op in _COMBINED.items()})
 """Functions by the name of JAX's primitive."""
