@@ -123,10 +123,16 @@ def _round(arrays: ArrayLowering, operands: Operands, params: Any, _e: Any) -> R
 
 def _convert(arrays: ArrayLowering, operands: Operands, params: Any, equation: Any) -> References:
     old, new = _kind(equation), kind_of(params["new_dtype"])
-    if old == new:
-        return operands[0]
-    op = {"f": "to_float", "i": "to_int", "b": "to_bool"}[new]
-    return arrays.elementwise(op, operands[0])
+    each, constant, result = arrays.elementwise, arrays.constant, operands[0]
+    narrowed = 8 * (8 - np.dtype(params["new_dtype"]).itemsize)
+    if old == new == "i" and 8 * (8 - equation.invars[0].aval.dtype.itemsize) < narrowed:
+        return each("ashr", each("shl", result, constant(narrowed)), constant(narrowed))
+    if old != new:
+        result = each({"f": "to_float", "i": "to_int", "b": "to_bool"}[new], result)
+    if (old, new) == ("f", "i") and narrowed:
+        limits = np.iinfo(params["new_dtype"])
+        result = each("min", each("max", result, constant(limits.min)), constant(limits.max))
+    return result
 
 
 def _bitcast(arrays: ArrayLowering, operands: Operands, params: Any, equation: Any) -> References:
