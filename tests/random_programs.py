@@ -251,7 +251,7 @@ class Drawing:
         other = self.like(values, one)
         return Step(lambda p, x, y: [lax.select(p, x, y)], (which, one, other), values[one].kind)
 
-    def constant(self, values: list[Value]) -> Step:
+    def constant(self, values: list[Value]) -> Step | None:
         like = self.one(values)
         shape = np.shape(values[like].array)
         if not self.padded and self.below(2):
@@ -273,12 +273,12 @@ class Drawing:
         array, kind = values[at].array, values[at].kind
         shape = np.shape(array)
         if not shape:
-            sizes = (self.pick((2, 3)),)
-            return Step(lambda x: [lax.broadcast(x, sizes)], (at,), kind)
+            return Step(lambda x: [lax.broadcast(x, (2,))], (at,), kind)
         axis = self.below(len(shape))
         size = shape[axis]
         other = self.like(values, at)
-        start = self.below(size) if size else 0
+        # Few shapes, as XLA compiles every primitive for every shape.
+        start = self.pick((0, size - 1)) if size else 0
         which = self.below(9)
         if which == 0:
             return Step(lambda x: [lax.rev(x, (axis,))], (at,), kind)
@@ -286,15 +286,16 @@ class Drawing:
             order = list(range(len(shape)))[::-1]
             return Step(lambda x: [lax.transpose(x, order)], (at,), kind)
         if which == 2 and size:
-            stop = start + 1 + self.below(size - start)
-            stride = 1 + self.below(2)
+            start, stop, stride = self.pick([(0, size, 1), (1, size, 1), (0, size, 2), (0, 2, 1)])
+            if not start < stop <= size:
+                return None
             return Step(lambda x: [lax.slice_in_dim(x, start, stop, stride, axis)], (at,), kind)
         if which == 3 and np.size(array) <= 26:
             return Step(lambda x, y: [lax.concatenate([x, y], axis)], (at, other), kind)
         if which == 4:
             return Step(lambda x: [lax.reshape(x, (np.size(array),))], (at,), kind)
         if which == 5 and np.size(array) <= 26 and kind != "b":
-            low, high, inside = self.below(3) - 1, self.below(3) - 1, self.below(2)
+            low, high, inside = self.pick([(1, 0, 0), (-1, 1, 0), (0, -1, 1), (2, -1, 0)])
             if size + low + high < 1:
                 return None
             number = 0 if self.padded else self.pick((1, 3))
@@ -303,7 +304,7 @@ class Drawing:
         if which == 6 and size:
             return Step(lambda x: [lax.index_in_dim(x, start, axis, keepdims=False)], (at,), kind)
         if which == 7 and size:
-            order = np.array([self.below(size) for _ in range(min(size, 4))])
+            order = self.pick((np.arange(size)[::-1], np.zeros(2, int), np.arange(0, size, 3)))
             return Step(lambda x: [jnp.take(x, order, axis, mode="clip")], (at,), kind)
         if size:
             return Step(lambda x, y: [_written(x, y, start, axis)], (at, other), kind)
@@ -335,8 +336,8 @@ class Drawing:
         axes = tuple(range(len(shape))) if self.below(2) else (axis,)
         reverse = bool(self.below(2))
         if kind == "b":
-            function = self.pick((lax.reduce_and_p, lax.reduce_or_p))
-            return Step(lambda x: [function.bind(x, axes=axes, **_SHARDING)], (at,), "b")
+            function = self.pick((jnp.all, jnp.any))
+            return Step(lambda x: [function(x, axis=axes)], (at,), "b")
         ready = {"sum": digits, "prod": signs} if kind == "f" else {}
         name = self.pick(("sum", "prod", "max", "min"))
         first = ready.get(name, lambda x: x)
@@ -401,7 +402,7 @@ class Drawing:
     def while_loop(self, values: list[Value], depth: int) -> Step:
         carry = [self.one(values) for _ in range(1 + self.below(2))]
         limit, test = self.below(4), self.one(values, "f")
-        inner = [*values, Value(np.int64(0), "i")]
+        inner = [*values, Value(jnp.int64(0), "i")]
         steps = self.body(values, inner, depth)
         after = self.results(inner, [values[at] for at in carry])
 
@@ -476,11 +477,6 @@ def _written(x: Any, y: Any, start: int, axis: int) -> Any:
     """Return an array with one slice replaced by another's."""
     own = (slice(None),) * axis + (start,)
     return jnp.asarray(x).at[own].set(jnp.asarray(y)[own], mode="promise_in_bounds")
-
-
-_SHARDING: dict[str, Any] = {}
-if "out_sharding" in (lax.reduce_and_p.bind.__doc__ or ""):
-    _SHARDING = {"out_sharding": None}
 
 
 def numbers(drawing: Drawing, count: int, special: Sequence[float]) -> np.ndarray:

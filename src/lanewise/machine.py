@@ -55,8 +55,9 @@ def target() -> str:
 
 
 @contextmanager
-def _without_slow_passes() -> Generator[None]:
-    options = _OPTIONS if llvm.llvm_version_info[0] in _KNOWN_VERSIONS else {}
+def _without_slow_passes(level: int) -> Generator[None]:
+    known = level > 0 and llvm.llvm_version_info[0] in _KNOWN_VERSIONS
+    options = _OPTIONS if known else {}
     for option, (ours, _) in options.items():
         llvm.set_option("lanewise", f"{option}={ours}")
     try:
@@ -73,7 +74,7 @@ def machine_code(text: str, level: int = 2) -> bytes:
         text: The program, in LLVM IR.
         level: How hard LLVM optimises, 0 to 3.
     """
-    with _lock, _without_slow_passes():
+    with _lock, _without_slow_passes(level):
         machine = _target_machine(level)
         head = f'target triple = "{machine.triple}"\n'
         head += f'target datalayout = "{machine.target_data}"\n'
@@ -103,6 +104,3 @@ def load(code: bytes) -> Callable[[bytes, bytes, int, int], None]:
     # The code lives as long as its engine.
     function.engine = engine  # pyright: ignore[reportAttributeAccessIssue]
     return function
-
-
-__all__ = ["load", "machine_code", "target"]

@@ -130,6 +130,3 @@ def _working_memory(count: int) -> int:
         start += -start % 64
         _thread.memory = (count, start)
     return start
-
-
-__all__ = ["LoweredProgram", "Program", "lower"]

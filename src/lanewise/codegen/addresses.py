@@ -61,6 +61,3 @@ class Arena:
     def free(self, first: int, count: int) -> None:
         """Allow memory to be assigned again."""
         self._free.setdefault(-(-count // WIDTH) * WIDTH, []).append(first)
-
-
-__all__ = ["Address", "Arena"]

@@ -12,26 +12,11 @@ _LONGEST_BLOCK = 200
 
 _SCALAR = {"f": "double", "i": "i64", "b": "i1"}
 _SUFFIX = {"f": "f64", "i": "i64", "b": "i1"}
-_COMPARISONS = {
-    "eq": ("oeq", "eq"),
-    "ne": ("une", "ne"),
-    "lt": ("olt", "slt"),
-    "le": ("ole", "sle"),
-    "gt": ("ogt", "sgt"),
-    "ge": ("oge", "sge"),
-}
+_COMPARISONS = ("eq", "ne", "lt", "le", "gt", "ge")
 _FLOAT = {"add": "fadd contract", "sub": "fsub contract", "mul": "fmul contract", "div": "fdiv"}
-_SAME_NAME = ("add", "sub", "mul", "and", "or", "xor", "shl", "lshr", "ashr")
-_INTEGER = {name: name for name in _SAME_NAME} | {"div": "sdiv"}
-_FLOAT_INTRINSICS = {
-    "sqrt": "sqrt",
-    "abs": "fabs",
-    "floor": "floor",
-    "ceil": "ceil",
-    "round_even": "roundeven",
-    "round_away": "round",
-    "max": "maximum",
-    "min": "minimum",
+_INTEGER = ("add", "sub", "mul", "and", "or", "xor", "shl", "lshr", "ashr", "div")
+_FLOAT_INTRINSICS = {"abs": "fabs", "round_even": "roundeven", "round_away": "round"} | {
+    name: f"{name}imum" for name in ("max", "min")
 }
 _REDUCE = {
     "f": {"add": "fadd", "mul": "fmul", "max": "fmaximum", "min": "fminimum"},
@@ -151,10 +136,11 @@ class IRBuilder:
         if kind == "f" and op in _FLOAT:
             return self.assign(f"{_FLOAT[op]} {own} {values[0]}, {values[1]}")
         if kind == "f":
-            name = f"llvm.{_FLOAT_INTRINSICS[op]}.{self._suffix(kind, vector)}"
+            name = f"llvm.{_FLOAT_INTRINSICS.get(op, op)}.{self._suffix(kind, vector)}"
             return self.call(name, own, [(own, value) for value in values])
         if op in _INTEGER:
-            return self.assign(f"{_INTEGER[op]} {own} {values[0]}, {values[1]}")
+            name = "sdiv" if op == "div" else op
+            return self.assign(f"{name} {own} {values[0]}, {values[1]}")
         if op == "abs":
             args = [(own, values[0]), ("i1", "false")]
             return self.call(f"llvm.abs.{self._suffix(kind, vector)}", own, args)
@@ -162,10 +148,12 @@ class IRBuilder:
         return self.call(name, own, [(own, value) for value in values])
 
     def _comparison(self, op: str, values: list[str], kind: str, own: str) -> str:
-        of_floats, of_integers = _COMPARISONS[op]
-        if kind == "b" and op not in ("eq", "ne"):
-            of_integers = "u" + of_integers[1:]
-        compare = f"fcmp {of_floats}" if kind == "f" else f"icmp {of_integers}"
+        if kind == "f":
+            compare = "fcmp une" if op == "ne" else f"fcmp o{op}"
+        elif op in ("eq", "ne"):
+            compare = f"icmp {op}"
+        else:
+            compare = f"icmp {'s' if kind == 'i' else 'u'}{op}"
         return self.assign(f"{compare} {own} {values[0]}, {values[1]}")
 
     def _conversion(self, op: str, value: str, kind: str, vector: bool) -> str:
@@ -240,6 +228,3 @@ class IRBuilder:
         """End a block: jump to a label and begin it."""
         self.line(f"br label %{label}")
         self.line(f"{label}:")
-
-
-__all__ = ["IRBuilder", "literal", "type_name"]

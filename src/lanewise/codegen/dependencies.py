@@ -79,13 +79,3 @@ def operand_nodes(graph: Graph, node: int) -> Iterable[int]:
     if op in ("reduce", "prefix"):
         return args[1:2]
     return args
-
-
-__all__ = [
-    "RegionParts",
-    "operand_nodes",
-    "parts",
-    "regions",
-    "returns_results",
-    "stored_nodes",
-]

@@ -188,5 +188,3 @@ _REGIONS: dict[type, Callable[[Emitter, Any], None]] = {
     Conditional: Emitter._conditional,  # pyright: ignore[reportPrivateUsage]
     BatchLoop: Emitter._batch_loop,  # pyright: ignore[reportPrivateUsage]
 }
-
-__all__ = ["Emitter"]

@@ -167,6 +167,3 @@ class LaneLoops:
             storage.store(target, at, total, kind)
 
         storage.loop(str(length), iteration)
-
-
-__all__ = ["LaneLoops"]

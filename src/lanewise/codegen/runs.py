@@ -46,6 +46,3 @@ def find_runs(refs: Sequence[int], offsets: Sequence[int]) -> list[Run]:
             runs.append(Run(node, lane, lane_stride, offset, offset_stride, end - first))
             first = end
     return runs
-
-
-__all__ = ["Run", "find_runs"]

@@ -257,6 +257,3 @@ class Schedule:
                     if not same_block or self.stage[one] != self.stage.get(node):
                         self.kept.add(one)
         self.kept.update(one for one in stored_nodes(self.function.stores) if self.is_looped(one))
-
-
-__all__ = ["Schedule", "Stage"]

@@ -201,6 +201,3 @@ def _is_padded(buffer: Buffer, first: int, length: int) -> bool:
         end += buffer.offset + (buffer.steps - 1) * buffer.stride
         buffer = buffer.source
     return buffer.space == "arena" or (buffer.space == "argument" and end <= buffer.size)
-
-
-__all__ = ["Storage"]

@@ -107,6 +107,3 @@ class StoreWriter:
         """Return the new value for the rows of a mask and the stored one for others."""
         old = self.storage.load(target, index, kind)
         return self.builder.operation("select", [mask, value, old], ["b", kind, kind], True)
-
-
-__all__ = ["StoreWriter"]

@@ -194,6 +194,3 @@ class Values:
     def run_address(self, run: Run) -> Address:
         """Return where the lanes of a run are."""
         return self.storage.address_of(run.node).part(run.lane, run.lane_stride)
-
-
-__all__ = ["Values"]

@@ -1,9 +1,8 @@
-"""Exponentials, logarithms, powers and hyperbolic functions out of basic operations.
+"""Compute exponentials, logarithms, powers, angles and hyperbolic functions by basic operations.
 
-A compiler that turns a traced function into vector code needs no library for them: it traces the
-functions of `ELEMENTARY` in place of JAX's primitives. They use sums, products, quotients, square
-roots, comparisons, choices and the bits of floats; neither branches nor tables. Products and sums
-may be fused.
+The compiler traces the functions of `ELEMENTARY` in place of JAX's primitives. They use sums,
+products, quotients, square roots, comparisons, selections and the bits of floats; neither branches
+nor tables. Products and sums may be fused.
 
 Results are within 1.5 units in the last place (`exp`, `log`, `sin`, `cos`, `atan`) or within 3
 (others). Those of `pow` are within 4 between 1e-40 and 1e40, within 40 beyond; those of `cbrt`
@@ -20,28 +19,10 @@ from lanewise.elementary.exp import cosh, exp, exp2, expm1, logistic, sinh, tanh
 from lanewise.elementary.log import acosh, asinh, atanh, log, log1p
 from lanewise.elementary.power import cbrt, pow, rsqrt
 
-ELEMENTARY: dict[str, Callable[..., Array]] = {
-    "exp": exp,
-    "exp2": exp2,
-    "expm1": expm1,
-    "log": log,
-    "log1p": log1p,
-    "logistic": logistic,
-    "pow": pow,
-    "cbrt": cbrt,
-    "rsqrt": rsqrt,
-    "sin": sin,
-    "cos": cos,
-    "tan": tan,
-    "asin": asin,
-    "acos": acos,
-    "atan": atan,
-    "atan2": atan2,
-    "sinh": sinh,
-    "cosh": cosh,
-    "tanh": tanh,
-    "asinh": asinh,
-    "acosh": acosh,
-    "atanh": atanh,
-}
+_FUNCTIONS = (
+    *(exp, exp2, expm1, log, log1p, logistic, pow, cbrt, rsqrt),
+    *(sin, cos, tan, asin, acos, atan, atan2),
+    *(sinh, cosh, tanh, asinh, acosh, atanh),
+)
+ELEMENTARY: dict[str, Callable[..., Array]] = {one.__name__: one for one in _FUNCTIONS}
 """The function in place of each of JAX's primitives, by its name."""

@@ -88,14 +88,14 @@ _ASIN = (
 
 
 def sin(x: Array) -> Array:
-    """Sine."""
+    """Return the sine."""
     minus, sine, cosine = _turned(x)
     value = select((minus & 1) != 0, cosine, sine)
     return flipped(value, (to_bits(x) ^ ((minus + 1) << 62)) & SIGN)
 
 
 def cos(x: Array) -> Array:
-    """Cosine."""
+    """Return the cosine."""
     minus, sine, cosine = _turned(x)
     value = select((minus & 1) != 0, sine, cosine)
     # bit 1 of -n is the sign
@@ -103,7 +103,7 @@ def cos(x: Array) -> Array:
 
 
 def tan(x: Array) -> Array:
-    """Tangent."""
+    """Return the tangent."""
     minus, sine, cosine = _turned(x)
     odd = (minus & 1) != 0
     value = select(odd, cosine, sine) / select(odd, sine, cosine)
@@ -111,7 +111,7 @@ def tan(x: Array) -> Array:
 
 
 def _turned(x: Array) -> tuple[Array, Array, Array]:
-    """The lowest bits of -n, n pi/2 being nearest to |x|; sine and cosine of what remains.
+    """Return the lowest bits of -n, n pi/2 being nearest to |x|, and sine and cosine of the rest.
 
     Numbers too large for an angle are taken as 0.
     """
@@ -129,7 +129,7 @@ def _turned(x: Array) -> tuple[Array, Array, Array]:
 
 
 def atan(x: Array) -> Array:
-    """Inverse of the tangent."""
+    """Return the arc tangent."""
     size = abs(x)
     large = size > 1.0
     slope = select(large, -1.0 / size, size)
@@ -138,7 +138,7 @@ def atan(x: Array) -> Array:
 
 
 def atan2(y: Array, x: Array) -> Array:
-    """Angle of the point (x, y), with the quadrants and signed zeros of C."""
+    """Return the angle of the point (x, y), with the quadrants and signed zeros of C."""
     height, width = abs(y), abs(x)
     steep, left = height > width, to_bits(x) < 0
     short, long = select(steep, width, height), select(steep, height, width)
@@ -150,13 +150,13 @@ def atan2(y: Array, x: Array) -> Array:
 
 
 def _atan_less(slope: Array) -> Array:
-    """atan(t) - t for |t| <= 1."""
+    """Return atan(t) - t for |t| <= 1."""
     z = slope * slope
     return (slope * z) * polynomial(z, _ATAN)
 
 
 def asin(x: Array) -> Array:
-    """Inverse of the sine."""
+    """Return the arc sine."""
     size = abs(x)
     # asin(x) = pi/2 - 2 asin(sqrt((1 - x)/2))
     large = size > 0.5
@@ -167,7 +167,7 @@ def asin(x: Array) -> Array:
 
 
 def acos(x: Array) -> Array:
-    """Inverse of the cosine."""
+    """Return the arc cosine."""
     size = abs(x)
     # acos(x) = 2 asin(sqrt((1 - x)/2)) = pi/2 - asin(x)
     large = size > 0.5
@@ -178,5 +178,5 @@ def acos(x: Array) -> Array:
 
 
 def _asin_less(part: Array, z: Array) -> Array:
-    """asin(s) - s, or a multiple of it, z being s² and `part` the same multiple of s."""
+    """Return asin(s) - s times a factor; z is s², `part` is s times that factor."""
     return (part * z) * polynomial(z, _ASIN)

@@ -32,22 +32,22 @@ _BEYOND = 6.123233995736766e-17 / 1.5707963267948966
 
 
 def to_bits(x: Array) -> Array:
-    """The bits of floats as integers."""
+    """Return the bits of floats as integers."""
     return jax.lax.bitcast_convert_type(x, jnp.int64)
 
 
 def from_bits(bits: Array) -> Array:
-    """The floats of these bits."""
+    """Return the floats of these bits."""
     return jax.lax.bitcast_convert_type(bits, jnp.float64)
 
 
 def sign_of(x: Array) -> Array:
-    """The sign bit, all others being zero."""
+    """Return the sign bit, all others being zero."""
     return to_bits(x) & SIGN
 
 
 def flipped(x: Array, sign: Array) -> Array:
-    """A float with its sign changed where `sign` has the sign bit set."""
+    """Return a float with its sign changed where `sign` has the sign bit set."""
     return from_bits(to_bits(x) ^ sign)
 
 
@@ -57,7 +57,7 @@ def select(which: Array, yes: Array | float, no: Array | float) -> Array:
 
 
 def at_most(x: Array, limit: float) -> Array:
-    """The smaller one, and NaN for NaN; this order is a single instruction on x86."""
+    """Return the smaller one, and NaN for NaN; this order is a single instruction on x86."""
     return select(x > limit, limit, x)
 
 
@@ -76,12 +76,12 @@ def nearest(x: Array) -> tuple[Array, Array]:
 
 
 def as_float(integer: Array) -> Array:
-    """2^52 plus an integer below 2^52, as a float."""
+    """Return 2^52 plus an integer below 2^52, as a float."""
     return from_bits(integer | (ONE + (52 << 52)))
 
 
 def polynomial(x: Array, coefficients: Sequence[float]) -> Array:
-    """Sum of coefficients times powers of x, beginning with the power zero.
+    """Return the sum of coefficients times powers of x, from the power zero on.
 
     Two terms at a time, of long ones four: one or two products more than Horner's, which must
     wait for every single step.
@@ -98,7 +98,7 @@ def polynomial(x: Array, coefficients: Sequence[float]) -> Array:
 
 
 def sum_of_angles(base: Array, angle: Array, small: Array) -> Array:
-    """A multiple of pi/2 and two more parts, the last of them small.
+    """Return the sum of a multiple of pi/2 and two more parts, the last of them small.
 
     The digits of pi beyond double precision are added, too.
     """

@@ -46,20 +46,20 @@ _COSH = (
 
 
 def exp(x: Array) -> Array:
-    """Exponential function."""
+    """Return the exponential function."""
     count, minus = nearest(x * LOG2_E)
     return exp_of_parts(x, less_powers(x, count), minus)
 
 
 def exp2(x: Array) -> Array:
-    """Power of two."""
+    """Return the power of two."""
     count, minus = nearest(x)
     result = _scaled(1.0 + _expm1_near_zero((x - count) * np.log(2)), minus)
     return select(x >= 1024.0, INFINITY, select(x < -1022.0, 0.0, result))
 
 
 def expm1(x: Array) -> Array:
-    """Exponential function less one, with all digits near zero."""
+    """Return the exponential function less one, with all digits near zero."""
     x = select(x < -40.0, -40.0, at_most(x, 710.0))
     count, minus = nearest(x * LOG2_E)
     near = _expm1_near_zero(less_powers(x, count))
@@ -69,24 +69,24 @@ def expm1(x: Array) -> Array:
 
 
 def logistic(x: Array) -> Array:
-    """Logistic function 1/(1 + exp(-x))."""
+    """Return the logistic function 1/(1 + exp(-x))."""
     return 1.0 / (1.0 + exp(-x))
 
 
 def sinh(x: Array) -> Array:
-    """Hyperbolic sine."""
+    """Return the hyperbolic sine."""
     up, down, odd, even = _halves(x)
     return flipped(2.0 * ((up - down) + ((up + down) * odd - (up - down) * even)), sign_of(x))
 
 
 def cosh(x: Array) -> Array:
-    """Hyperbolic cosine."""
+    """Return the hyperbolic cosine."""
     up, down, odd, even = _halves(x)
     return 2.0 * ((up + down) + ((up - down) * odd - (up + down) * even))
 
 
 def tanh(x: Array) -> Array:
-    """Hyperbolic tangent."""
+    """Return the hyperbolic tangent."""
     twice = at_most(abs(x) * 2.0, 40.0)
     count, minus = nearest(twice * LOG2_E)
     near = _expm1_near_zero(less_powers(twice, count))
@@ -96,7 +96,7 @@ def tanh(x: Array) -> Array:
 
 
 def _halves(x: Array) -> tuple[Array, Array, Array, Array]:
-    """What sinh and cosh are put together from.
+    """Compute the parts of sinh and cosh.
 
     Returns:
         A quarter of 2^n and of 2^-n, n being the nearest to |x|/ln(2); sinh(r) and 1 - cosh(r) of
@@ -111,12 +111,12 @@ def _halves(x: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def less_powers(x: Array, count: Array) -> Array:
-    """What remains of x when the logarithm of 2^n is taken off."""
+    """Return x less the logarithm of 2^n."""
     return (x - count * LN2[0]) - count * LN2[1]
 
 
 def _odd_and_even(rest: Array) -> tuple[Array, Array, Array]:
-    """sinh(r) - r, 1 - cosh(r) and r."""
+    """Return sinh(r) - r, 1 - cosh(r) and r."""
     z = rest * rest
     return (rest * z) * polynomial(z, _SINH), z * polynomial(z, _COSH), rest
 
@@ -127,11 +127,11 @@ def _expm1_near_zero(rest: Array) -> Array:
 
 
 def exp_of_parts(x: Array, rest: Array, minus: Array) -> Array:
-    """exp(x), `rest` being x less n ln(2); of -n the lowest bits are given."""
+    """Return exp(x); `rest` is x less n ln(2), `minus` the lowest bits of -n."""
     result = _scaled(1.0 + _expm1_near_zero(rest), minus)
     return select(x > _EXP_RANGE[1], INFINITY, select(x < _EXP_RANGE[0], 0.0, result))
 
 
 def _scaled(value: Array, minus: Array) -> Array:
-    """A float times 2^n, by adding to its exponent; of -n the lowest bits are given."""
+    """Return a float times 2^n by adding to its exponent; `minus` is the lowest bits of -n."""
     return from_bits(to_bits(value) - (minus << 52))

@@ -52,19 +52,19 @@ _ROOT_HALF = 0x3FE6A09E << 32
 
 
 def log(x: Array) -> Array:
-    """Natural logarithm."""
+    """Return the natural logarithm."""
     parts, exponent, _ = split(x, 1.0)
     return _checked(_log_of_parts(parts - 1.0, exponent), x)
 
 
 def log1p(x: Array) -> Array:
-    """Logarithm of 1 + x, with all digits near zero."""
+    """Return the logarithm of 1 + x, with all digits near zero."""
     result, total = _log_above(0.5, -0.5 * x)
     return _checked(result, total)
 
 
 def asinh(x: Array) -> Array:
-    """Inverse of the hyperbolic sine."""
+    """Return the inverse of the hyperbolic sine."""
     size = abs(x)
     some = at_most(size, 1e100)  # its square must not overflow; the quotient is 1 long before
     less = -0.25 * size
@@ -74,7 +74,7 @@ def asinh(x: Array) -> Array:
 
 
 def acosh(x: Array) -> Array:
-    """Inverse of the hyperbolic cosine."""
+    """Return the inverse of the hyperbolic cosine."""
     # acosh(1 + a) = log1p(a + sqrt(a² + 2 a)); where the square overflows, the root is a
     less = -0.25 * (x - 1.0)
     result, _ = _log_above(
@@ -84,7 +84,7 @@ def acosh(x: Array) -> Array:
 
 
 def atanh(x: Array) -> Array:
-    """Inverse of the hyperbolic tangent."""
+    """Return the inverse of the hyperbolic tangent."""
     size = abs(x)
     # The quotient (1 + x)/(1 - x) is 2^k (1 + s)/(1 - s); the bits of a float are nearly its
     # logarithm, so that those of the quotient need not be known for k.
@@ -107,7 +107,7 @@ def atanh(x: Array) -> Array:
 
 
 def _log_above(unit: float, less: Array) -> tuple[Array, Array]:
-    """log((unit - less)/unit), unit being 1/2 or 1/4; and the difference of both.
+    """Return log((unit - less)/unit), unit being 1/2 or 1/4, and unit - less.
 
     With a unit below one it cannot overflow where twice or four times as much is wanted.
     """
@@ -133,7 +133,7 @@ def split(x: Array, unit: float) -> tuple[Array, Array, Array]:
 
 
 def _log_of_parts(above: Array, negative: Array) -> Array:
-    """log((1 + f) 2^k) from f and -k; the order of its sums is that of fdlibm (e_log.c)."""
+    """Return log((1 + f) 2^k); the order of its sums is that of fdlibm (e_log.c)."""
     part = above / (2.0 + above)
     z = part * part
     half = 0.5 * above * above
@@ -143,6 +143,6 @@ def _log_of_parts(above: Array, negative: Array) -> Array:
 
 
 def _checked(result: Array, x: Array) -> Array:
-    """The logarithm of x, also where x is zero, negative or infinite."""
+    """Return the logarithm of x, also where x is zero, negative or infinite."""
     none = select(x < 0.0, NAN, -INFINITY)
     return select(x < SMALLEST, none, select(x < INFINITY, result, x))

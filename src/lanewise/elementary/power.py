@@ -29,7 +29,7 @@ _LARGEST_EXPONENT = 1e22
 
 
 def pow(x: Array, y: Array) -> Array:
-    """Power with any exponent, special values being those of C."""
+    """Return a power with any exponent; special values are those of C."""
     size = abs(x)
     exponent = at_most(y, _LARGEST_EXPONENT)
     exponent = select(exponent < -_LARGEST_EXPONENT, -_LARGEST_EXPONENT, exponent)
@@ -56,7 +56,7 @@ def pow(x: Array, y: Array) -> Array:
 
 
 def _long_log(x: Array) -> tuple[Array, Array]:
-    """The logarithm in two parts: the first 26 digits, and what they lack.
+    """Return the logarithm in two parts: the first 26 digits, and the rest.
 
     As in fdlibm (Sun Microsystems 1993, e_pow.c), but with the series of `log`.
     """
@@ -83,7 +83,7 @@ def _first_digits(x: Array) -> Array:
 
 
 def cbrt(x: Array) -> Array:
-    """Cube root."""
+    """Return the cube root."""
     size = abs(x)
     # A third of the bits, negative, is nearly the logarithm of 1/cbrt(x). The constant makes the
     # error equal on both sides: (1 - error)^(-1/3) is fitted for |error| < 0.1022 to 2^-18.
@@ -106,5 +106,5 @@ def cbrt(x: Array) -> Array:
 
 
 def rsqrt(x: Array) -> Array:
-    """One by the square root."""
+    """Return the inverse of the square root."""
     return 1.0 / jnp.sqrt(x)

@@ -120,14 +120,3 @@ class LoweredFunction:
     in_place: list[int]
     sizes: list[int]
     batched: bool
-
-
-__all__ = [
-    "WIDTH",
-    "BatchLoop",
-    "Conditional",
-    "LoweredFunction",
-    "ScanLoop",
-    "Store",
-    "WhileLoop",
-]

@@ -180,15 +180,3 @@ class Graph:
 def reference(node: int, lane: int = 0) -> int:
     """Return the reference to a lane of a node."""
     return (node << LANE_BITS) + lane
-
-
-__all__ = [
-    "LANE_BITS",
-    "LANE_MASK",
-    "Block",
-    "Buffer",
-    "Graph",
-    "References",
-    "UnsupportedPrimitiveError",
-    "reference",
-]

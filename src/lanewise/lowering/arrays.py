@@ -238,6 +238,3 @@ def _distinct_columns(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _empty(shape: tuple[int, ...]) -> References:
     return np.zeros(shape, np.int64)
-
-
-__all__ = ["ArrayLowering"]

@@ -88,6 +88,3 @@ class BufferLayout:
                 flat = self.arrays.elementwise("to_float", flat)
             stores.append(Store(flat, buffer(number, flat.size), np.arange(flat.size)))
         return stores
-
-
-__all__ = ["BufferLayout", "Layout"]

@@ -31,44 +31,12 @@ def _reshape(
     return refs.reshape(new_sizes)
 
 
-def _squeeze(refs: References, *, dimensions: tuple[int, ...], **_: Any) -> References:
-    return np.squeeze(refs, axis=tuple(dimensions))
-
-
-def _expand(refs: References, *, dimensions: tuple[int, ...], **_: Any) -> References:
-    return np.expand_dims(refs, tuple(dimensions))
-
-
-def _transpose(refs: References, *, permutation: tuple[int, ...], **_: Any) -> References:
-    return np.transpose(refs, permutation)
-
-
-def _rev(refs: References, *, dimensions: tuple[int, ...], **_: Any) -> References:
-    return np.flip(refs, dimensions)
-
-
 def _slice(
     refs: References, *, start_indices: Any, limit_indices: Any, strides: Any, **_: Any
 ) -> References:
     steps = strides or (1,) * refs.ndim
     cut = (slice(*one) for one in zip(start_indices, limit_indices, steps, strict=True))
     return refs[tuple(cut)]
-
-
-def _concatenate(*arrays: References, dimension: int, **_: Any) -> References:
-    return np.concatenate(arrays, axis=dimension)
-
-
-def _stack(*arrays: References, axis: int = 0, **_: Any) -> References:
-    return np.stack(arrays, axis=axis)
-
-
-def _unstack(refs: References, *, axis: int, **_: Any) -> list[References]:
-    return list(np.moveaxis(refs, axis, 0))
-
-
-def _split(refs: References, *, sizes: tuple[int, ...], axis: int, **_: Any) -> list[References]:
-    return np.split(refs, np.cumsum(sizes)[:-1], axis=axis)
 
 
 def _pad(refs: References, filling: References, *, padding_config: Any, **_: Any) -> References:
@@ -95,27 +63,23 @@ def _identity(refs: References, **_: Any) -> References:
     return refs
 
 
-def _identities(*arrays: References, **_: Any) -> list[References]:
-    return list(arrays)
-
-
 DATA_MOVEMENT: dict[str, Callable[..., Any]] = {
     "broadcast_in_dim": _broadcast,
     "reshape": _reshape,
-    "squeeze": _squeeze,
-    "expand_dims": _expand,
-    "transpose": _transpose,
-    "rev": _rev,
+    "squeeze": lambda refs, *, dimensions, **_: np.squeeze(refs, tuple(dimensions)),
+    "expand_dims": lambda refs, *, dimensions, **_: np.expand_dims(refs, tuple(dimensions)),
+    "transpose": lambda refs, *, permutation, **_: np.transpose(refs, permutation),
+    "rev": lambda refs, *, dimensions, **_: np.flip(refs, dimensions),
     "slice": _slice,
-    "concatenate": _concatenate,
-    "stack": _stack,
-    "unstack": _unstack,
-    "split": _split,
+    "concatenate": lambda *arrays, dimension, **_: np.concatenate(arrays, axis=dimension),
+    "stack": lambda *arrays, axis=0, **_: np.stack(arrays, axis),
+    "unstack": lambda refs, *, axis, **_: list(np.moveaxis(refs, axis, 0)),
+    "split": lambda refs, *, sizes, axis, **_: np.split(refs, np.cumsum(sizes)[:-1], axis),
     "pad": _pad,
     "copy": _identity,
     "copy_p": _identity,
     "stop_gradient": _identity,
-    "optimization_barrier": _identities,
+    "optimization_barrier": lambda *arrays, **_: list(arrays),
 }
 """Functions by the name of JAX's primitive."""
 
@@ -130,7 +94,10 @@ def gather_static(refs: References, indices: np.ndarray, params: dict[str, Any])
     at, grid = _gather_windows(refs, indices.shape, params)
     starts = indices[grid]
     for number, axis in enumerate(params["dimension_numbers"].start_index_map):
-        at[axis] = at[axis] + _in_bounds(starts[..., number], refs.shape[axis] - sizes[axis])
+        limit, start = refs.shape[axis] - sizes[axis], starts[..., number]
+        if params["mode"].name == "CLIP":
+            start = np.clip(start, 0, limit)
+        at[axis] = at[axis] + _in_bounds(start, limit)
     return refs[tuple(at)]
 
 
@@ -229,6 +196,3 @@ def _in_bounds(starts: np.ndarray, limit: int) -> np.ndarray:
     if (starts < 0).any() or (starts > limit).any():
         raise UnsupportedPrimitiveError("indices out of bounds", "gather or scatter")
     return starts
-
-
-__all__ = ["DATA_MOVEMENT", "gather_candidates", "gather_static", "scatter_static"]

@@ -8,6 +8,7 @@ removes most rows of a linear step, which are padded with zeros.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -54,25 +55,15 @@ def _shift(operation: Callable[[int, int], int]) -> Callable[[int, int], int]:
     return lambda a, b: _wrap(operation(a, b if 0 <= b < 64 else 64))
 
 
-FOLD: dict[str, Callable[..., Any]] = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
+_SAME_NAME = ("add", "sub", "mul", "neg", "eq", "ne", "lt", "le", "gt", "ge", "xor")
+FOLD: dict[str, Callable[..., Any]] = {name: getattr(operator, name) for name in _SAME_NAME} | {
     "div": _divide,
-    "neg": lambda a: -a,
     "abs": abs,
     "sqrt": lambda a: math.sqrt(a) if a >= 0.0 else math.nan,
     "max": _maximum,
     "min": lambda a, b: -_maximum(-a, -b) if not isinstance(a, bool) else a and b,
-    "eq": lambda a, b: a == b,
-    "ne": lambda a, b: a != b,
-    "lt": lambda a, b: a < b,
-    "le": lambda a, b: a <= b,
-    "gt": lambda a, b: a > b,
-    "ge": lambda a, b: a >= b,
-    "and": lambda a, b: a & b,
-    "or": lambda a, b: a | b,
-    "xor": lambda a, b: a ^ b,
+    "and": operator.and_,
+    "or": operator.or_,
     "not": lambda a: (not a) if isinstance(a, bool) else ~a,
     "is_finite": math.isfinite,
     "floor": lambda a: float(np.floor(a)),

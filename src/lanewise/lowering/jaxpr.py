@@ -19,18 +19,10 @@ from lanewise.lowering.data_movement import DATA_MOVEMENT
 from lanewise.lowering.primitives import ELEMENTWISE, PRIMITIVES, kind_of
 from lanewise.lowering.scan_inputs import ScanInputs
 
-# Primitives that call another function, and the parameter that holds it.
-_CALLS = {
-    "jit": "jaxpr",
-    "pjit": "jaxpr",
-    "closed_call": "call_jaxpr",
-    "core_call": "call_jaxpr",
-    "custom_jvp_call": "call_jaxpr",
-    "custom_vjp_call": "call_jaxpr",
-    "remat": "jaxpr",
-    "remat2": "jaxpr",
-    "checkpoint": "jaxpr",
-}
+# Primitives that call another function.
+_CALLS = {"jit", "pjit", "closed_call", "core_call", "remat", "remat2", "checkpoint"}.union(
+    ("custom_jvp_call", "custom_vjp_call")
+)
 
 
 class JaxprLowering:
@@ -86,15 +78,22 @@ class JaxprLowering:
 
         for equation in jaxpr.eqns:
             operands = [value(variable) for variable in equation.invars]
-            if scalar and equation.primitive.name == "broadcast_in_dim":
+            name = equation.primitive.name
+            if scalar and name == "broadcast_in_dim":
                 results = [operands[0]]
             else:
-                results = self._equation(equation, operands, scalar)
+                try:
+                    results = self._equation(name, equation, operands, scalar)
+                except (KeyError, AttributeError) as error:  # another JAX writes it in another way
+                    reason = f"JAX's primitive `{name}` as JAX {jax.__version__} writes it: {error}"
+                    raise UnsupportedPrimitiveError(reason, name) from error
             values.update(zip(equation.outvars, results, strict=True))
         return [value(variable) for variable in jaxpr.outvars]
 
-    def _equation(self, equation: Any, operands: list[References], scalar: bool) -> Any:
-        name, params = equation.primitive.name, equation.params
+    def _equation(
+        self, name: str, equation: Any, operands: list[References], scalar: bool
+    ) -> list[References]:
+        params = equation.params
         for variable in equation.outvars:
             kind_of(variable.aval.dtype)
         if name in DATA_MOVEMENT:
@@ -109,7 +108,7 @@ class JaxprLowering:
                     operands[at] = self.arrays.elementwise("to_float", operands[at])
             return self.function(_elementary(name, len(operands)), operands, scalar=True)
         if name in _CALLS:
-            inner = params[_CALLS[name]]
+            inner = params["jaxpr" if "jaxpr" in params else "call_jaxpr"]
             if hasattr(inner, "consts"):
                 return self.function(inner, operands, scalar=scalar)
             return self._jaxpr(inner, [], operands, scalar)
@@ -151,7 +150,7 @@ class JaxprLowering:
 
     def scan(self, operands: list[References], params: dict[str, Any]) -> list[References]:
         """Lower `scan`: carried values lie in buffers, a step sees slices of inputs and results."""
-        consts, carried = params["num_consts"], params["num_carry"]
+        consts, carried = _scan_sizes(params)
         closed, length = params["jaxpr"], params["length"]
         start, arrays = operands[consts : consts + carried], operands[consts + carried :]
         avals = closed.out_avals
@@ -234,6 +233,14 @@ class JaxprLowering:
         ]
 
 
+def _scan_sizes(params: dict[str, Any]) -> tuple[int, int]:
+    """Return how many constants and how many carried values a scan has."""
+    if "num_consts" in params:
+        return params["num_consts"], params["num_carry"]
+    consts, carry, _ = params["ft_in"].unpack()  # from JAX 0.12 on
+    return len(list(consts.vals)), len(list(carry.vals))
+
+
 @cache
 def _elementary(name: str, count: int) -> Any:
     return jax.make_jaxpr(ELEMENTARY[name])(*[1.0] * count)
@@ -244,5 +251,3 @@ _CONTROL_FLOW: dict[str, Callable[..., list[References]]] = {
     "scan": JaxprLowering.scan,
     "cond": JaxprLowering.cond,
 }
-
-__all__ = ["JaxprLowering"]

@@ -116,6 +116,3 @@ def _result_slice(number: int, size: int) -> Buffer:
 
 def _in_order(shape: tuple[int, ...]) -> np.ndarray:
     return np.arange(math.prod(shape)).reshape(shape)
-
-
-__all__ = ["lower_batch", "lower_path", "lower_single"]

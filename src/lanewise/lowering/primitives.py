@@ -123,10 +123,16 @@ def _round(arrays: ArrayLowering, operands: Operands, params: Any, _e: Any) -> R
 
 def _convert(arrays: ArrayLowering, operands: Operands, params: Any, equation: Any) -> References:
     old, new = _kind(equation), kind_of(params["new_dtype"])
-    if old == new:
-        return operands[0]
-    op = {"f": "to_float", "i": "to_int", "b": "to_bool"}[new]
-    return arrays.elementwise(op, operands[0])
+    each, constant, result = arrays.elementwise, arrays.constant, operands[0]
+    narrowed = 8 * (8 - np.dtype(params["new_dtype"]).itemsize)
+    if old == new == "i" and 8 * (8 - equation.invars[0].aval.dtype.itemsize) < narrowed:
+        return each("ashr", each("shl", result, constant(narrowed)), constant(narrowed))
+    if old != new:
+        result = each({"f": "to_float", "i": "to_int", "b": "to_bool"}[new], result)
+    if (old, new) == ("f", "i") and narrowed:
+        limits = np.iinfo(params["new_dtype"])
+        result = each("min", each("max", result, constant(limits.min)), constant(limits.max))
+    return result
 
 
 def _bitcast(arrays: ArrayLowering, operands: Operands, params: Any, equation: Any) -> References:
@@ -246,19 +252,10 @@ PRIMITIVES: dict[str, Callable[..., References]] = {
     "scatter": _scatter(None),
     "scatter-add": _scatter("add"),
     "scatter_add": _scatter("add"),
-    "reduce_sum": _reduce("add"),
-    "reduce_prod": _reduce("mul"),
-    "reduce_max": _reduce("max"),
-    "reduce_min": _reduce("min"),
-    "reduce_and": _reduce("and"),
-    "reduce_or": _reduce("or"),
     "argmax": _argument_of_extreme("gt"),
     "argmin": _argument_of_extreme("lt"),
-    "cumsum": _cumulative("add"),
-    "cumprod": _cumulative("mul"),
-    "cummax": _cumulative("max"),
-    "cummin": _cumulative("min"),
 }
+_COMBINED = {"sum": "add", "prod": "mul", "max": "max", "min": "min", "and": "and", "or": "or"}
+PRIMITIVES.update({f"reduce_{name}": _reduce(op) for name, op in _COMBINED.items()})
+PRIMITIVES.update({f"cum{name}": _cumulative(op) for name, op in _COMBINED.items()})
 """Functions by the name of JAX's primitive."""
-
-__all__ = ["ELEMENTWISE", "PRIMITIVES", "kind_of"]

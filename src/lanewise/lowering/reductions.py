@@ -153,6 +153,3 @@ def dot_general(
         for number in range(count)
     )
     return reduce(lambda total, term: arrays.elementwise("add", total, term), terms)
-
-
-__all__ = ["dot_general", "neutral", "prefix", "reduce_axes"]

@@ -98,6 +98,3 @@ def _without_loads(graph: Graph, refs: References) -> References:
             own = nodes == node
             result[own] = reference(buffer, first) + (flat[own] & LANE_MASK) * stride
     return result.reshape(refs.shape)
-
-
-__all__ = ["ScanInputs"]
