@@ -1,4 +1,4 @@
-"""One quantity of a path over another, and bent shapes, on axes of matplotlib."""
+"""Draws one quantity of a path over another, or a shape, on axes of matplotlib."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from notchflex.errors import InputError
-from notchflex.plotting.curves import COLOUR, LINE, failures, solved_only
-from notchflex.plotting.drive import LOADING, UNLOADING, branches, drive
+from notchflex.plotting.branches import LOADING, UNLOADING, branches, load_parameter
+from notchflex.plotting.curves import LINE, NEUTRAL, branch_lines, failures
 from notchflex.plotting.equilibrium import robot_shape, state_shape
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
-from notchflex.plotting.sheet import BESIDE, INSIDE, Item, Line, Panel
+from notchflex.plotting.sheet import BESIDE, INSIDE, Line, Mark, Panel
 from notchflex.plotting.style import house_style, sequence_colours
 from notchflex.results.files.csv import Entry, entries_of, is_listed
 from notchflex.results.quantities.quantity import Quantity
@@ -102,37 +102,24 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
     Raises:
         InputError: There is no such quantity, it is no number, or x has several entries.
     """
-    ways = [(part, LOADING if up else UNLOADING) for part, up in branches(drive(path))]
-    both = len({way for _, way in ways}) > 1
+    both = len({way for _, way in branches(load_parameter(path))}) > 1
     across, upward = series_of(path, x), series_of(path, y)
     pairs = _pairs(x, across, upward)
     several = len(pairs) > 1
-    items: list[Item] = []
+    items: list[Mark] = []
     for (column, row), shade in zip(pairs, sequence_colours(len(pairs)), strict=True):
         points = np.stack([across.values[:, column], upward.values[:, row]], axis=1)
-        points = solved_only(path, points)
-        named: set[str] = set()
-        for part, way in ways:
-            name = upward.names[row] if several else way
-            items.append(
-                Line(
-                    points[part],
-                    shade if several else COLOUR[way],
-                    LINE[way],
-                    marker="o" if part.stop - part.start == 1 else "",
-                    name="" if name in named or not (several or both) else name,
-                    group=name,
-                    told=True,
-                )
-            )
-            named.add(name)
+        if several:
+            items += branch_lines(path, points, shade, upward.names[row])
+        else:
+            items += branch_lines(path, points, name=None if both else "")
     if several and both:
-        items += [Line([], "#4c4c4c", LINE[way], name=way) for way in (LOADING, UNLOADING)]
+        items += [Line([], NEUTRAL, LINE[way], name=way) for way in (LOADING, UNLOADING)]
     if len({column for column, _ in pairs}) == 1:
         items += failures(path, across.values[:, pairs[0][0]])
-    told = both or not np.all(path.converged)
-    legend = BESIDE if several else INSIDE if told else ""
-    return Panel(items, across.label, upward.label, legend=legend, whole_x=x == STEP)
+    named = both or not np.all(path.converged)
+    legend = BESIDE if several else INSIDE if named else ""
+    return Panel(items, across.label, upward.label, legend=legend, whole="x" * (x == STEP))
 
 
 def series_of(path: EquilibriumPath, name: str) -> Series:

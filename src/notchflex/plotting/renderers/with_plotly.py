@@ -1,40 +1,47 @@
-"""A picture drawn by plotly, for a browser: one file that holds all it needs.
+"""Draws a picture with plotly: one HTML file that needs no network.
 
-Its panels are drawn by `plotly_axes.py` and `plotly_marks.py`, in space by `plotly_space.py`.
+matplotlib arranges the panels, limits and legends; this file draws the marks at these places.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from notchflex._extras import need
-from notchflex.plotting.renderers.labels import for_browser, heading_lines, translated
-from notchflex.plotting.renderers.plotly_axes import (
-    FONT,
-    LABELS,
-    Place,
-    axes_of,
-    legend_height,
-    legend_of,
-    ranges_of,
+from notchflex.plotting.labels import for_browser, heading_lines
+from notchflex.plotting.renderers.with_matplotlib import figure_of
+from notchflex.plotting.sheet import (
+    Area,
+    Arrow,
+    Bars,
+    Correlations,
+    Faces,
+    Line,
+    Note,
+    Panel,
+    Sheet,
+    Span,
 )
-from notchflex.plotting.renderers.plotly_marks import area_trace, draw_item, line_trace
-from notchflex.plotting.renderers.plotly_space import draw_in_space, scene_of
-from notchflex.plotting.sheet import BELOW, BESIDE, Area, Bars, Correlations, Panel, Sheet
+from notchflex.plotting.style import diverging_colours, rgb
 from notchflex.results.files.writing import write_text
 
-INCH = 64.0
-"""Pixels of a browser for an inch of the paper, where the window is as wide as the picture."""
+INCH = 100.0
+"""Pixels for an inch of paper, where the window is as wide as the picture."""
+POINT = INCH / 72.0
+"""Pixels for a point."""
 
 NARROWEST = 0.75
-"""A picture follows the width of its window down to this part of its own; then it is scrolled."""
+"""A picture shrinks with its window to this part of its width; below it is scrolled."""
 
-# notation: room in pixels round the panels, beside and between them, and a line of text.
-_ABOVE, _BELOW, _LEFT, _RIGHT = 70.0, 64.0, 76.0, 20.0
-_BESIDE, _BETWEEN = 150.0, 78.0
-_LETTER, _HEADING_LINE = 7.0, 22.0
+_SYMBOLS = {
+    "o": "circle", "s": "square", "^": "triangle-up", "D": "diamond", "v": "triangle-down",
+    "P": "cross", "*": "star", "X": "x",
+}  # fmt: skip
 
 
 def interactive_of(picture: Sheet) -> Any:
@@ -46,78 +53,37 @@ def interactive_of(picture: Sheet) -> Any:
     need("plotly", "plot", "an interactive picture")
     import plotly.graph_objects as go
 
-    places, width, height = _places(picture)
-    heading = heading_lines(picture.title, width / INCH)
-    picture = translated(picture, for_browser)
-    figure = go.Figure()
+    paper = figure_of(picture)
+    paper.draw_without_rendering()  # arranges everything
+    width, height = INCH * picture.width, INCH * picture.height
+    heading = heading_lines(picture.title, picture.width)
     layout: dict[str, Any] = {
-        "font": {"size": FONT, "family": "DejaVu Sans, Verdana, sans-serif", "color": "#222"},
-        "template": None,
-        "paper_bgcolor": "white",
-        "plot_bgcolor": "white",
-        "hovermode": "closest",
-        "margin": {"t": 0, "b": 0, "l": 0, "r": 0},
-        "annotations": [],
-        "shapes": [],
-    }
-    # The width is that of the window; `meta` tells the one that the places are made for.
-    layout |= {"autosize": True, "height": height, "meta": {"width": width}}
-    layout["title"] = {
-        "text": "<br>".join(map(for_browser, heading)), "x": 0.5, "font": {"size": 17},
-        "yref": "container", "y": 1.0 - 12.0 / height, "yanchor": "top",
+        "font": {"size": 9.0 * POINT, "family": "DejaVu Sans, Verdana, sans-serif",
+                 "color": "#222"},
+        "template": None, "paper_bgcolor": "white", "plot_bgcolor": "white",
+        "hovermode": "closest", "margin": {"t": 0, "b": 0, "l": 0, "r": 0},
+        # The width is that of the window; `meta` holds the one of the arrangement.
+        "autosize": True, "height": height, "meta": {"width": width},
+        "annotations": [], "shapes": [],
+        "title": {
+            "text": "<br>".join(map(for_browser, heading)), "x": 0.5, "font": {"size": 17},
+            "yref": "container", "y": 1.0 - 8.0 / height, "yanchor": "top",
+        },
     }  # fmt: skip
-    ranges = ranges_of(picture)
+    figure = go.Figure()
     shared: dict[str, str] = {}
-    flat = space = 0
-    for number, (cell, place) in enumerate(zip(picture.cells, places, strict=True), 1):
-        panel = cell.panel
-        if panel.in_space:
-            space += 1
-            layout[_numbered("scene", space)] = scene_of(panel, place)
-            where = {"scene": _numbered("scene", space)}
-        else:
-            flat += 1
-            x, y = _numbered("x", flat), _numbered("y", flat)
-            across, upward = axes_of(panel, place, x, y, ranges[number - 1])
-            for own, axis, sharing in (
-                (x, across, panel.shared_x),
-                (y, upward, panel.shared_y),
-            ):
-                if sharing and shared.setdefault(own[0], own) != own:
-                    axis["matches"] = shared[own[0]]
-            layout[_numbered("xaxis", flat)] = across
-            layout[_numbered("yaxis", flat)] = upward
-            where = {"xaxis": x, "yaxis": y}
-        legend = _numbered("legend", number + 1)
-        if panel.legend:
-            layout[legend] = legend_of(panel, place)
-        if panel.title:
-            layout["annotations"].append(
-                {
-                    "text": panel.title, "x": place.left, "xref": "paper", "xanchor": "left",
-                    "y": place.top, "yref": "paper", "yanchor": "bottom", "showarrow": False,
-                    "font": {"size": FONT + 0.5},
-                }
-            )  # fmt: skip
-        for item in sorted(panel.items, key=_layer):
-            drawn = (
-                draw_in_space(item, panel)
-                if panel.in_space
-                else draw_item(item, panel, where, layout)
-            )
-            for trace in drawn:
-                options: dict[str, Any] = (
-                    {"legend": legend} if panel.legend else {"showlegend": False}
-                )
-                figure.add_trace(trace | where | options)
-    if picture.legend:
-        layout["legend"] = {
-            "orientation": "h", "x": 0.5, "xanchor": "center", "yanchor": "bottom",
-            "y": 4.0 / height, "yref": "container",
-        }  # fmt: skip
+    for number, (cell, axes) in enumerate(zip(picture.cells, paper.axes, strict=True), 1):
+        where = _add_axes(cell.panel, axes, number, layout, shared)
+        where |= _add_legend(axes.get_legend(), f"legend{number + 1}", layout)
+        for item in sorted(cell.panel.items, key=lambda item: item.layer):
+            for trace in _traces(item, cell.panel, where, layout):
+                figure.add_trace(trace | where)
+    for legend in paper.legends:
+        _add_legend(legend, "legend", layout)
+        layout["legend"] |= {"orientation": "h", "x": 0.5, "xanchor": "center"}
         for entry in picture.legend:
-            trace = area_trace(entry) if isinstance(entry, Area) else line_trace(entry, None)
-            figure.add_trace(trace | {"showlegend": True, "legend": "legend"})
+            trace = _area(entry) if isinstance(entry, Area) else _line(entry, None)
+            figure.add_trace(trace | {"legend": "legend"})
     figure.update_layout(layout)
     return figure
 
@@ -128,8 +94,7 @@ def save_html(picture: Sheet, target: str | FilePath) -> None:
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
     """
-    figure = interactive_of(picture)
-    text = figure.to_html(
+    text = interactive_of(picture).to_html(
         include_plotlyjs=True,
         full_html=True,
         default_width="100%",
@@ -140,63 +105,265 @@ def save_html(picture: Sheet, target: str | FilePath) -> None:
             "toImageButtonOptions": {"format": "svg"},
         },
     )
-    narrowest = round(NARROWEST * figure.layout.meta["width"])
+    narrowest = round(NARROWEST * INCH * picture.width)
     head = f"<head><title>{escape(picture.title)}</title>"
     head += f"<style>#notchflex {{min-width: {narrowest}px}}</style>"
     write_text(target, text.replace("<head>", head, 1))
 
 
-def _places(picture: Sheet) -> tuple[list[Place], float, float]:
-    """Where every panel stands, and width and height of the whole in pixels."""
-    rows, columns = picture.shape
-    beside = [
-        _BESIDE
-        if any(c.panel.legend == BESIDE and c.columns[1] == column + 1 for c in picture.cells)
-        else 0.0
-        for column in range(columns)
-    ]
-    width = INCH * picture.width / columns
-    # A column may divide its height into other rows than its neighbour.
-    lines = max(sum(c.columns[0] == column for c in picture.cells) for column in range(columns))
-    body = INCH * picture.height + (lines - 1) * _BETWEEN
-    height = (body - (rows - 1) * _BETWEEN) / rows
-    before = [
-        max((_names_before(c.panel) for c in picture.cells if c.columns[0] == column), default=0.0)
-        for column in range(columns)
-    ]
-    starts = [
-        _LEFT + column * (width + _BETWEEN) + sum(beside[:column]) + sum(before[: column + 1])
-        for column in range(columns)
-    ]
-    whole = starts[-1] + width + beside[-1] + _RIGHT
-    above = _ABOVE + _HEADING_LINE * (len(heading_lines(picture.title, whole / INCH)) - 1)
-    tall = above + rows * height + (rows - 1) * _BETWEEN + _BELOW
-    tall += 40.0 if picture.legend else 0.0
-    places: list[Place] = []
-    for cell in picture.cells:
-        top = tall - above - cell.rows[0] * (height + _BETWEEN)
-        bottom = tall - above - cell.rows[1] * (height + _BETWEEN) + _BETWEEN
-        if cell.panel.legend == BELOW:
-            bottom += legend_height(cell.panel)
-        left, right = starts[cell.columns[0]], starts[cell.columns[1] - 1] + width
-        foot = bottom - LABELS
-        places.append(Place(left / whole, right / whole, bottom / tall, top / tall, foot / tall))
-    return places, whole, tall
+def _add_axes(
+    panel: Panel, axes: Any, number: int, layout: dict[str, Any], shared: dict[str, str]
+) -> dict[str, str]:
+    """Add the axes of a panel where matplotlib has them; return where its traces belong."""
+    box = axes.get_position()
+    suffix = "" if number == 1 else str(number)
+    if panel.title:
+        layout["annotations"].append(
+            {"text": for_browser(panel.title), "x": box.x0, "xref": "paper", "xanchor": "left",
+             "y": box.y1, "yref": "paper", "yanchor": "bottom", "showarrow": False}
+        )  # fmt: skip
+    domain = {"x": [box.x0, box.x1], "y": [box.y0, box.y1]}
+    found: dict[str, Any] = {}
+    for name in "xyz" if panel.in_space else "xy":
+        label = for_browser(getattr(panel, f"{name}_label"))
+        found[name] = {
+            "title": {"text": label, "standoff": 6}, "gridcolor": "#e6e6e6", "zeroline": False,
+            "range": list(getattr(axes, f"get_{name}lim")()),
+        }  # fmt: skip
+        if name in panel.whole:
+            found[name] |= {"tickformat": "d", "nticks": 8}
+    if panel.in_space:
+        for axis in found.values():
+            axis["title"].pop("standoff")
+            axis |= {"nticks": 5, "backgroundcolor": "white"}
+        span = {name: float(np.ptp(axis["range"])) for name, axis in found.items()}
+        layout[f"scene{suffix}"] = {
+            "domain": domain, "aspectmode": "manual",
+            "aspectratio": {name: one / max(span.values()) for name, one in span.items()},
+            "camera": {"eye": {"x": 0.7, "y": -1.5, "z": 0.5}},
+            **{f"{name}axis": axis for name, axis in found.items()},
+        }  # fmt: skip
+        return {"scene": f"scene{suffix}"}
+    for name, other in ("xy", "yx"):
+        found[name] |= {
+            "domain": domain[name], "anchor": other + suffix, "showline": True,
+            "linecolor": "#444", "ticks": "outside", "ticklen": 4,
+        }  # fmt: skip
+        own = name + suffix
+        if name in panel.shared and shared.setdefault(name, own) != own:
+            found[name]["matches"] = shared[name]
+        layout[f"{name}axis{suffix}"] = found[name]
+    if panel.most_x is not None:
+        found["x"]["nticks"] = panel.most_x
+    if axes.get_aspect() == 1.0:
+        found["y"]["scaleanchor"] = f"x{suffix}"
+        if axes.get_adjustable() == "box":
+            found["x"]["constrain"] = found["y"]["constrain"] = "domain"
+    return {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
 
 
-def _names_before(panel: Panel) -> float:
-    """What names at the vertical axis of a panel need more than numbers do, in pixels."""
-    names: list[str] = []
-    for item in panel.items:
-        if isinstance(item, (Bars, Correlations)):
-            names += item.names if isinstance(item, Bars) else item.rows
-    longest = max((len(line) for name in names for line in name.split("\n")), default=0)
-    return max(0.0, _LETTER * longest - (_LEFT - 10.0))
+def _add_legend(legend: Any, name: str, layout: dict[str, Any]) -> dict[str, Any]:
+    """Add a legend where matplotlib has it; return what its traces have for it."""
+    if legend is None:
+        return {"showlegend": False}
+    figure = legend.get_figure()
+    box = legend.get_window_extent().transformed(figure.transFigure.inverted())
+    layout[name] = {
+        "x": box.x0, "xanchor": "left", "y": box.y1, "yanchor": "top", "indentation": -4,
+        "font": {"size": 8.0 * POINT}, "bgcolor": "rgba(255,255,255,0.7)", "tracegroupgap": 0,
+    }  # fmt: skip
+    return {"legend": name}
 
 
-def _numbered(name: str, number: int) -> str:
-    return name if number == 1 else f"{name}{number}"
+def _traces(
+    item: Any, panel: Panel, where: dict[str, Any], layout: dict[str, Any]
+) -> Iterator[dict[str, Any]]:
+    """Yield the traces of a mark; shapes, notes and tick labels are added to `layout`."""
+    match item:
+        case Line():
+            yield _line(item, panel)
+        case Area():
+            yield _area(item)
+        case Faces():
+            yield _mesh(item)
+        case Arrow():
+            yield from _arrow(item)
+        case Span():
+            layout["shapes"].append(_shape(item, where))
+            if item.name:  # a shape has no entry in a legend
+                look: dict[str, Any] = {"name": item.name, "group": item.group or item.name}
+                if item.low == item.high:
+                    yield _line(Line([], item.colour, item.dash, item.width, **look), None)
+                else:
+                    yield _area(Area([], item.colour, item.colour, item.opacity, 0.0, **look))
+        case Bars():
+            names = [for_browser(name) for name in item.names]
+            _axis(layout, where, "y").update(
+                tickvals=list(range(len(names))), ticktext=names, showgrid=False, ticks=""
+            )
+            yield {
+                "type": "bar", "orientation": "h", "x": list(item.values),
+                "marker": {"color": [css(colour) for colour in item.colours]}, "width": 0.6,
+                "text": [f"{value:.2f}" for value in item.values], "customdata": names,
+                "textposition": "outside", "cliponaxis": False, "showlegend": False,
+                "hovertemplate": "%{customdata}: %{x}<extra></extra>",
+            }  # fmt: skip
+        case Correlations():
+            yield _correlations(item, where, layout)
+        case Note():
+            place: dict[str, Any] = {"x": 0.5, "y": 0.5}
+            if item.corner:
+                place = {"x": 0.03, "y": 0.95, "xanchor": "left", "yanchor": "top"}
+            layout["annotations"].append(
+                {"text": for_browser(item.text), "font": {"color": css(item.colour)}, **place,
+                 "xref": f"{where['xaxis']} domain", "yref": f"{where['yaxis']} domain",
+                 "showarrow": False}
+            )  # fmt: skip
+        case _:
+            raise NotImplementedError(f"plotly draws no {type(item).__name__}")
 
 
-def _layer(item: Any) -> int:
-    return getattr(item, "layer", 0)
+def _line(item: Line, panel: Panel | None) -> dict[str, Any]:
+    """Return a line as a trace; without a panel it is only the entry of a legend."""
+    in_space = panel is not None and panel.in_space
+    rows = item.rows if len(item.rows) else np.full((1, 3 if in_space else 2), np.nan)
+    colour = css(item.colour)
+    symbol = _SYMBOLS.get(item.marker, "circle")
+    trace: dict[str, Any] = {
+        "type": "scatter3d" if in_space else "scatter", **dict(zip("xyz", rows.T, strict=False)),
+        "mode": "+".join(["lines"] * (item.dash is not None) + ["markers"] * bool(item.marker)),
+        "line": {"color": colour, "width": POINT * item.width * (2 if in_space else 1)},
+        "marker": {"size": POINT * item.size, "color": colour,
+                   "symbol": f"{symbol}-open" if item.hollow else symbol},
+        "hoverinfo": "skip", **_named(item),
+    }  # fmt: skip
+    if item.dash and not in_space:
+        trace["line"]["dash"] = _dashes(item)
+    error = ""
+    if item.error is not None:
+        trace["error_y"] = {
+            "type": "data", "array": np.asarray(item.error), "width": 0, "thickness": POINT * 0.7,
+            "color": colour,
+        }  # fmt: skip
+        trace["text"] = [f" ± {one:.2g}" if np.isfinite(one) else "" for one in item.error]
+        error = "%{text}"
+    if item.hover and panel is not None:
+        name, x, y = map(for_browser, (item.name or item.group, panel.x_label, panel.y_label))
+        trace["hoverinfo"] = "all"
+        trace["hovertemplate"] = (
+            f"{name}<br>{x}: %{{x:.4g}}<br>{y}: %{{y:.4g}}{error}<extra></extra>"
+        )
+    return trace
+
+
+def _area(item: Area) -> dict[str, Any]:
+    """Return polygons as a trace, closed and with a gap behind each."""
+    gap = np.full((1, 2), np.nan)
+    rows = np.concatenate([gap, *(part for one in item.polygons for part in (one, one[:1], gap))])
+    return {
+        "type": "scatter", "mode": "lines", "fill": "toself", "x": rows[1:, 0], "y": rows[1:, 1],
+        "fillcolor": css(item.face, item.opacity),
+        "line": {"color": css(item.edge), "width": POINT * item.width},
+        "hoverinfo": "skip", **_named(item),
+    }  # fmt: skip
+
+
+def _mesh(item: Faces) -> dict[str, Any]:
+    corners = item.corners.reshape(-1, 3)
+    first = 4 * np.arange(len(item.corners))
+    triangles = np.concatenate(
+        [np.stack([first, first + 1, first + 2]), np.stack([first, first + 2, first + 3])], axis=1
+    )
+    return {
+        "type": "mesh3d", **dict(zip("xyz", corners.T, strict=True)),
+        **dict(zip("ijk", triangles, strict=True)),
+        "facecolor": [css(colour) for colour in item.colours] * 2, "flatshading": True,
+        "lighting": {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}, "hoverinfo": "skip",
+        # The faces have colours of their own; this one is that of the legend.
+        "color": css(item.colour), **_named(item),
+    }  # fmt: skip
+
+
+def _arrow(item: Arrow) -> Iterator[dict[str, Any]]:
+    start, end = np.asarray(item.start, float), np.asarray(item.end, float)
+    step, colour = end - start, css(item.colour)
+    look: dict[str, Any] = {"hoverinfo": "skip", **_named(item)}
+    if len(start) == 3:
+        ends = zip("xyz", np.stack([start, end]).T, strict=True)
+        line = {"color": colour, "width": 3.0 * item.width}
+        yield {"type": "scatter3d", "mode": "lines", "line": line, **dict(ends), **look}
+        yield {
+            "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
+            "colorscale": [[0, colour], [1, colour]], "hoverinfo": "skip", "showlegend": False,
+            **dict(zip("xyzuvw", np.concatenate([end, 0.3 * step])[:, None], strict=True)),
+        }  # fmt: skip
+        return
+    # As matplotlib's arc3: a parabola whose control point is offset by `bend` of the length.
+    control = 0.5 * (start + end) + item.bend * np.array([step[1], -step[0]])
+    part = np.linspace(0.0, 1.0, 21)[:, None]
+    curve = (1 - part) ** 2 * start + 2 * part * (1 - part) * control + part**2 * end
+    yield {
+        "type": "scatter", "mode": "lines+markers", "x": curve[:, 0], "y": curve[:, 1],
+        "line": {"color": colour, "width": POINT * item.width},
+        "marker": {"symbol": "arrow", "angleref": "previous", "color": colour,
+                   "size": [0.0] * 20 + [11.0]}, **look,
+    }  # fmt: skip
+
+
+def _shape(item: Span, where: dict[str, Any]) -> dict[str, Any]:
+    """Return what goes across the whole panel; it is shown and hidden with its group."""
+    own, other = ("x", "y") if item.axis == "x" else ("y", "x")
+    shape: dict[str, Any] = {
+        f"{own}0": item.low, f"{own}1": item.high, f"{own}ref": where[f"{own}axis"],
+        f"{other}0": 0, f"{other}1": 1, f"{other}ref": f"{where[f'{other}axis']} domain",
+    }  # fmt: skip
+    if group := item.group or item.name:
+        shape["legendgroup"] = for_browser(group)
+    if item.low == item.high:
+        line: dict[str, Any] = {"color": css(item.colour), "width": POINT * item.width}
+        return shape | {"type": "line", "line": line | {"dash": _dashes(item) or "solid"}}
+    fill = css(item.colour, item.opacity)
+    return shape | {"type": "rect", "line": {"width": 0}, "layer": "below", "fillcolor": fill}
+
+
+def _correlations(
+    item: Correlations, where: dict[str, Any], layout: dict[str, Any]
+) -> dict[str, Any]:
+    count = len(item.names)
+    for name, texts in (("x", [str(one + 1) for one in range(count)]), ("y", item.rows)):
+        size = POINT * min(7.0, 3.1 * item.font_size)
+        _axis(layout, where, name).update(
+            tickvals=list(range(count)), ticktext=[for_browser(text) for text in texts],
+            tickfont={"size": size}, showgrid=False,
+        )  # fmt: skip
+    names = [for_browser(name) for name in item.names]
+    return {
+        "type": "heatmap", "z": item.values, "zmin": -1.0, "zmax": 1.0, "showscale": False,
+        "colorscale": [[i / 20, css(colour)] for i, colour in enumerate(diverging_colours(21))],
+        "text": item.texts, "texttemplate": "%{text}",
+        "textfont": {"size": POINT * item.font_size},
+        "customdata": [[f"{one}<br>{other}" for other in names] for one in names],
+        "hovertemplate": "%{customdata}<br>%{text}<extra></extra>",
+    }  # fmt: skip
+
+
+def _axis(layout: dict[str, Any], where: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return the layout of the axis x or y of a panel, whose name for plotly is like x2."""
+    return layout[f"{name}axis{where[f'{name}axis'][1:]}"]
+
+
+def _named(item: Any) -> dict[str, Any]:
+    """Return the legend entry of a mark, and the group with which it is shown and hidden."""
+    group = for_browser(item.group)
+    named = {"name": for_browser(item.name) or group, "showlegend": bool(item.name)}
+    return named | ({"legendgroup": group} if group else {})
+
+
+def _dashes(item: Line | Span) -> str:
+    return ",".join(f"{POINT * item.width * one:.1f}px" for one in item.dash or ())
+
+
+def css(colour: Any, opacity: float = 1.0) -> str:
+    """Return a colour as HTML takes it."""
+    red, green, blue = (round(255 * part) for part in rgb(colour))
+    return f"rgba({red},{green},{blue},{opacity:g})"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from notchflex.plotting.curves import COLOUR
-from notchflex.plotting.drive import LOADING, UNLOADING, branches
+from notchflex.plotting.branches import LOADING, UNLOADING, branches
 from notchflex.plotting.style import GREY
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.viewer.page.chart import Line, chart

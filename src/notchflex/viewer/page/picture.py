@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.acting import acting_at
-from notchflex.plotting.shapes.bent import bent_at
+from notchflex.plotting.shapes.applied_loads import applied_loads
+from notchflex.plotting.shapes.robot_shape import shape_at
 from notchflex.plotting.style import house_style
 from notchflex.viewer.page.charts import Loop, loop
 from notchflex.viewer.page.legend import BALL, entries, strain_scale
@@ -64,8 +64,8 @@ def _write(axes: Axes, session: Session) -> None:
     from matplotlib.lines import Line2D
 
     axes.set_axis_off()
-    shape = bent_at(session.solved, 0)
-    loads = [one.label for one in acting_at(session.solved, 0, shape)]
+    shape = shape_at(session.solved, 0)
+    loads = [one.label for one in applied_loads(session.solved, 0, shape)]
     told = [f"{row.label}: {row.value}" for row in rows(session)]
     told.append(f"loads at the tip: {', '.join(loads) or 'none'}")
     axes.text(

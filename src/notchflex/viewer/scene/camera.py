@@ -72,7 +72,7 @@ def first_eye(direction_deg: float, length: float, turn: Vector, side: bool, asp
     angle = np.radians(direction_deg)
     across = np.array([np.cos(angle), np.sin(angle), 0.0])
     along = np.array([0.0, 0.0, 1.0])
-    # Bent to either side it is about half as wide as it is long.
+    # RobotShape to either side it is about half as wide as it is long.
     corners = [across * x + along * z for x in (-0.2, 0.75) for z in (-0.15, 1.05)]
     toward = turn @ np.cross(across, along)
     if abs(toward[2]) > 0.9:  # its plane is level: from the front

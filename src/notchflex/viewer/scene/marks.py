@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.bent import Bent
+from notchflex.plotting.shapes.robot_shape import RobotShape
 from notchflex.results import EquilibriumPath
 from notchflex.viewer.scene.colours import CLOSED, TENDON, UNKNOWN, linear, of_contacts
 from notchflex.viewer.scene.shown import Shown
@@ -30,7 +30,7 @@ class Marks:
         rest: The robot as nothing loads it.
     """
 
-    def __init__(self, scene: Any, root: str, rest: Bent) -> None:
+    def __init__(self, scene: Any, root: str, rest: RobotShape) -> None:
         """Send them."""
         import trimesh
 
@@ -64,11 +64,11 @@ class Marks:
             for number in range(len(rest.flexures))
         ]
 
-    def _beside(self, shape: Bent, tendon: int) -> NDArray[np.float32]:
+    def _beside(self, shape: RobotShape, tendon: int) -> NDArray[np.float32]:
         """Places of the marks of the contacts of a tendon (from 0)."""
         return shape.contacts(tendon, _CONTACT_AT * self._outer).astype(np.float32)
 
-    def move(self, path: EquilibriumPath, shape: Bent, shown: Shown) -> None:
+    def move(self, path: EquilibriumPath, shape: RobotShape, shown: Shown) -> None:
         """Move them to a new state.
 
         Args:

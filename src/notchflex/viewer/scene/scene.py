@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.acting import Acting, acting_at
-from notchflex.plotting.shapes.bent import HELD, Bent, bent_at
-from notchflex.plotting.shapes.twist import rotation_of
+from notchflex.plotting.shapes.applied_loads import AppliedLoad, applied_loads
+from notchflex.plotting.shapes.robot_shape import HELD, RobotShape, shape_at
+from notchflex.plotting.shapes.interpolation import rotation_of
 from notchflex.results import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.viewer.controls import POINTING, Controls
@@ -124,7 +124,7 @@ class Scene:
         """Width of a cell of the grid on the floor, mm."""
         return self._grid_cell
 
-    def update(self, path: EquilibriumPath, controls: Controls) -> Bent:
+    def update(self, path: EquilibriumPath, controls: Controls) -> RobotShape:
         """Move everything to a new state.
 
         Args:
@@ -134,7 +134,7 @@ class Scene:
         Returns:
             The robot in that state.
         """
-        shape = bent_at(path, 0, PIECES)
+        shape = shape_at(path, 0, PIECES)
         held = shape.position[:1] - [0.0, 0.0, HELD * self.robot.tube.outer_radius]
         self._seen = np.concatenate([held, shape.position, shape.tip[None]])
         with self.server.atomic():
@@ -154,7 +154,7 @@ class Scene:
         lowest = {"up": HELD * outer, "sideways": 0.35 * self.length, "down": 1.1 * self.length}
         self._grid.position = (0.0, 0.0, -lowest[pointing])
 
-    def _dress(self, path: EquilibriumPath, shape: Bent) -> None:
+    def _dress(self, path: EquilibriumPath, shape: RobotShape) -> None:
         """Take other triangles for the flexures where other loads ask for more sections of them."""
         if len(self._skins[0].across.T) == len(shape.flexures[0].area):
             return
@@ -172,7 +172,7 @@ class Scene:
             if not more:
                 node.vertices = corners
 
-    def _move(self, shape: Bent) -> None:
+    def _move(self, shape: RobotShape) -> None:
         turned = quaternions(shape.rotation)
         for node, place, turn in zip(self._bodies, shape.position, turned, strict=True):
             node.position, node.wxyz = place, turn
@@ -191,8 +191,8 @@ class Scene:
             if colour != self._colours[number]:
                 self._flexures[number].color = self._colours[number] = colour
 
-    def _move_loads(self, path: EquilibriumPath, shape: Bent) -> None:
-        loads = acting_at(path, 0, shape) if self.shown.loads else []
+    def _move_loads(self, path: EquilibriumPath, shape: RobotShape) -> None:
+        loads = applied_loads(path, 0, shape) if self.shown.loads else []
         self._arrows.visible = bool(loads)
         for label in self._labels[len(loads) :]:
             label.visible = False
@@ -204,7 +204,7 @@ class Scene:
         for label, one, (_, end) in zip(self._labels, loads, ends, strict=False):
             label.text, label.position, label.visible = one.label, end, True
 
-    def _arrow(self, one: Acting) -> NDArray[np.float64]:
+    def _arrow(self, one: AppliedLoad) -> NDArray[np.float64]:
         most = max(self.reach.force, GRAVITY * self.reach.mass)
         size = max(one.size / most, _SHORTEST / _ARROW) * _ARROW * self.length
         return size * one.vector / one.size

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.bent import Bent, Sections, bent_by_angles
+from notchflex.plotting.shapes.robot_shape import RobotShape, FlexureShape, shape_from_angles
 from notchflex.robot import ArcNotch, Robot
 
 PIECES = 12  # straight pieces that a bent flexure is drawn with, at least
@@ -36,7 +36,7 @@ class Skin:
     out: Points
     faces: NDArray[np.int64]
 
-    def at(self, sections: Sections) -> Points:
+    def at(self, sections: FlexureShape) -> Points:
         """Place all corners for a bent flexure, mm, (k c, 3)."""
         x, y = self.across.T[..., None], self.out.T[..., None]
         rotation = sections.rotation[:, None]
@@ -44,7 +44,7 @@ class Skin:
         return points.reshape(-1, 3)
 
 
-def at_rest(robot: Robot, level: str = "tendons") -> Bent:
+def at_rest(robot: Robot, level: str = "tendons") -> RobotShape:
     """Return a robot as it stands when nothing loads it, drawn with `PIECES`.
 
     Args:
@@ -52,10 +52,10 @@ def at_rest(robot: Robot, level: str = "tendons") -> Bent:
         level: For which loads its chain is assembled; more of them may ask for more sections.
     """
     free = np.radians([notch.precurvature_deg for notch in robot.notches])
-    return bent_by_angles(robot, free, PIECES, level)
+    return shape_from_angles(robot, free, PIECES, level)
 
 
-def skins(rest: Bent) -> list[Skin]:
+def skins(rest: RobotShape) -> list[Skin]:
     """Return the surfaces of all flexures of a robot, base to tip.
 
     Args:
@@ -68,7 +68,7 @@ def skins(rest: Bent) -> list[Skin]:
     ]
 
 
-def _spine(rest: Bent, notch: int) -> Skin:
+def _spine(rest: RobotShape, notch: int) -> Skin:
     """A piece of the wall with the edges that the cut made: radial ones, or one straight cut."""
     one, tube = rest.flexures[notch], rest.robot.tube
     outer, inner = tube.outer_radius, tube.inner_radius
@@ -93,7 +93,7 @@ def _spine(rest: Bent, notch: int) -> Skin:
     return Skin(across, out, _box(len(axis), ROUND + 1))
 
 
-def _strip(rest: Bent, notch: int) -> Skin:
+def _strip(rest: RobotShape, notch: int) -> Skin:
     """A strip across the tube, its walls as far out as the tube's are there."""
     one, tube = rest.flexures[notch], rest.robot.tube
     view = np.radians(rest.robot.notches[notch].direction_deg)

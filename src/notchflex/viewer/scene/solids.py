@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.bent import Bent
+from notchflex.plotting.shapes.robot_shape import RobotShape
 from notchflex.plotting.shapes.outline import body_corners
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Mesh(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def body_solids(rest: Bent) -> list[Mesh]:
+def body_solids(rest: RobotShape) -> list[Mesh]:
     """Return the rigid pieces of a robot, base first, each in its own frame (mm).
 
     Args:
@@ -42,7 +42,7 @@ def body_solids(rest: Bent) -> list[Mesh]:
     return [_body(rest, body) for body in range(len(rest.position))]
 
 
-def _body(rest: Bent, body: int) -> Mesh:
+def _body(rest: RobotShape, body: int) -> Mesh:
     notch = rest.robot.notches[max(body - 1, 0)]
     view = float(np.radians(notch.direction_deg))
     corners = np.array(body_corners(rest, body, view))
@@ -60,7 +60,7 @@ def _body(rest: Bent, body: int) -> Mesh:
     return Mesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
 
 
-def _tube(rest: Bent, along: NDArray[np.float64]) -> Manifold:
+def _tube(rest: RobotShape, along: NDArray[np.float64]) -> Manifold:
     """The wall of the tube, longer than what is to be cut from it."""
     from manifold3d import Manifold
 
@@ -73,7 +73,7 @@ def _tube(rest: Bent, along: NDArray[np.float64]) -> Manifold:
     return (outer - inner).translate((0.0, 0.0, low))
 
 
-def _through(polygon: NDArray[np.float64], view: float, rest: Bent) -> Manifold:
+def _through(polygon: NDArray[np.float64], view: float, rest: RobotShape) -> Manifold:
     """All that lies behind a polygon (across, along) seen from the side."""
     from manifold3d import CrossSection, FillRule, Manifold
 
