@@ -230,7 +230,7 @@ def test_rig_in_a_browser_is_that_on_paper(drawn):
     assert {one.legendgroup for one in shown.layout.shapes} <= groups
     deviation = rig.readings.coefficient_deviation
     readings = next(one for one in shown.data if one.name == "reading")
-    assert readings.error_y.array[0] is None
+    assert np.isnan(readings.error_y.array[0])
     np.testing.assert_allclose(readings.error_y.array[1:], deviation[1:], rtol=1e-5)
     assert readings.text[0] == ""
     ends = np.array([bar[:, 1] for bar in left.collections[0].get_segments()])

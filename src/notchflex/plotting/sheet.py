@@ -69,7 +69,8 @@ class Line:
 
 def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Line:
     """Return round markers without a line; `options` are those of `Line`."""
-    return Line(points, colour, **({"dash": None, "marker": "o", "size": size} | options))
+    look: dict[str, Any] = {"dash": None, "marker": "o", "size": size}
+    return Line(points, colour, **(look | options))
 
 
 @dataclass(frozen=True)

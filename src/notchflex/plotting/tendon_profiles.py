@@ -37,7 +37,8 @@ def span_line(path: EquilibriumPath, step: int, tendon: int, colour: Colour, **l
     """Return the tension of a tendon (from 0) from span to span at one step."""
     tension = path.span_tension[step, tendon, : spans_of(path, tendon)]
     points = np.stack([np.arange(len(tension)), tension], axis=1)
-    return Line(points, colour, **({"marker": "o", "size": 1.8, "hover": True} | look))
+    usual: dict[str, Any] = {"marker": "o", "size": 1.8, "hover": True}
+    return Line(points, colour, **(usual | look))
 
 
 def profile_panel(path: EquilibriumPath, tendon: int) -> Panel:

@@ -127,7 +127,8 @@ def _add_axes(
     for name in "xyz" if panel.in_space else "xy":
         label = for_browser(getattr(panel, f"{name}_label"))
         found[name] = {
-            "title": {"text": label, "standoff": 6}, "gridcolor": "#e6e6e6", "zeroline": False,
+            "title": {"text": label, "standoff": 6, "font": {"size": 9.0 * POINT}},
+            "gridcolor": "#e6e6e6", "zeroline": False,
             "range": list(getattr(axes, f"get_{name}lim")()),
         }  # fmt: skip
         if name in panel.whole:
@@ -170,7 +171,7 @@ def _add_legend(legend: Any, name: str, layout: dict[str, Any]) -> dict[str, Any
     box = legend.get_window_extent().transformed(figure.transFigure.inverted())
     layout[name] = {
         "x": box.x0, "xanchor": "left", "y": box.y1, "yanchor": "top", "indentation": -4,
-        "font": {"size": 8.0 * POINT}, "bgcolor": "rgba(255,255,255,0.7)", "tracegroupgap": 0,
+        "font": {"size": 7.5 * POINT}, "bgcolor": "rgba(255,255,255,0.7)", "tracegroupgap": 0,
     }  # fmt: skip
     return {"legend": name}
 
