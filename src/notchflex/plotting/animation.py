@@ -76,15 +76,10 @@ def save_animation(
     figure.draw_without_rendering()  # arranges the axes, once for all frames
     figure.set_layout_engine("none")
     robot, *curves = figure.axes
-    limits = _limits(robot)
+    limits = {name: getattr(robot, f"get_{name}lim")() for name in _axes_of(robot)}
     view = plane_of(path)
-    dots = [
-        axes.plot(x, y, "o", color=colour, markersize=5.0, zorder=9)[0]
-        for axes, (x, y, colour) in zip(curves, _dots(path, steps[0]), strict=True)
-    ]
-    frame = min(max(_SHORTEST, SECONDS / 1.5 / len(steps)), _LONGEST)
-    rest = SECONDS - (len(steps) - 2) * frame
-    standing = math.ceil(max(STANDING_SECONDS, rest / 2.0) / frame)
+    dots = [axes.plot([], [], "o", color=BLACK, markersize=5.0, zorder=9)[0] for axes in curves]
+    frame, standing = _durations(len(steps))
     writer = PillowWriter(fps=1.0 / frame)  # pyright: ignore[reportArgumentType]
     with (
         replacing(target) as temporary,
@@ -95,12 +90,19 @@ def save_animation(
             robot.clear()
             draw_panel(robot, _robot(path, step, view))
             _limit(robot, limits)
-            for dot, (x, y, _) in zip(dots, _dots(path, step), strict=True):
-                dot.set_data(x, y)
+            for dot, points in zip(dots, _dots(path, step), strict=True):
+                dot.set_data(*points)
             for _ in range(standing if number in (0, len(steps) - 1) else 1):
                 writer.grab_frame()
             if progress is not None:
                 progress(number + 1, len(steps))
+
+
+def _durations(count: int) -> tuple[float, int]:
+    """Return the duration of a frame [s], and how many frames the first and the last one last."""
+    frame = min(max(_SHORTEST, SECONDS / 1.5 / count), _LONGEST)
+    rest = SECONDS - (count - 2) * frame
+    return frame, math.ceil(max(STANDING_SECONDS, rest / 2.0) / frame)
 
 
 def frames_of(path: EquilibriumPath) -> list[int]:
@@ -125,23 +127,22 @@ def _robot(path: EquilibriumPath, step: int, view: float | None) -> Panel:
     return replace(panel, legend="", title=label)
 
 
-def _dots(path: EquilibriumPath, step: int) -> list[tuple[list[float], list[float], str]]:
+def _dots(path: EquilibriumPath, step: int) -> list[tuple[list[float], list[float]]]:
     """Return the points of a step on the curves of the total angle and of the notches."""
     x = float(abscissa(path)[0][step])
     total = float(path.total_angle[step]) * QUANTITIES["total_angle"].scale
     notches = [float(one) for one in path.notch_angle[step] * QUANTITIES["notch_angle"].scale]
-    return [([x], [total], BLACK), ([x] * len(notches), notches, BLACK)]
+    return [([x], [total]), ([x] * len(notches), notches)]
 
 
-def _limits(axes: Any) -> dict[str, Any]:
-    names = "xyz" if axes.name == "3d" else "xy"
-    return {name: getattr(axes, f"get_{name}lim")() for name in names}
+def _axes_of(axes: Any) -> str:
+    return "xyz" if axes.name == "3d" else "xy"
 
 
 def _limit(axes: Any, limits: dict[str, Any]) -> None:
     if axes.name != "3d":
         axes.set_aspect("equal", adjustable="box", anchor="C")
-    for name, given in limits.items():
-        getattr(axes, f"set_{name}lim")(*given)
+    for name, ends in limits.items():
+        getattr(axes, f"set_{name}lim")(*ends)
     if axes.name == "3d":
-        axes.set_box_aspect([np.ptp(given) for given in limits.values()], zoom=0.92)
+        axes.set_box_aspect([np.ptp(ends) for ends in limits.values()], zoom=0.92)

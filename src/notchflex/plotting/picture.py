@@ -54,14 +54,14 @@ def _picture(result: Any) -> Picture:
     from notchflex.results import Equilibrium, EquilibriumPath
     from notchflex.robot import Robot
 
-    kinds: tuple[tuple[type, Callable[[Any], Picture]], ...] = (
-        (Robot, robot_picture),
-        (EquilibriumPath, path_picture),
-        (Equilibrium, lambda state: state_picture(state.path, state.step)),
-        (Batch, batch_picture),
-        (Comparison, comparison_picture),
-    )
-    for kind, describe in kinds:
+    kinds: dict[type, Callable[[Any], Picture]] = {
+        Robot: robot_picture,
+        EquilibriumPath: path_picture,
+        Equilibrium: lambda state: state_picture(state.path, state.step),
+        Batch: batch_picture,
+        Comparison: comparison_picture,
+    }
+    for kind, describe in kinds.items():
         if isinstance(result, kind):
             return describe(result)
     if isinstance(result, Mapping) and all(

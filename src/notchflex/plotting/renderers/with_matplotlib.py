@@ -47,7 +47,8 @@ def figure_of(picture: Sheet) -> Figure:
             options: dict[str, Any] = {"projection": "3d"} if panel.in_space else {}
             options |= {f"share{name}": shared.get(name) for name in panel.shared}
             axes: Any = figure.add_subplot(place, **options)
-            shared = dict.fromkeys(panel.shared, axes) | shared
+            for name in panel.shared:
+                shared.setdefault(name, axes)
             draw_panel(axes, panel)
             if panel.scale:
                 scales.setdefault(panel.scale, []).append(axes)

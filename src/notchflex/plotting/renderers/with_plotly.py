@@ -1,11 +1,10 @@
 """Draws a picture with plotly: one HTML file that needs no network.
 
-matplotlib arranges the panels, limits and legends; this file draws the marks at these places.
+matplotlib arranges the panels, limits and legends; `plotly_marks.py` draws the marks there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from html import escape
 from pathlib import Path as FilePath
 from typing import Any
@@ -14,34 +13,13 @@ import numpy as np
 
 from notchflex._extras import need
 from notchflex.plotting.labels import for_browser, heading_lines
+from notchflex.plotting.renderers.plotly_marks import INCH, POINT, area_trace, line_trace, traces
 from notchflex.plotting.renderers.with_matplotlib import figure_of
-from notchflex.plotting.sheet import (
-    Area,
-    Arrow,
-    Bars,
-    Correlations,
-    Faces,
-    Line,
-    Note,
-    Panel,
-    Sheet,
-    Span,
-)
-from notchflex.plotting.style import diverging_colours, rgb
+from notchflex.plotting.sheet import Area, Panel, Sheet
 from notchflex.results.files.writing import write_text
-
-INCH = 100.0
-"""Pixels for an inch of paper, where the window is as wide as the picture."""
-POINT = INCH / 72.0
-"""Pixels for a point."""
 
 NARROWEST = 0.75
 """A picture shrinks with its window to this part of its width; below it is scrolled."""
-
-_SYMBOLS = {
-    "o": "circle", "s": "square", "^": "triangle-up", "D": "diamond", "v": "triangle-down",
-    "P": "cross", "*": "star", "X": "x",
-}  # fmt: skip
 
 
 def interactive_of(picture: Sheet) -> Any:
@@ -76,13 +54,13 @@ def interactive_of(picture: Sheet) -> Any:
         where = _add_axes(cell.panel, axes, number, layout, shared)
         where |= _add_legend(axes.get_legend(), f"legend{number + 1}", layout)
         for item in sorted(cell.panel.items, key=lambda item: item.layer):
-            for trace in _traces(item, cell.panel, where, layout):
+            for trace in traces(item, cell.panel, where, layout):
                 figure.add_trace(trace | where)
     for legend in paper.legends:
         _add_legend(legend, "legend", layout)
         layout["legend"] |= {"orientation": "h", "x": 0.5, "xanchor": "center"}
         for entry in picture.legend:
-            trace = _area(entry) if isinstance(entry, Area) else _line(entry, None)
+            trace = area_trace(entry) if isinstance(entry, Area) else line_trace(entry, None)
             figure.add_trace(trace | {"legend": "legend"})
     figure.update_layout(layout)
     return figure
@@ -174,197 +152,3 @@ def _add_legend(legend: Any, name: str, layout: dict[str, Any]) -> dict[str, Any
         "font": {"size": 7.5 * POINT}, "bgcolor": "rgba(255,255,255,0.7)", "tracegroupgap": 0,
     }  # fmt: skip
     return {"legend": name}
-
-
-def _traces(
-    item: Any, panel: Panel, where: dict[str, Any], layout: dict[str, Any]
-) -> Iterator[dict[str, Any]]:
-    """Yield the traces of a mark; shapes, notes and tick labels are added to `layout`."""
-    match item:
-        case Line():
-            yield _line(item, panel)
-        case Area():
-            yield _area(item)
-        case Faces():
-            yield _mesh(item)
-        case Arrow():
-            yield from _arrow(item)
-        case Span():
-            layout["shapes"].append(_shape(item, where))
-            if item.name:  # a shape has no entry in a legend
-                look: dict[str, Any] = {"name": item.name, "group": item.group or item.name}
-                if item.low == item.high:
-                    yield _line(Line([], item.colour, item.dash, item.width, **look), None)
-                else:
-                    yield _area(Area([], item.colour, item.colour, item.opacity, 0.0, **look))
-        case Bars():
-            names = [for_browser(name) for name in item.names]
-            _axis(layout, where, "y").update(
-                tickvals=list(range(len(names))), ticktext=names, showgrid=False, ticks=""
-            )
-            yield {
-                "type": "bar", "orientation": "h", "x": list(item.values),
-                "marker": {"color": [css(colour) for colour in item.colours]}, "width": 0.6,
-                "text": [f"{value:.2f}" for value in item.values], "customdata": names,
-                "textposition": "outside", "cliponaxis": False, "showlegend": False,
-                "hovertemplate": "%{customdata}: %{x}<extra></extra>",
-            }  # fmt: skip
-        case Correlations():
-            yield _correlations(item, where, layout)
-        case Note():
-            place: dict[str, Any] = {"x": 0.5, "y": 0.5}
-            if item.corner:
-                place = {"x": 0.03, "y": 0.95, "xanchor": "left", "yanchor": "top"}
-            layout["annotations"].append(
-                {"text": for_browser(item.text), "font": {"color": css(item.colour)}, **place,
-                 "xref": f"{where['xaxis']} domain", "yref": f"{where['yaxis']} domain",
-                 "showarrow": False}
-            )  # fmt: skip
-        case _:
-            raise NotImplementedError(f"plotly draws no {type(item).__name__}")
-
-
-def _line(item: Line, panel: Panel | None) -> dict[str, Any]:
-    """Return a line as a trace; without a panel it is only the entry of a legend."""
-    in_space = panel is not None and panel.in_space
-    rows = item.rows if len(item.rows) else np.full((1, 3 if in_space else 2), np.nan)
-    colour = css(item.colour)
-    symbol = _SYMBOLS.get(item.marker, "circle")
-    trace: dict[str, Any] = {
-        "type": "scatter3d" if in_space else "scatter", **dict(zip("xyz", rows.T, strict=False)),
-        "mode": "+".join(["lines"] * (item.dash is not None) + ["markers"] * bool(item.marker)),
-        "line": {"color": colour, "width": POINT * item.width * (2 if in_space else 1)},
-        "marker": {"size": POINT * item.size, "color": colour,
-                   "symbol": f"{symbol}-open" if item.hollow else symbol},
-        "hoverinfo": "skip", **_named(item),
-    }  # fmt: skip
-    if item.dash and not in_space:
-        trace["line"]["dash"] = _dashes(item)
-    error = ""
-    if item.error is not None:
-        trace["error_y"] = {
-            "type": "data", "array": np.asarray(item.error), "width": 0, "thickness": POINT * 0.7,
-            "color": colour,
-        }  # fmt: skip
-        trace["text"] = [f" ± {one:.2g}" if np.isfinite(one) else "" for one in item.error]
-        error = "%{text}"
-    if item.hover and panel is not None:
-        name, x, y = map(for_browser, (item.name or item.group, panel.x_label, panel.y_label))
-        trace["hoverinfo"] = "all"
-        trace["hovertemplate"] = (
-            f"{name}<br>{x}: %{{x:.4g}}<br>{y}: %{{y:.4g}}{error}<extra></extra>"
-        )
-    return trace
-
-
-def _area(item: Area) -> dict[str, Any]:
-    """Return polygons as a trace, closed and with a gap behind each."""
-    gap = np.full((1, 2), np.nan)
-    rows = np.concatenate([gap, *(part for one in item.polygons for part in (one, one[:1], gap))])
-    return {
-        "type": "scatter", "mode": "lines", "fill": "toself", "x": rows[1:, 0], "y": rows[1:, 1],
-        "fillcolor": css(item.face, item.opacity),
-        "line": {"color": css(item.edge), "width": POINT * item.width},
-        "hoverinfo": "skip", **_named(item),
-    }  # fmt: skip
-
-
-def _mesh(item: Faces) -> dict[str, Any]:
-    corners = item.corners.reshape(-1, 3)
-    first = 4 * np.arange(len(item.corners))
-    triangles = np.concatenate(
-        [np.stack([first, first + 1, first + 2]), np.stack([first, first + 2, first + 3])], axis=1
-    )
-    return {
-        "type": "mesh3d", **dict(zip("xyz", corners.T, strict=True)),
-        **dict(zip("ijk", triangles, strict=True)),
-        "facecolor": [css(colour) for colour in item.colours] * 2, "flatshading": True,
-        "lighting": {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}, "hoverinfo": "skip",
-        # The faces have colours of their own; this one is that of the legend.
-        "color": css(item.colour), **_named(item),
-    }  # fmt: skip
-
-
-def _arrow(item: Arrow) -> Iterator[dict[str, Any]]:
-    start, end = np.asarray(item.start, float), np.asarray(item.end, float)
-    step, colour = end - start, css(item.colour)
-    look: dict[str, Any] = {"hoverinfo": "skip", **_named(item)}
-    if len(start) == 3:
-        ends = zip("xyz", np.stack([start, end]).T, strict=True)
-        line = {"color": colour, "width": 3.0 * item.width}
-        yield {"type": "scatter3d", "mode": "lines", "line": line, **dict(ends), **look}
-        yield {
-            "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
-            "colorscale": [[0, colour], [1, colour]], "hoverinfo": "skip", "showlegend": False,
-            **dict(zip("xyzuvw", np.concatenate([end, 0.3 * step])[:, None], strict=True)),
-        }  # fmt: skip
-        return
-    # As matplotlib's arc3: a parabola whose control point is offset by `bend` of the length.
-    control = 0.5 * (start + end) + item.bend * np.array([step[1], -step[0]])
-    part = np.linspace(0.0, 1.0, 21)[:, None]
-    curve = (1 - part) ** 2 * start + 2 * part * (1 - part) * control + part**2 * end
-    yield {
-        "type": "scatter", "mode": "lines+markers", "x": curve[:, 0], "y": curve[:, 1],
-        "line": {"color": colour, "width": POINT * item.width},
-        "marker": {"symbol": "arrow", "angleref": "previous", "color": colour,
-                   "size": [0.0] * 20 + [11.0]}, **look,
-    }  # fmt: skip
-
-
-def _shape(item: Span, where: dict[str, Any]) -> dict[str, Any]:
-    """Return what goes across the whole panel; it is shown and hidden with its group."""
-    own, other = ("x", "y") if item.axis == "x" else ("y", "x")
-    shape: dict[str, Any] = {
-        f"{own}0": item.low, f"{own}1": item.high, f"{own}ref": where[f"{own}axis"],
-        f"{other}0": 0, f"{other}1": 1, f"{other}ref": f"{where[f'{other}axis']} domain",
-    }  # fmt: skip
-    if group := item.group or item.name:
-        shape["legendgroup"] = for_browser(group)
-    if item.low == item.high:
-        line: dict[str, Any] = {"color": css(item.colour), "width": POINT * item.width}
-        return shape | {"type": "line", "line": line | {"dash": _dashes(item) or "solid"}}
-    fill = css(item.colour, item.opacity)
-    return shape | {"type": "rect", "line": {"width": 0}, "layer": "below", "fillcolor": fill}
-
-
-def _correlations(
-    item: Correlations, where: dict[str, Any], layout: dict[str, Any]
-) -> dict[str, Any]:
-    count = len(item.names)
-    for name, texts in (("x", [str(one + 1) for one in range(count)]), ("y", item.rows)):
-        size = POINT * min(7.0, 3.1 * item.font_size)
-        _axis(layout, where, name).update(
-            tickvals=list(range(count)), ticktext=[for_browser(text) for text in texts],
-            tickfont={"size": size}, showgrid=False,
-        )  # fmt: skip
-    names = [for_browser(name) for name in item.names]
-    return {
-        "type": "heatmap", "z": item.values, "zmin": -1.0, "zmax": 1.0, "showscale": False,
-        "colorscale": [[i / 20, css(colour)] for i, colour in enumerate(diverging_colours(21))],
-        "text": item.texts, "texttemplate": "%{text}",
-        "textfont": {"size": POINT * item.font_size},
-        "customdata": [[f"{one}<br>{other}" for other in names] for one in names],
-        "hovertemplate": "%{customdata}<br>%{text}<extra></extra>",
-    }  # fmt: skip
-
-
-def _axis(layout: dict[str, Any], where: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the layout of the axis x or y of a panel, whose name for plotly is like x2."""
-    return layout[f"{name}axis{where[f'{name}axis'][1:]}"]
-
-
-def _named(item: Any) -> dict[str, Any]:
-    """Return the legend entry of a mark, and the group with which it is shown and hidden."""
-    group = for_browser(item.group)
-    named = {"name": for_browser(item.name) or group, "showlegend": bool(item.name)}
-    return named | ({"legendgroup": group} if group else {})
-
-
-def _dashes(item: Line | Span) -> str:
-    return ",".join(f"{POINT * item.width * one:.1f}px" for one in item.dash or ())
-
-
-def css(colour: Any, opacity: float = 1.0) -> str:
-    """Return a colour as HTML takes it."""
-    red, green, blue = (round(255 * part) for part in rgb(colour))
-    return f"rgba({red},{green},{blue},{opacity:g})"
