@@ -297,3 +297,22 @@ def test_a_missing_library_is_told_with_its_command(drawn, tmp_path, monkeypatch
     with pytest.raises(InputError, match=words):
         drawn["state"].save(tmp_path / f"a{suffix}")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_browser_has_the_arrangement_of_paper(drawn):
+    own = drawn["beside"]
+    paper, layout = own.figure(), own.interactive().layout
+    paper.draw_without_rendering()
+    for number, axes in enumerate(paper.axes, 1):
+        suffix = "" if number == 1 else str(number)
+        x, y = layout[f"xaxis{suffix}"], layout[f"yaxis{suffix}"]
+        box = axes.get_position()
+        assert x.domain == pytest.approx((box.x0, box.x1), abs=1e-3)
+        assert y.domain == pytest.approx((box.y0, box.y1), abs=1e-3)
+        assert x.range == pytest.approx(axes.get_xlim(), rel=1e-3)
+        assert y.range == pytest.approx(axes.get_ylim(), rel=1e-3)
+        if axes.get_legend() is not None:
+            legend = axes.get_legend().get_window_extent()
+            assert layout[f"legend{number + 1}"].x == pytest.approx(
+                legend.x0 / paper.bbox.width, abs=1e-2
+            )

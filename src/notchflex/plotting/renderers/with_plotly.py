@@ -119,7 +119,7 @@ def _add_axes(
         layout[f"scene{suffix}"] = {
             "domain": domain, "aspectmode": "manual",
             "aspectratio": {name: one / max(span.values()) for name, one in span.items()},
-            "camera": {"eye": {"x": 0.7, "y": -1.5, "z": 0.5}},
+            "camera": {"eye": {"x": 0.8, "y": -1.7, "z": 0.55}},
             **{f"{name}axis": axis for name, axis in found.items()},
         }  # fmt: skip
         return {"scene": f"scene{suffix}"}

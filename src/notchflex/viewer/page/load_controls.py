@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from notchflex.viewer.controls import POINTING, STROKE, TENSION, Controls
-from notchflex.viewer.page.sliders import Choice, NumberField, Slider, add_button
+from notchflex.viewer.page.sliders import Dropdown, NumberField, Slider, add_button
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
@@ -29,10 +29,10 @@ class LoadControls:
         count = viewer.session.robot.number_of_tendons
         with gui.add_folder("Tendons", order=1.0) as tendons:
             self._drives = [_Drive(viewer, self, tendon) for tendon in range(count)]
-            self._chosen: Choice | None = None
+            self._chosen: Dropdown | None = None
             if count > 1:
                 numbers = tuple(str(i + 1) for i in range(count))
-                self._chosen = Choice(gui, "charts show tendon", numbers, self._choose)
+                self._chosen = Dropdown(gui, "charts show tendon", numbers, self._choose)
             hint = "load and unload the tendon of the charts"
             add_button(gui, "Play a cycle", lambda _: viewer.ask(self._cycle), hint)
             add_button(gui, "Stop", lambda _: viewer.interrupt(viewer.halt), "stop at this state")
@@ -40,7 +40,7 @@ class LoadControls:
             add_button(gui, "Reset", lambda _: viewer.interrupt(viewer.reset), hint)
         with gui.add_folder("At the tip", order=2.0) as tip:
             self._at_tip = [self._load(count + i, label) for i, label in enumerate(_AT_TIP)]
-            self._pointing = Choice(
+            self._pointing = Dropdown(
                 gui,
                 "tube points",
                 tuple(POINTING),
@@ -91,7 +91,7 @@ class _Drive:
         self._of = f" {tendon + 1}" if viewer.session.robot.number_of_tendons > 1 else ""
         self._key = ("by", tendon)
         texts = tuple(_BY.values())
-        self._by = Choice(viewer.server.gui, f"tendon{self._of} by", texts, self._choose)
+        self._by = Dropdown(viewer.server.gui, f"tendon{self._of} by", texts, self._choose)
         self._sliders = {by: self._slider(by) for by in _BY}
         self._ends = {by: self._end(by) for by in _BY}
         self._show(TENSION)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from notchflex.robot import Robot
 from notchflex.viewer import parts
-from notchflex.viewer.page.sliders import Choice, NumberField
+from notchflex.viewer.page.sliders import Dropdown, NumberField
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
@@ -46,7 +46,7 @@ class _PartFolder:
         )
         with self.folder:
             kinds, kind = tuple(parts.kinds(section)), getattr(robot, section).kind
-            self._kind = Choice(gui, "law", kinds, self._choose, kind)
+            self._kind = Dropdown(gui, "law", kinds, self._choose, kind)
             self._fill(robot)
 
     def _choose(self, kind: str) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from notchflex.errors import InputError
 from notchflex.robot import Robot, list_robots, load_robot, robot_from_text
 from notchflex.viewer.page import saving
-from notchflex.viewer.page.sliders import Choice, add_button
+from notchflex.viewer.page.sliders import Dropdown, add_button
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
@@ -41,7 +41,7 @@ class RobotControls:
             add_button(gui, side, lambda _: viewer.ask(lambda: viewer.page.look(side=True)))
             add_button(gui, "View as at first", lambda _: viewer.ask(viewer.page.look))
         with gui.add_folder("Robot", order=6.0, expand_by_default=False) as robot:
-            Choice(gui, "ready robot", (_CHOOSE, *list_robots()), self._load)
+            Dropdown(gui, "ready robot", (_CHOOSE, *list_robots()), self._load)
             file = gui.add_upload_button("Load a robot file", mime_type=".toml")
         with gui.add_folder("Save", order=7.0, expand_by_default=False) as save:
             hint = "with loads, loop, numbers and legend"

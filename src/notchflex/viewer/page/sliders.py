@@ -127,7 +127,7 @@ class NumberField(_Control):
             self._handle.value = float(value)
 
 
-class Choice:
+class Dropdown:
     """A drop-down list; `act` is called with what a person selects, in the event loop."""
 
     def __init__(
