@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
 STEP = "step"
-"""What stands for the number of the step, from 1."""
+"""Name of the number of the step, from 1."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Series:
     """Values of one quantity along a path, S steps, k entries.
 
     Attributes:
-        label: What stands at the axis, with symbol and unit.
-        names: What a legend calls each entry; "" for a quantity with one number.
-        headers: The CSV column of each entry; "" where it has none.
+        label: Label of the axis, with symbol and unit.
+        names: Legend entries; "" for a quantity with one number.
+        headers: CSV columns of the entries; "" for none.
         values: (S, k), in the units of pictures.
-        per: What the entries stand for, such as ("notch",).
+        per: Meaning of the entries, such as ("notch",).
     """
 
     label: str
@@ -53,13 +53,13 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
     """Draw one quantity of a path over another, or the shape of a state or a robot.
 
     Args:
-        thing: A path; a state or a robot where x and y are None.
+        thing: A path; a state or a robot if x and y are None.
         x: Quantity along the horizontal axis; see `notchflex.plot`.
         y: Quantity along the vertical axis.
         ax: Axes to draw into; new ones of pyplot if None.
 
     Raises:
-        InputError: It can't be drawn on one pair of axes, or there is no such quantity.
+        InputError: It can't be drawn on one pair of axes, or the quantity is unknown.
     """
     from notchflex.results import Equilibrium, EquilibriumPath
 
@@ -100,7 +100,7 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
     """Return one quantity of a path over another; loading and unloading have their own lines.
 
     Raises:
-        InputError: There is no such quantity, it is no number, or x has several entries.
+        InputError: The quantity is unknown or not numeric, or x has several entries.
     """
     both = len({way for _, way in branches(load_parameter(path))}) > 1
     across, upward = series_of(path, x), series_of(path, y)
@@ -126,7 +126,7 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
     """Return a quantity of a path by its name, or one of its entries by its CSV column.
 
     Raises:
-        InputError: There is none of that name, or it has no numbers that could be drawn.
+        InputError: The name is unknown, or the quantity has no numbers to draw.
     """
     if name == STEP:
         return Series(STEP, [""], [""], np.arange(1.0, len(path) + 1.0)[:, None])
@@ -166,12 +166,12 @@ def _label(quantity: Quantity, entry: Entry) -> str:
 
 
 def _pairs(x: str, across: Series, upward: Series) -> list[tuple[int, int]]:
-    """Which entry of y is drawn over which of x: equal tendons or notches, or all over the one."""
+    """Return pairs of entries of x and y: the same tendons or notches, or all over one."""
     count = across.values.shape[1]
     if count > 1 and across.per == upward.per:
         return [(index, index) for index in range(count)]
     used = range(count)
-    if count > 1 and across.per == ("tendon",):  # tendons that nobody pulls say nothing
+    if count > 1 and across.per == ("tendon",):  # only tendons that are pulled
         used = np.flatnonzero(np.ptp(across.values, axis=0) > 0.0).tolist()
     if len(used) != 1:
         columns = ", ".join(header for header in across.headers if header) or "tension, stroke"

@@ -119,12 +119,12 @@ def body_corners(shape: RobotShape, body: int, view: float) -> list[tuple[float,
 
 
 def _sides(shape: RobotShape, body: int, view: float) -> list[tuple[float, float] | None]:
-    """From where to where a body has wall on the right and the left."""
+    """Return the ends of the wall of a body on the right and the left; None if no wall."""
     return [shape.walls(np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
 
 
 def _centre_line(shape: RobotShape) -> NDArray[np.float64]:
-    """The tube axis, along the bodies and, where a notch has a spine beside it, the notches."""
+    """Return the tube axis along the bodies, and along notches with a spine beside it."""
     rods = shape.chain.rods
     points: list[NDArray[np.float64]] = []
     for body, length in enumerate(shape.body_length):
@@ -139,9 +139,9 @@ def _centre_line(shape: RobotShape) -> NDArray[np.float64]:
 def _reach(
     shape: RobotShape, body: int, across: NDArray[np.float64], inner: float
 ) -> tuple[float, float]:
-    """How near to the axis the wall of a body comes on the right and the left.
+    """Return the distance of the wall of a body from the axis on the right and the left.
 
-    To the inside of the tube, or farther where a flexure is joined to it.
+    The inner radius, or less where a flexure is attached.
     """
     reach = [inner, inner]
     joined = []
@@ -164,16 +164,16 @@ def _body(
     outer: float,
     reach: tuple[float, float],
 ) -> list[tuple[float, float]]:
-    """Corners of a body (across, along), from the lower right one upward, then down on the left."""
+    """Return the corners of a body (across, along), counter-clockwise from the lower right."""
     if right is None or left is None:
         sign, wall, inside = (-1.0, left, reach[1]) if right is None else (1.0, right, reach[0])
-        assert wall is not None  # a body has wall somewhere
+        assert wall is not None  # every body has a wall
         low, high = wall
         return [
             (sign * at, z) for at, z in ((outer, low), (outer, high), (inside, high), (inside, low))
         ]
     low, high = max(right[0], left[0]), min(right[1], left[1])
-    # Both walls are joined where they stand side by side, else from one to the other aslant.
+    # Walls that overlap are connected at right angles, others diagonally.
     top = [(reach[0], high), (-reach[1], high)] if high > low else []
     foot = [(-reach[1], low), (reach[0], low)] if high > low else []
     return [

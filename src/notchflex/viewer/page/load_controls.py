@@ -15,11 +15,7 @@ _AT_TIP = ("force x [N]", "force y [N]", "force z [N]", "hung weight [g]")
 
 
 class LoadControls:
-    """The folders "Tendons" and "At the tip" of a page.
-
-    Args:
-        viewer: The viewer.
-    """
+    """The folders "Tendons" and "At the tip" of a page."""
 
     def __init__(self, viewer: Viewer) -> None:
         """Add them with the current loads."""

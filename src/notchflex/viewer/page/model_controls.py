@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 
 
 class ModelControls:
-    """The folders "Friction" and "Material" of a page; a change repeats the load history.
-
-    Args:
-        viewer: The viewer.
-    """
+    """The folders "Friction" and "Material" of a page; a change repeats the load history."""
 
     def __init__(self, viewer: Viewer) -> None:
         """Add them with the values of the robot."""

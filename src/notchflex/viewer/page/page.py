@@ -27,11 +27,7 @@ STYLE = """<style>
 
 
 class Page:
-    """The panels beside the scene; all methods are called by the solver thread.
-
-    Args:
-        viewer: The viewer.
-    """
+    """The panels beside the scene; all methods are called by the solver thread."""
 
     def __init__(self, viewer: Viewer) -> None:
         """Add all panels."""

@@ -24,11 +24,7 @@ _CHOOSE = "choose ..."
 
 
 class RobotControls:
-    """The folders "Show", "Robot" and "Save" of a page.
-
-    Args:
-        viewer: The viewer.
-    """
+    """The folders "Show", "Robot" and "Save" of a page."""
 
     def __init__(self, viewer: Viewer) -> None:
         """Add them."""

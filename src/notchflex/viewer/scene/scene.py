@@ -26,13 +26,13 @@ from notchflex.viewer.scene.solids import body_solids
 if TYPE_CHECKING:
     import viser
 
-# As a part of the outer radius of the tube.
+# In outer radii of the tube.
 _FRAME = 2.2
-# As parts of the length of the robot.
+# In lengths of the robot.
 _ARROW, _SHORTEST = 0.35, 0.06
 _SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
 SEE_THROUGH = 0.35
-# Where lamps stand, and how bright they are.
+# Directions of lights, and their intensities.
 _LIGHTS = (((0.6, -1.0, 0.8), 1.6), ((-1.0, -0.3, 0.5), 0.7), ((0.3, 1.0, 0.4), 0.7))
 ROOT = "/robot"
 

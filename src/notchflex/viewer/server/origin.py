@@ -1,7 +1,7 @@
 """Checks the addresses of a request: the defence against other pages in the same browser.
 
 A page of another site can send requests to 127.0.0.1, and after DNS rebinding even under its own
-name. Browsers tell in `Origin` which page asks and in `Host` which name it used, and a page can
+name. Browsers send the page in `Origin` and the name that it used in `Host`, and a page can
 forge neither.
 """
 

@@ -2,8 +2,8 @@
 
 viser 1.1 has no setting for this and hands its own `process_request` to `websockets`. Its server
 thread looks `websockets.asyncio.server.serve` up when it starts, so that public function is
-replaced until the server stands; nothing of viser is changed. Were viser to start in another way,
-`serve` would not see the check put in place, and refuses to go on.
+replaced until the server runs; nothing of viser is changed. If viser starts in another way,
+`serve` notices that no check is installed, and refuses to continue.
 """
 
 from __future__ import annotations
