@@ -107,7 +107,7 @@ def draw_panel(axes: Any, panel: Panel) -> None:
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
     if panel.legend == BELOW:  # axes of three dimensions have no empty corner
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06))
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.085))
     elif panel.legend == BESIDE:
         # In space the labels of the vertical axis are there too.
         at = (1.25, 1.0) if panel.in_space else (1.0, 1.0)
