@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 import notchflex as nf
 from notchflex.errors import InputError
 from notchflex.plotting import Picture
-from notchflex.plotting.drive import LOADING, UNLOADING
+from notchflex.plotting.branches import LOADING, UNLOADING
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from scipy.stats import t
 
 from fitted import NAMES, fitted
 from notchflex.fit import Interval
-from notchflex.plotting import calibration_figure, calibration_picture, picture
+from notchflex.plotting import calibration_picture, picture
 from notchflex.plotting.sheet import Area
 from notchflex.plotting.style import VERMILLION
 
@@ -28,7 +28,7 @@ def curve(axes):
 
 
 def test_panels_and_units():
-    figure = calibration_figure(fitted())
+    figure = calibration_picture(fitted()).figure()
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert titles == [
         *(f"notch {number}" for number in range(1, 6)),
@@ -46,7 +46,7 @@ def test_panels_and_units():
 
 def test_model_measured_and_band_are_those_of_the_fit():
     found = fitted()
-    axes = panel(calibration_figure(found), "notch 2")
+    axes = panel(calibration_picture(found).figure(), "notch 2")
     model = curve(axes)
     measured = found.problem.samples.every[0].measured
     order = np.argsort(measured.load.tension[:, 0], kind="stable")
@@ -72,7 +72,7 @@ def test_model_measured_and_band_are_those_of_the_fit():
 
 def test_profile_goes_through_the_points_and_shows_the_ends():
     found = fitted()
-    axes = panel(calibration_figure(found), "profile of constant 1, dotted: 95 %")
+    axes = panel(calibration_picture(found).figure(), "profile of constant 1, dotted: 95 %")
     interval = found.intervals[NAMES[0]]
     x, y = curve(axes).get_data()
     assert y.min() == pytest.approx(0.0, abs=0.05)
@@ -90,7 +90,7 @@ def test_open_ends_and_unknown_constants_are_drawn():
     # nothing depends on the second constant
     curvature = np.diag([found.reached.curvature[0, 0], 0.0])
     opened = replace(opened, reached=found.reached._replace(curvature=curvature))
-    figure = calibration_figure(opened)
+    figure = calibration_picture(opened).figure()
     axes = panel(figure, "profile of constant 1, dotted: 95 %")
     assert [text.get_text() for text in axes.texts] == ["open below and above"]
     assert not panel(figure, "notch 1").patches  # no band where the covariance is infinite

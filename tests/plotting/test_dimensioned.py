@@ -11,8 +11,8 @@ import notchflex as nf
 from notchflex.errors import InputError
 from notchflex.plotting.drawings.dimensioned import MOST, dimensioned_figure, save_dimensioned
 from notchflex.plotting.drawings.notch_views import notch_view
-from notchflex.plotting.shapes.bent import bent_by_angles
 from notchflex.plotting.shapes.outline import outline
+from notchflex.plotting.shapes.robot_shape import shape_from_angles
 from notchflex.robot.kinds import Notch
 
 ROBOTS = ["pacheco2021-a", "pacheco2021-c", "york2015", "liu2022", "gao2017", "two-axis-wrist"]
@@ -103,7 +103,7 @@ def test_cut_face_of_an_on_axis_cut_shows_both_corners():
 
 def wall_ends(robot, side):
     """Where the walls of the model's first bodies end on one side of the straight robot [mm]."""
-    straight = outline(bent_by_angles(robot, np.zeros(robot.number_of_notches)), 0.0)
+    straight = outline(shape_from_angles(robot, np.zeros(robot.number_of_notches)), 0.0)
     ends = [
         place for body in straight.bodies[:4] for across, place in body if abs(across - side) < 1e-9
     ]

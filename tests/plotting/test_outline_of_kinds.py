@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.shapes.bent import bent_by_angles
+from notchflex.plotting.shapes.faces import body_faces
 from notchflex.plotting.shapes.outline import outline
-from notchflex.plotting.shapes.space import _walls
+from notchflex.plotting.shapes.robot_shape import shape_from_angles
 
 
 def shape_of(name, angle=0.0):
     robot = nf.load_robot(name)
-    return bent_by_angles(robot, np.full(robot.number_of_notches, angle))
+    return shape_from_angles(robot, np.full(robot.number_of_notches, angle))
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +99,6 @@ def test_notches_close_where_they_are_open(links, strips):
 
 
 def test_walls_in_space_are_half_round_where_slots_alternate(links):
-    base, first, *_ = _walls(links)
+    base, first, *_ = body_faces(links)
     assert len(first) == len(base) / 2
     assert first[..., 0].max() == pytest.approx(0.0, abs=1e-9)

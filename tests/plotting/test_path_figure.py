@@ -8,16 +8,16 @@ from notchflex.errors import InputError
 from notchflex.loads.external import BodyForce, ExternalLoad
 from notchflex.mechanics.chain import assemble
 from notchflex.plotting import path_figure, path_picture, save
-from notchflex.plotting.drive import abscissa, branches, way_of
-from notchflex.plotting.shapes.bent import bent, bent_at
+from notchflex.plotting.branches import abscissa, branches, steps_by_branch
 from notchflex.plotting.shapes.outline import bending_plane, outline
-from notchflex.plotting.shapes.wrist import load_label, telling_steps
-from notchflex.plotting.sheet import Area, Level
+from notchflex.plotting.shapes.panel import load_label, representative_steps
+from notchflex.plotting.shapes.robot_shape import shape_at, shape_from_modes
+from notchflex.plotting.sheet import Area, Span
 from notchflex.robot import Linear
 
 
 def outline_at(path, step):
-    return outline(bent_at(path, step), 0.0)
+    return outline(shape_at(path, step), 0.0)
 
 
 def panels(path):
@@ -148,14 +148,15 @@ def test_shapes_are_named_by_what_drives_them():
 def test_strain_is_drawn_with_what_is_allowed():
     path = fake_path(4)
     panel = next(cell.panel for cell in path_picture(path).cells if "strain" in cell.panel.y_label)
-    (level,) = (item for item in panel.items if isinstance(item, Level))
-    assert (level.at, level.name) == (pytest.approx(8.0), "allowed 8 %")
+    (level,) = (item for item in panel.items if isinstance(item, Span))
+    assert level.low == level.high
+    assert (level.low, level.name) == (pytest.approx(8.0), "allowed 8 %")
     np.testing.assert_allclose(
         panel.items[0].rows[:, 1], 100.0 * path.peak_strain[:5, 0]
     )  # the peak is held
     path.robot = path.robot.replace(material=Linear(10_000.0))
     panel = next(cell.panel for cell in path_picture(path).cells if "strain" in cell.panel.y_label)
-    assert not any(isinstance(item, Level) for item in panel.items)
+    assert not any(isinstance(item, Span) for item in panel.items)
 
 
 def test_clamp_ends_where_the_robot_begins():
@@ -176,7 +177,7 @@ def test_ways_of_two_tendons_are_told_by_their_sum():
     path.columns["commanded_tension"] = path.columns["tension"]
     path.columns["commanded_stroke"] = np.full((6, 2), np.nan)
     path.columns["stroke"] = np.repeat(path.stroke, 2, axis=1)
-    assert way_of(path) == {"loading": [0, 1, 2, 3], "unloading": [3, 4, 5]}
+    assert steps_by_branch(path) == {"loading": [0, 1, 2, 3], "unloading": [3, 4, 5]}
 
 
 def arrows(figure):
@@ -192,7 +193,7 @@ def test_loads_are_arrows_where_they_act():
     figure = path_figure(path)
     names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert {"force 0.2 N", "moment 1 N mm", "force 0.1 N, following"} <= set(names)
-    shape = bent_at(path, 0)
+    shape = shape_at(path, 0)
     dead = (path.tip_position[0] - path.body_position[0, 0])[[0, 2]]
     ends = [arrow._posA_posB for arrow in arrows(figure)]
     np.testing.assert_allclose(ends[0][0], dead, atol=1e-9)
@@ -244,12 +245,12 @@ def test_path_with_failures_is_drawn(failed):
 def test_single_step_is_drawn():
     path = part_of(fake_path(2), slice(1, 2))
     assert len(path_figure(path).axes) == 1
-    assert len(telling_steps(path)) == 1
+    assert len(representative_steps(path)) == 1
 
 
 def test_steps_drawn_are_spread_over_the_shapes():
     path = fake_path(31)
-    steps = telling_steps(path)
+    steps = representative_steps(path)
     assert len(steps) == 5
     assert np.ptp(np.diff(path.total_angle[steps])) < np.radians(12.0)
     assert path.total_angle[steps[-1]] == path.total_angle.max()
@@ -258,7 +259,7 @@ def test_steps_drawn_are_spread_over_the_shapes():
 def test_branches_turn_where_the_tension_turns():
     x = np.array([0.0, 1.0, 1.0, 2.0, 2.0, 1.0, 1.0, 3.0])
     parts = [(part.start, part.stop, up) for part, up in branches(x)]
-    assert parts == [(0, 5, True), (4, 7, False), (6, 8, True)]
+    assert parts == [(0, 5, "loading"), (4, 7, "unloading"), (6, 8, "loading")]
 
 
 def test_abscissa_is_the_step_where_several_tendons_change():
@@ -304,7 +305,7 @@ def test_picture_does_not_turn_with_the_base():
     modes = path.run.solved.point.unknowns.modes[2]
     chain = assemble(path.robot, path.chain.level, flat=False)
     position, rotation = path.body_position[2] @ turn.T, turn @ path.body_rotation[2]
-    turned = outline(bent(path.robot, chain, modes, position, rotation), 0.0)
+    turned = outline(shape_from_modes(path.robot, chain, modes, position, rotation), 0.0)
     straight = outline_at(path, 2)
     for one, other in zip(turned.bodies, straight.bodies, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-12)

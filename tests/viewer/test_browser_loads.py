@@ -112,7 +112,7 @@ def test_what_was_chosen_stays_when_friction_is_changed(visit):
 def test_a_number_beyond_the_slider_is_set_to_its_end_and_said_so(visit):
     end = ends(visit, TENSION)[2]
     visit.type(TENSION, f"{10.0 * end:g}", delay=120)
-    text = visit.notice("is beyond its slider")
+    text = visit.notice("is outside its slider")
     assert f"{10.0 * end:g} N" in text
     assert f"set to {end:g} N" in text
     visit.wait_for("tension_1", f"{end:.3f}")
@@ -125,7 +125,7 @@ def test_a_number_beyond_the_slider_is_set_to_its_end_and_said_so(visit):
 def test_a_slider_cannot_be_stretched_without_limit(visit):
     end = ends(visit, TENSION)[2]
     visit.type("slider to", "1000000000")
-    visit.notice("The slider can end")
+    visit.notice("The end of the slider")
     assert ends(visit, TENSION)[2] == shown(visit, "slider to") == 10.0 * end
     visit.type("slider to", f"{end:g}")
     visit.page.wait_for_selector(f"[role=slider][aria-valuemax='{end:g}']")

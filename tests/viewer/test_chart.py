@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.plotting.sheet import Line, Panel
 from notchflex.viewer import Session
-from notchflex.viewer.page.chart import Line, chart, ticks
+from notchflex.viewer.page.chart import chart, ticks
 from robots import ready
 
 pytest.importorskip("matplotlib")
@@ -30,8 +31,8 @@ def test_ticks_take_in_zero_and_all_values_in_round_steps(values):
 
 
 def test_a_chart_puts_points_where_its_ticks_say():
-    line = Line(np.array([0.0, 1.0, 2.0]), np.array([0.0, 50.0, 100.0]), "#123456", dots=["#abc"])
-    text = chart([line], "T < 3 [N]", "angle [deg]", "loop")
+    line = Line([[0.0, 0.0], [1.0, 50.0], [2.0, 100.0]], "#123456", marker="o")
+    text = chart(Panel([line], "T < 3 [N]", "angle [deg]"), "loop")
     labels = {one.text: one.attrib for one in elements(text, "text")}
     assert "T < 3 [N]" in labels
     assert "angle [deg]" in labels
@@ -42,7 +43,7 @@ def test_a_chart_puts_points_where_its_ticks_say():
 
 def test_many_points_are_thinned_but_not_their_ends():
     x = np.linspace(0.0, 1.0, 20_000)
-    text = chart([Line(x, x, "#123456")], "x", "y", "many")
+    text = chart(Panel([Line(np.stack([x, x], axis=1), "#123456")], "x", "y"), "many")
     way = next(one for one in elements(text, "path") if one.attrib.get("fill") == "none")
     points = way.attrib["d"].lstrip("M").split("L")
     assert len(points) == 1500
@@ -68,21 +69,21 @@ def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
 
 def test_colours_of_contacts_and_strains():
     from notchflex.plotting.style import BLUE, GREEN, GREY, VERMILLION
-    from notchflex.viewer.scene.colours import BEYOND, METAL, of_contacts, of_strain
+    from notchflex.viewer.scene.colours import BEYOND, METAL, contact_colours, strain_colour
 
     robot = ready("A").with_value("friction.wrap", "geometric")
     session = Session(robot)
-    assert set(of_contacts(session.state, 0)) == {GREY}  # slack
+    assert set(contact_colours(session.state, 0)) == {GREY}  # slack
     seen = []
     for tension in (1.0, 0.99, 0.6):
         session.go(session.controls.with_tendon(0, "tension", tension))
-        seen.append(set(of_contacts(session.state, 0)))
+        seen.append(set(contact_colours(session.state, 0)))
     assert seen[0] == {BLUE}
     assert GREEN in seen[1]
     assert seen[2] == {VERMILLION}
-    assert of_strain(None) == METAL
-    assert of_strain(1.0) == of_strain(-1.0) != of_strain(0.9)
-    assert of_strain(1.5) == of_strain(-1.01) == BEYOND != of_strain(1.0)
+    assert strain_colour(None) == METAL
+    assert strain_colour(1.0) == strain_colour(-1.0) != strain_colour(0.9)
+    assert strain_colour(1.5) == strain_colour(-1.01) == BEYOND != strain_colour(1.0)
 
 
 def cells(text):
@@ -154,8 +155,8 @@ def test_by_stroke_the_loop_is_drawn_against_stroke():
         session.go(session.controls.with_tendon(0, "stroke", stroke))
     found = loop(session, 0)
     assert found.x_label == "tendon stroke [mm]"
-    assert found.lines[-1].x.tolist() == pytest.approx([1.5])
-    assert max(line.x.max() for line in found.lines) == pytest.approx(2.0)
+    assert found.items[-1].rows[:, 0].tolist() == pytest.approx([1.5])
+    assert max(line.rows[:, 0].max() for line in found.items) == pytest.approx(2.0)
     assert "total angle against stroke" in loop_chart(session, 0)
     session.go(session.controls.with_tendon(0, "tension", float(session.state.tension[0])))
     assert loop(session, 0).x_label == "tendon tension [N]"

@@ -45,7 +45,7 @@ def test_a_slider_that_goes_back_leaves_hysteresis_and_reset_takes_it_away():
     session = Session(ready("A"))
     first, _, back = pulled(session, 1.0, 2.0, 1.0)
     assert degrees(back - first) > 10.0  # 51.5 and about 79 deg
-    tension, angle = session.history.loop(0)
+    tension, angle = session.history.loop(0).T
     assert tension.tolist() == [0.0, 1.0, 2.0, 1.0]
     assert angle[[1, 3]] == pytest.approx([first, back])
     session.reset()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.shapes.bent import bent_at
+from notchflex.plotting.shapes.robot_shape import shape_at
 from notchflex.viewer.scene.skins import PIECES, at_rest, skins
 from notchflex.viewer.scene.solids import ROUND, body_solids
 from robots import ready
@@ -106,7 +106,7 @@ def test_links_and_pieces_fill_the_tube_but_for_its_slots():
 
 def test_at_rest_is_where_the_solver_finds_an_unloaded_robot():
     robot = nf.load_robot("pacheco2021-a-specimen")  # bent when nothing pulls
-    solved = bent_at(nf.simulate(robot, nf.Load()), 0, PIECES)
+    solved = shape_at(nf.simulate(robot, nf.Load()), 0, PIECES)
     for found, wanted in zip(at_rest(robot).flexures, solved.flexures, strict=True):
         assert found.position == pytest.approx(wanted.position, abs=1e-9)
 
@@ -116,7 +116,7 @@ def test_at_rest_is_where_the_solver_finds_an_unloaded_robot():
 )
 def test_loads_that_ask_for_more_sections_find_as_many_in_the_skin(load):
     path = nf.simulate(ready("A"), load)
-    shape, rest = bent_at(path, 0, PIECES), at_rest(ready("A"), path.chain.level)
+    shape, rest = shape_at(path, 0, PIECES), at_rest(ready("A"), path.chain.level)
     assert all(one.is_watertight for one in flexures(shape, rest))
     assert [len(one.area) for one in shape.flexures] == [len(one.area) for one in rest.flexures]
 
@@ -125,7 +125,7 @@ def test_a_bent_flexure_joins_its_pieces_and_keeps_its_volume():
     robot = ready("A")
     rest = at_rest(robot)
     path = nf.simulate(robot, nf.Load(tension=1.0))
-    shape = bent_at(path, 0, PIECES)
+    shape = shape_at(path, 0, PIECES)
     whole = zip(flexures(shape, rest), flexures(rest, rest), strict=True)
     for number, (bent, straight) in enumerate(whole):
         assert bent.is_watertight

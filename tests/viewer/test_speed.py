@@ -70,7 +70,7 @@ def test_solids_are_sent_once_and_moved():
         assert sum("/body_" in name for name in nodes) == 6
         place = viewer.scene._bodies[-1].position.copy()
         viewer.set(0, 1.0, "tension [N]")
-        while (controls := viewer.way.next()) is not None:
+        while (controls := viewer.targets.next()) is not None:
             viewer.advance(controls)
         assert {name: id(node) for name, node in scene._handle_from_node_name.items()} == nodes
         assert np.linalg.norm(viewer.scene._bodies[-1].position - place) > 1.0

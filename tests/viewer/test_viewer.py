@@ -62,7 +62,7 @@ def wait(condition):
 
 
 def reached(viewer, value):
-    return not len(viewer.way) and viewer.session.controls.value[0] == pytest.approx(value)
+    return not len(viewer.targets) and viewer.session.controls.value[0] == pytest.approx(value)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_a_law_that_is_refused_leaves_the_law_before_on_the_page_too(start, monk
     viewer.ask(lambda: viewer.set(0, 0.5, "tension [N]"))
     wait(lambda: reached(viewer, 0.5))
     robot, angle = viewer.session.robot, float(viewer.session.state.total_angle)
-    law = viewer.page.model._parts["friction"]._kind
+    law = viewer.page.model._parts["friction"]._kind.handle
 
     def refuse(*_, **__):
         raise nf.InputError("this law does not fit these notches")
@@ -133,16 +133,16 @@ def test_a_number_beyond_its_slider_is_set_to_the_end_and_told(start):
     viewer = start(nf.load_robot("pacheco2021-a"))
     viewer.ask(lambda: viewer.set(0, 1e9, "tension [N]"))
     wait(lambda: viewer.note)
-    assert "1e+09 N is beyond" in viewer.note
-    assert viewer.way.end.value == (3.0,)
+    assert "1e+09 N is outside" in viewer.note
+    assert viewer.targets.end.value == (3.0,)
     viewer.ask(lambda: viewer.set(0, -1.0, "tension [N]"))
     wait(lambda: "-1 N" in viewer.note)
-    assert viewer.way.end.value == (0.0,)
+    assert viewer.targets.end.value == (0.0,)
     viewer.ask(lambda: viewer.set(4, 1e6, "hung weight [g]"))
     wait(lambda: "hung weight" in viewer.note)
-    assert viewer.way.end.tip_mass == viewer.reach.mass
+    assert viewer.targets.end.tip_mass == viewer.reach.mass
     viewer.ask(lambda: viewer.stretch(0, "tension", 1e9))
-    wait(lambda: "can end" in viewer.note)
+    wait(lambda: "The end of the slider" in viewer.note)
     assert viewer.reach.tension == (30.0,)
     viewer.ask(viewer.reset)
     wait(lambda: viewer.note == "")

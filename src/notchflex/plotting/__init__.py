@@ -5,9 +5,9 @@ from notchflex.plotting.batch import batch_picture
 from notchflex.plotting.beside import beside_picture
 from notchflex.plotting.drawings.dimensioned import dimensioned_figure
 from notchflex.plotting.equilibrium import state_picture
-from notchflex.plotting.fits.calibration import calibration_figure, calibration_picture
+from notchflex.plotting.fits.calibration import calibration_picture
 from notchflex.plotting.fits.comparison import comparison_figure, comparison_picture
-from notchflex.plotting.fits.friction import friction_figure, friction_picture
+from notchflex.plotting.fits.friction import friction_picture
 from notchflex.plotting.output import Picture
 from notchflex.plotting.path import path_figure, path_picture
 from notchflex.plotting.picture import picture
@@ -17,12 +17,10 @@ __all__ = [
     "Picture",
     "batch_picture",
     "beside_picture",
-    "calibration_figure",
     "calibration_picture",
     "comparison_figure",
     "comparison_picture",
     "dimensioned_figure",
-    "friction_figure",
     "friction_picture",
     "path_figure",
     "path_picture",

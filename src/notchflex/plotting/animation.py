@@ -1,4 +1,4 @@
-"""A path as a moving picture: the robot, and where it is on its loop."""
+"""Animates a path: the robot moves while dots run along its curves."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex.errors import InputError
+from notchflex.plotting.branches import abscissa
 from notchflex.plotting.curves import notches_panel, total_panel
-from notchflex.plotting.drive import abscissa
 from notchflex.plotting.output import Picture
-from notchflex.plotting.path import plane_of, shape_panel
 from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
-from notchflex.plotting.shapes.wrist import telling_steps
-from notchflex.plotting.sheet import Area, Cell, Faces, Panel
+from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
+from notchflex.plotting.sheet import Area, Faces, Panel, stack
 from notchflex.plotting.style import BLACK, BLUE, house_style
 from notchflex.results.files.writing import MOVING, check_picture, replacing
 from notchflex.results.quantities.registry import QUANTITIES
@@ -31,10 +30,10 @@ MOST_FRAMES = 48
 DOTS_PER_INCH = 80
 
 SECONDS, STANDING_SECONDS = 4.2, 0.9
-"""How long it takes at least, and how long its first and its last picture stay at least [s]."""
+"""Shortest duration of the whole, and of the first and the last frame [s]."""
 
 _SHORTEST, _LONGEST = 0.1, 0.4
-"""Seconds that a frame stays: the longer the fewer there are."""
+"""Limits of the duration of a frame [s]: longer if there are fewer."""
 
 
 def save_animation(
@@ -44,15 +43,15 @@ def save_animation(
     title: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write a path as a GIF: the robot moves, and a dot goes along its loop.
+    """Write a path as a GIF: the robot moves, and dots run along its curves.
 
-    It takes four seconds or more: its first and its last picture stay for a while.
+    It takes four seconds or more; the first and the last frame are shown longer.
 
     Args:
-        path: Solved path; of a long one some steps are shown, spread evenly.
-        target: EquilibriumPath that ends in .gif; the file is whole or not there.
+        path: Solved path; of a long one an even selection of steps is shown.
+        target: Name of a file that ends in .gif; it is written completely or not at all.
         title: Heading; the name of the robot if None.
-        progress: Called with the frames done and all frames.
+        progress: Called with the number of finished frames and of all frames.
 
     Raises:
         InputError: Another suffix, nothing to show, or the file cannot be written.
@@ -73,19 +72,14 @@ def save_animation(
             f"an animation needs two steps that were solved; this path has {len(steps)}. "
             "Draw a picture instead."
         )
-    figure = figure_of(_stage(path, title))
+    figure = figure_of(_background(path, title))
     figure.draw_without_rendering()  # arranges the axes, once for all frames
     figure.set_layout_engine("none")
     robot, *curves = figure.axes
-    limits = _limits(robot)
+    limits = {name: getattr(robot, f"get_{name}lim")() for name in _axes_of(robot)}
     view = plane_of(path)
-    dots = [
-        axes.plot(x, y, "o", color=colour, markersize=5.0, zorder=9)[0]
-        for axes, (x, y, colour) in zip(curves, _dots(path, steps[0]), strict=True)
-    ]
-    frame = min(max(_SHORTEST, SECONDS / 1.5 / len(steps)), _LONGEST)
-    rest = SECONDS - (len(steps) - 2) * frame
-    standing = math.ceil(max(STANDING_SECONDS, rest / 2.0) / frame)
+    dots = [axes.plot([], [], "o", color=BLACK, markersize=5.0, zorder=9)[0] for axes in curves]
+    frame, standing = _durations(len(steps))
     writer = PillowWriter(fps=1.0 / frame)  # pyright: ignore[reportArgumentType]
     with (
         replacing(target) as temporary,
@@ -96,30 +90,34 @@ def save_animation(
             robot.clear()
             draw_panel(robot, _robot(path, step, view))
             _limit(robot, limits)
-            for dot, (x, y, _) in zip(dots, _dots(path, step), strict=True):
-                dot.set_data(x, y)
+            for dot, points in zip(dots, _dots(path, step), strict=True):
+                dot.set_data(*points)
             for _ in range(standing if number in (0, len(steps) - 1) else 1):
                 writer.grab_frame()
             if progress is not None:
                 progress(number + 1, len(steps))
 
 
+def _durations(count: int) -> tuple[float, int]:
+    """Return the duration of a frame [s], and how many frames the first and the last one last."""
+    frame = min(max(_SHORTEST, SECONDS / 1.5 / count), _LONGEST)
+    rest = SECONDS - (count - 2) * frame
+    return frame, math.ceil(max(STANDING_SECONDS, rest / 2.0) / frame)
+
+
 def frames_of(path: EquilibriumPath) -> list[int]:
-    """Return the steps to show: converged ones, spread evenly, with the first and the last."""
+    """Return an even selection of the converged steps, with the first and the last."""
     good = np.flatnonzero(np.asarray(path.converged))
-    if len(good) <= MOST_FRAMES:
-        return [int(step) for step in good]
-    spread = np.linspace(0, len(good) - 1, MOST_FRAMES).round().astype(int)
+    spread = np.linspace(0, len(good) - 1, min(len(good), MOST_FRAMES)).round().astype(int)
     return [int(step) for step in good[spread]]
 
 
-def _stage(path: EquilibriumPath, title: str | None) -> Picture:
-    """What stands still: the curves, and axes in which every shape has room."""
-    widest = shape_panel(path, telling_steps(path), plane_of(path))
-    # Legends change from frame to frame and would jump.
-    cells = [Cell(replace(widest, legend="", title=" "), (0, 2), (0, 1))]
-    curves = [total_panel(path), notches_panel(path)]
-    cells += [Cell(panel, (row, row + 1), (1, 2)) for row, panel in enumerate(curves)]
+def _background(path: EquilibriumPath, title: str | None) -> Picture:
+    """Return what does not move: the curves, and axes with room for every shape."""
+    widest = shape_panel(path, representative_steps(path), plane_of(path))
+    # Legends would jump, as they change from frame to frame.
+    cells = stack([replace(widest, legend="", title=" ")], height=2)
+    cells += stack([total_panel(path), notches_panel(path)], 1)
     return Picture(path.robot.name if title is None else title, 9.6, 5.4, cells)
 
 
@@ -129,23 +127,22 @@ def _robot(path: EquilibriumPath, step: int, view: float | None) -> Panel:
     return replace(panel, legend="", title=label)
 
 
-def _dots(path: EquilibriumPath, step: int) -> list[tuple[list[float], list[float], str]]:
-    """Where a step stands on the loop, and on the curves of the notches."""
+def _dots(path: EquilibriumPath, step: int) -> list[tuple[list[float], list[float]]]:
+    """Return the points of a step on the curves of the total angle and of the notches."""
     x = float(abscissa(path)[0][step])
     total = float(path.total_angle[step]) * QUANTITIES["total_angle"].scale
     notches = [float(one) for one in path.notch_angle[step] * QUANTITIES["notch_angle"].scale]
-    return [([x], [total], BLACK), ([x] * len(notches), notches, BLACK)]
+    return [([x], [total]), ([x] * len(notches), notches)]
 
 
-def _limits(axes: Any) -> dict[str, Any]:
-    names = "xyz" if axes.name == "3d" else "xy"
-    return {name: getattr(axes, f"get_{name}lim")() for name in names}
+def _axes_of(axes: Any) -> str:
+    return "xyz" if axes.name == "3d" else "xy"
 
 
 def _limit(axes: Any, limits: dict[str, Any]) -> None:
     if axes.name != "3d":
         axes.set_aspect("equal", adjustable="box", anchor="C")
-    for name, given in limits.items():
-        getattr(axes, f"set_{name}lim")(*given)
+    for name, ends in limits.items():
+        getattr(axes, f"set_{name}lim")(*ends)
     if axes.name == "3d":
-        axes.set_box_aspect([np.ptp(given) for given in limits.values()], zoom=0.92)
+        axes.set_box_aspect([np.ptp(ends) for ends in limits.values()], zoom=0.92)

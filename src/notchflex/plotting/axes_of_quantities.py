@@ -1,4 +1,4 @@
-"""One quantity of a path over another, and bent shapes, on axes of matplotlib."""
+"""Draws one quantity of a path over another, or a shape, on axes of matplotlib."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from notchflex._quantity import Quantity
 from notchflex.errors import InputError
-from notchflex.plotting.curves import COLOUR, LINE, failures, solved_only
-from notchflex.plotting.drive import LOADING, UNLOADING, branches, drive
+from notchflex.plotting.branches import LOADING, UNLOADING, branches, load_parameter
+from notchflex.plotting.curves import LINE, NEUTRAL, branch_lines, failures
 from notchflex.plotting.equilibrium import robot_shape, state_shape
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
-from notchflex.plotting.sheet import BESIDE, INSIDE, Item, Line, Panel
+from notchflex.plotting.sheet import BESIDE, INSIDE, Line, Mark, Panel
 from notchflex.plotting.style import house_style, sequence_colours
 from notchflex.results.files.csv import Entry, entries_of, is_listed
 from notchflex.results.quantities.registry import QUANTITIES
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
 STEP = "step"
-"""What stands for the number of the step, from 1."""
+"""Name of the number of the step, from 1."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Series:
     """Values of one quantity along a path, S steps, k entries.
 
     Attributes:
-        label: What stands at the axis, with symbol and unit.
-        names: What a legend calls each entry; "" for a quantity with one number.
-        headers: The CSV column of each entry; "" where it has none.
+        label: Label of the axis, with symbol and unit.
+        names: Legend entries; "" for a quantity with one number.
+        headers: CSV columns of the entries; "" for none.
         values: (S, k), in the units of pictures.
-        per: What the entries stand for, such as ("notch",).
+        per: Meaning of the entries, such as ("notch",).
     """
 
     label: str
@@ -53,13 +53,13 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
     """Draw one quantity of a path over another, or the shape of a state or a robot.
 
     Args:
-        thing: A path; a state or a robot where x and y are None.
+        thing: A path; a state or a robot if x and y are None.
         x: Quantity along the horizontal axis; see `notchflex.plot`.
         y: Quantity along the vertical axis.
         ax: Axes to draw into; new ones of pyplot if None.
 
     Raises:
-        InputError: It can't be drawn on one pair of axes, or there is no such quantity.
+        InputError: It can't be drawn on one pair of axes, or the quantity is unknown.
     """
     from notchflex.results import Equilibrium, EquilibriumPath
 
@@ -100,46 +100,33 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
     """Return one quantity of a path over another; loading and unloading have their own lines.
 
     Raises:
-        InputError: There is no such quantity, it is no number, or x has several entries.
+        InputError: The quantity is unknown or not numeric, or x has several entries.
     """
-    ways = [(part, LOADING if up else UNLOADING) for part, up in branches(drive(path))]
-    both = len({way for _, way in ways}) > 1
+    both = len({way for _, way in branches(load_parameter(path))}) > 1
     across, upward = series_of(path, x), series_of(path, y)
     pairs = _pairs(x, across, upward)
     several = len(pairs) > 1
-    items: list[Item] = []
+    items: list[Mark] = []
     for (column, row), shade in zip(pairs, sequence_colours(len(pairs)), strict=True):
         points = np.stack([across.values[:, column], upward.values[:, row]], axis=1)
-        points = solved_only(path, points)
-        named: set[str] = set()
-        for part, way in ways:
-            name = upward.names[row] if several else way
-            items.append(
-                Line(
-                    points[part],
-                    shade if several else COLOUR[way],
-                    LINE[way],
-                    marker="o" if part.stop - part.start == 1 else "",
-                    name="" if name in named or not (several or both) else name,
-                    group=name,
-                    told=True,
-                )
-            )
-            named.add(name)
+        if several:
+            items += branch_lines(path, points, shade, upward.names[row])
+        else:
+            items += branch_lines(path, points, name=None if both else "")
     if several and both:
-        items += [Line([], "#4c4c4c", LINE[way], name=way) for way in (LOADING, UNLOADING)]
+        items += [Line([], NEUTRAL, LINE[way], name=way) for way in (LOADING, UNLOADING)]
     if len({column for column, _ in pairs}) == 1:
         items += failures(path, across.values[:, pairs[0][0]])
-    told = both or not np.all(path.converged)
-    legend = BESIDE if several else INSIDE if told else ""
-    return Panel(items, across.label, upward.label, legend=legend, whole_x=x == STEP)
+    named = both or not np.all(path.converged)
+    legend = BESIDE if several else INSIDE if named else ""
+    return Panel(items, across.label, upward.label, legend=legend, whole="x" * (x == STEP))
 
 
 def series_of(path: EquilibriumPath, name: str) -> Series:
     """Return a quantity of a path by its name, or one of its entries by its CSV column.
 
     Raises:
-        InputError: There is none of that name, or it has no numbers that could be drawn.
+        InputError: The name is unknown, or the quantity has no numbers to draw.
     """
     if name == STEP:
         return Series(STEP, [""], [""], np.arange(1.0, len(path) + 1.0)[:, None])
@@ -181,12 +168,12 @@ def _label(quantity: Quantity, entry: Entry) -> str:
 
 
 def _pairs(x: str, across: Series, upward: Series) -> list[tuple[int, int]]:
-    """Which entry of y is drawn over which of x: equal tendons or notches, or all over the one."""
+    """Return pairs of entries of x and y: the same tendons or notches, or all over one."""
     count = across.values.shape[1]
     if count > 1 and across.per == upward.per:
         return [(index, index) for index in range(count)]
     used = range(count)
-    if count > 1 and across.per == ("tendon",):  # tendons that nobody pulls say nothing
+    if count > 1 and across.per == ("tendon",):  # only tendons that are pulled
         used = np.flatnonzero(np.ptp(across.values, axis=0) > 0.0).tolist()
     if len(used) != 1:
         columns = ", ".join(header for header in across.headers if header) or "tension, stroke"

@@ -1,4 +1,4 @@
-"""The picture of a batch: every quantity it holds over its rows, and where its tips lie."""
+"""The picture of a batch: every quantity over its rows, and the positions of the tips."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
 from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import BESIDE, Cell, Item, Line, Panel
+from notchflex.plotting.sheet import BESIDE, Line, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from notchflex.analysis import Batch
 
 MOST_COLUMNS = 12
-"""Entries of a quantity, such as its notches, that are drawn; of more, some spread evenly."""
+"""Entries of a quantity, such as notches, that are drawn; of more, an even selection."""
 
 _LEFT_OUT = ("converged", "reason", "iterations", "tip_position", "stable")
 
@@ -31,22 +31,21 @@ def batch_picture(
 ) -> Picture:
     """Describe what a batch returned.
 
-    Every quantity with one number, or one for each tendon or notch, in a panel over the rows, or
-    over what was changed from row to row; and the tips from the side, where they were asked for.
-    Of a batch of paths the last step of each is drawn. Rows that did not converge are left out of
-    the curves and marked in red among the tips.
+    A panel for every quantity with one number, or one for each tendon or notch, over the rows or
+    over `against`; and the positions of the tips, if the batch has them. Of a batch of paths the
+    last step of each is drawn. Rows that did not converge are gaps in the curves and red tips.
 
     Args:
         batch: What `solve_batch` or `simulate_batch` returned.
-        against: What the rows differ in, (rows,), such as the tensions; the row numbers if None.
-        label: What the axis of it is called, with its unit.
+        against: Values for the horizontal axis, (rows,), such as tensions; row numbers if None.
+        label: Label of this axis, with its unit.
         title: Heading.
 
     Returns:
         The picture; its `save` writes it as PNG, SVG, PDF or HTML.
 
     Raises:
-        InputError: As many values as rows are needed; or the batch has nothing to draw.
+        InputError: The number of values is not that of the rows, or there is nothing to draw.
 
     Example:
         >>> import numpy as np
@@ -81,15 +80,11 @@ def batch_picture(
         )
     columns = min(3, len(panels))
     lines = -(-len(panels) // columns)
-    cells = [
-        Cell(panel, (row, row + 1), (column, column + 1))
-        for panel, (row, column) in zip(panels, np.ndindex(lines, columns), strict=False)
-    ]
-    return Picture(title, 1.0 + 4.4 * columns, 0.6 + 3.2 * lines, cells)
+    return Picture(title, 1.0 + 4.4 * columns, 0.6 + 3.2 * lines, grid(panels, columns))
 
 
 def _last(batch: Batch, name: str) -> NDArray[Any] | None:
-    """What a batch has of a quantity, of paths at their last step; None if it has it not."""
+    """Return the values of a quantity, of paths at their last step; None if there are none."""
     if name not in batch:
         return None
     values = np.asarray(batch[name])
@@ -110,22 +105,21 @@ def _over_rows(
     count = table.shape[1]
     shown = np.unique(np.linspace(0, count - 1, min(count, MOST_COLUMNS)).round().astype(int))
     order = np.argsort(x, kind="stable")
-    items: list[Item] = []
+    items: list[Mark] = []
     for column, colour in zip(shown, sequence_colours(len(shown)), strict=True):
         one = f"{quantity.per[0]} {column + 1}" if quantity.per and count > 1 else ""
         points = np.stack([x[order], table[order, column]], axis=1)
-        options: dict[str, Any] = {"marker": "o", "size": 2.0, "width": 0.8, "told": True}
+        options: dict[str, Any] = {"marker": "o", "size": 2.0, "width": 0.8, "hover": True}
         items.append(Line(points, colour if count > 1 else BLUE, name=one, group=one, **options))
     return Panel(items, label, quantity.label, legend=BESIDE if count > 1 else "")
 
 
 def _tips(tips: NDArray[np.float64], good: NDArray[np.bool_]) -> Panel:
     quantity = QUANTITIES["tip_position"]
-    mark: dict[str, Any] = {"dash": None, "marker": "o", "size": 2.5}
-    items: list[Item] = [Line(tips[good][:, [0, 2]], BLUE, told=True, group="tip", **mark)]
+    items: list[Mark] = [dots(tips[good][:, [0, 2]], BLUE, 2.5, hover=True, group="tip")]
     if not good.all():
-        bad = tips[~good][:, [0, 2]]
-        items.append(Line(bad, VERMILLION, name="not converged", group="not converged", **mark))
+        name = "not converged"
+        items.append(dots(tips[~good][:, [0, 2]], VERMILLION, 2.5, name=name, group=name))
     unit = f"[{quantity.unit}]"
     return Panel(
         items,

@@ -1,4 +1,4 @@
-"""Angles, strains and tension over the load: loops, and what every notch does."""
+"""Panels of curves over the load: total angle, notches, strains, tension over stroke."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.drive import LOADING, UNLOADING, abscissa, branches, drive
+from notchflex.plotting.branches import LOADING, UNLOADING, abscissa, branches, load_parameter
 from notchflex.plotting.sheet import (
     BESIDE,
     DASHED,
+    DOTTED,
     INSIDE,
     SOLID,
     Colour,
-    Item,
-    Level,
     Line,
+    Mark,
     Panel,
-    Upright,
+    Span,
+    dots,
 )
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
@@ -29,55 +30,80 @@ if TYPE_CHECKING:
 
 COLOUR = {LOADING: BLUE, UNLOADING: VERMILLION}
 LINE = {LOADING: SOLID, UNLOADING: DASHED}
+NEUTRAL = "#4c4c4c"
+"""Colour of legend entries that stand for marks of several colours."""
 MOST_NAMES = 12
-"""More notches than this are not all named in a legend."""
+"""If a robot has more notches than this, a legend names some of them."""
+
+
+def branch_lines(
+    path: EquilibriumPath,
+    points: NDArray[np.float64],
+    colour: Colour | None = None,
+    name: str | None = None,
+    **look: Any,
+) -> Iterator[Line]:
+    """Yield the branches of a curve: loading solid, unloading dashed.
+
+    Args:
+        path: Solved path.
+        points: A point for each step, (S, 2); steps that did not converge are left out.
+        colour: Colour of all branches; None for one colour each for loading and unloading.
+        name: Legend entry of all branches together; None to name loading and unloading.
+        look: Further options of `Line`; `group` is the name if not given.
+    """
+    points = converged_only(path, points)
+    named: set[str] = set()
+    for part, way in branches(load_parameter(path)):
+        label = way if name is None else name
+        options: dict[str, Any] = {"group": label, "hover": True}
+        options["marker"] = "o" if part.stop - part.start == 1 else ""
+        shown = "" if label in named else label
+        shade = COLOUR[way] if colour is None else colour
+        yield Line(points[part], shade, LINE[way], name=shown, **(options | look))
+        named.add(label)
 
 
 def total_panel(path: EquilibriumPath) -> Panel:
-    """Return the total angle against tension or stroke, loading and unloading apart."""
+    """Return the total angle against tension or stroke."""
     quantity = QUANTITIES["total_angle"]
     x, label = abscissa(path)
-    y = solved_only(path, path.total_angle * quantity.scale)
-    items = list(_ways(path, np.stack([x, y], axis=1)))
-    items += failures(path, x)
-    told = len(items) > 1 or not np.all(path.converged)
-    return Panel(items, label, quantity.label, legend=INSIDE if told else "")
+    items: list[Mark] = [
+        *branch_lines(path, np.stack([x, path.total_angle * quantity.scale], axis=1)),
+        *failures(path, x),
+    ]
+    named = len(items) > 1 or not np.all(path.converged)
+    return Panel(items, label, quantity.label, legend=INSIDE if named else "")
 
 
 def notches_panel(path: EquilibriumPath) -> Panel:
-    """Return the angle of every notch; dots mark where a notch is closed."""
+    """Return the angle of every notch; dots mark closed notches."""
     quantity = QUANTITIES["notch_angle"]
     x, label = abscissa(path)
-    angles = solved_only(path, path.notch_angle * quantity.scale)
+    angles = path.notch_angle * quantity.scale
+    items = list(_notch_lines(path, x, angles))
     closed = np.asarray(path.closed) & np.asarray(path.converged)[:, None]
-    items: list[Item] = []
     for notch, colour in enumerate(sequence_colours(angles.shape[1])):
-        items += _of_notch(path, x, angles, notch, colour)
         there = closed[:, notch]
         if there.any():
-            dots = np.stack([x[there], angles[there, notch]], axis=1)
-            group = _notch_name(notch)
-            items.append(Line(dots, colour, None, marker="o", group=group, layer=3))
+            points = np.stack([x[there], angles[there, notch]], axis=1)
+            items.append(dots(points, colour, group=f"notch {notch + 1}", layer=3))
     if closed.any():
-        items.append(Line([], "#4c4c4c", None, marker="o", name="closed"))
-    items += failures(path, x)
-    return Panel(items, label, quantity.label, legend=BESIDE)
+        items.append(dots([], NEUTRAL, name="closed"))
+    return Panel([*items, *failures(path, x)], label, quantity.label, legend=BESIDE)
 
 
 def strain_panel(path: EquilibriumPath) -> Panel:
-    """Return the peak strain of every notch, with what the material is allowed."""
+    """Return the peak strain of every notch, with the allowed strain of the material."""
     x, label = abscissa(path)
-    strain = solved_only(path, 100.0 * np.abs(path.peak_strain))
-    items: list[Item] = []
-    for notch, colour in enumerate(sequence_colours(strain.shape[1])):
-        items += _of_notch(path, x, strain, notch, colour, named=False)
+    items = list(_notch_lines(path, x, 100.0 * np.abs(path.peak_strain), named=False))
     allowed = path.robot.material.allowed_strain
     if allowed is not None:
         name = f"allowed {100.0 * allowed:.3g} %"
-        items.append(Level(100.0 * allowed, VERMILLION, DASHED, 1.2, name=name))
-    items += failures(path, x)
+        at = 100.0 * allowed
+        items.append(Span("y", at, at, VERMILLION, DASHED, 1.2, name=name))
     return Panel(
-        items,
+        [*items, *failures(path, x)],
         label,
         f"{QUANTITIES['peak_strain'].title} of every notch [%]",
         legend="" if allowed is None else INSIDE,
@@ -86,78 +112,45 @@ def strain_panel(path: EquilibriumPath) -> Panel:
 
 
 def stroke_panel(path: EquilibriumPath, tendon: int) -> Panel:
-    """Return the tension of a tendon (from 0) over its stroke: the loop that friction makes."""
-    points = np.stack([path.stroke[:, tendon], solved_only(path, path.tension)[:, tendon]], axis=1)
-    items = list(_ways(path, points))
-    several = path.tension.shape[1] > 1
-    labels = [
-        QUANTITIES[name].label.replace(
-            QUANTITIES[name].title, f"{name} of tendon {tendon + 1}" if several
-            else QUANTITIES[name].title, 1,
-        )
-        for name in ("stroke", "tension")
-    ]  # fmt: skip
-    items += failures(path, path.commanded_stroke[:, tendon])
+    """Return the tension of a tendon (from 0) over its stroke: the hysteresis of friction."""
+    points = np.stack([path.stroke[:, tendon], path.tension[:, tendon]], axis=1)
+    labels: list[str] = []
+    for name in ("stroke", "tension"):
+        quantity = QUANTITIES[name]
+        title = f"{name} of tendon {tendon + 1}" if path.tension.shape[1] > 1 else quantity.title
+        labels.append(quantity.label.replace(quantity.title, title, 1))
+    items = [*branch_lines(path, points), *failures(path, path.commanded_stroke[:, tendon])]
     return Panel(items, labels[0], labels[1], legend=INSIDE, y_range=(0.0, None))
 
 
-def _ways(path: EquilibriumPath, points: NDArray[np.float64]) -> Iterator[Item]:
-    """The branches of a loop, loading and unloading apart, each named once."""
-    named: set[str] = set()
-    for part, growing in branches(drive(path)):
-        way = LOADING if growing else UNLOADING
-        name = "" if way in named else way
-        marker = _marker(part)
-        yield Line(
-            points[part], COLOUR[way], LINE[way], marker=marker, name=name, group=way, told=True
-        )
-        named.add(way)
-
-
-def _of_notch(
+def _notch_lines(
     path: EquilibriumPath,
     x: NDArray[np.float64],
     values: NDArray[np.float64],
-    notch: int,
-    colour: Colour,
     *,
     named: bool = True,
-) -> Iterator[Item]:
-    """The branches of what a notch has, in its colour."""
+) -> Iterator[Mark]:
+    """Yield a curve for every notch, in its colour."""
     count = values.shape[1]
     chosen: Any = range(count)
-    if count > MOST_NAMES:  # a few, the first and the last among them
+    if count > MOST_NAMES:  # some, with the first and the last
         chosen = np.unique(np.linspace(0, count - 1, MOST_NAMES // 2).round().astype(int))
-    group = _notch_name(notch)
-    for order, (part, growing) in enumerate(branches(drive(path))):
-        yield Line(
-            np.stack([x[part], values[part, notch]], axis=1),
-            colour,
-            LINE[LOADING if growing else UNLOADING],
-            marker=_marker(part),
-            name=group if named and order == 0 and notch in chosen else "",
-            group=group,
-            told=True,
-        )
+    for notch, colour in enumerate(sequence_colours(count)):
+        group = f"notch {notch + 1}"
+        name = group if named and notch in chosen else ""
+        points = np.stack([x, values[:, notch]], axis=1)
+        yield from branch_lines(path, points, colour, name, group=group)
 
 
-def _notch_name(notch: int) -> str:
-    return f"notch {notch + 1}"
-
-
-def failures(path: EquilibriumPath, x: NDArray[np.float64]) -> Iterator[Item]:
-    """Mark the steps that were not solved by dotted lines."""
+def failures(path: EquilibriumPath, x: NDArray[np.float64]) -> Iterator[Span]:
+    """Mark the steps that did not converge by dotted vertical lines."""
     places = x[~np.asarray(path.converged)]
-    for order, place in enumerate(places[np.isfinite(places)]):
-        yield Upright(float(place), name="" if order else "not converged")
+    for order, at in enumerate(places[np.isfinite(places)].tolist()):
+        yield Span("x", at, at, "#666666", DOTTED, name="" if order else "not converged")
 
 
-def solved_only(path: EquilibriumPath, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def converged_only(path: EquilibriumPath, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return values with NaN in the steps that did not converge."""
     values = np.array(values, dtype=float)
     values[~np.asarray(path.converged)] = np.nan
     return values
-
-
-def _marker(part: slice) -> str:
-    return "o" if part.stop - part.start == 1 else ""

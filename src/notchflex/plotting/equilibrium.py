@@ -3,40 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from notchflex.plotting.along import MOST_TENDONS, SLACK
 from notchflex.plotting.output import Picture
-from notchflex.plotting.path import plane_of, shape_panel
-from notchflex.plotting.sheet import BESIDE, SOLID, Cell, Item, Line, Note, Panel
+from notchflex.plotting.shapes.panel import plane_of, shape_panel
+from notchflex.plotting.sheet import BESIDE, Line, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
+from notchflex.plotting.tendon_profiles import SLACK, span_line
 from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.results.quantities.spans import spans_of
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
+MOST_TENDONS = 8
+"""Tendons of one state whose tension is drawn."""
+
 
 def state_picture(path: EquilibriumPath, step: int, *, title: str | None = None) -> Picture:
     """Describe the picture of one state of a path.
 
-    The robot to scale with its loads, the angle of every notch with where it is closed, and the
+    The robot to scale with its loads, the angle of every notch with closed notches marked, and the
     tension of every pulled tendon from span to span.
 
     Args:
         path: Solved path.
-        step: Which of its steps, counted from 0.
+        step: Index of the step, from 0.
         title: Heading; the name of the robot if None.
 
     Returns:
         The picture; its `save` writes it as PNG, SVG, PDF or HTML.
     """
-    panels = [notch_bars(path, step), tension_along(path, step)]
-    cells = [Cell(state_shape(path, step), (0, 2), (0, 1))]
-    cells += [Cell(panel, (row, row + 1), (1, 2)) for row, panel in enumerate(panels)]
+    curves = [notch_angles(path, step), tension_along(path, step)]
+    cells = [*stack([state_shape(path, step)], height=2), *stack(curves, 1)]
     return Picture(path.robot.name if title is None else title, 9.6, 6.4, cells)
 
 
@@ -50,7 +51,7 @@ def robot_picture(robot: Robot, *, title: str | None = None) -> Picture:
     Returns:
         The picture; its `save` writes it as PNG, SVG, PDF or HTML.
     """
-    cells = [Cell(robot_shape(robot), (0, 1), (0, 1))]
+    cells = stack([robot_shape(robot)])
     return Picture(robot.name if title is None else title, 5.6, 6.4, cells)
 
 
@@ -68,56 +69,34 @@ def state_shape(path: EquilibriumPath, step: int) -> Panel:
     return shape_panel(path, [step] if path.converged[step] else [], plane_of(path))
 
 
-def notch_bars(path: EquilibriumPath, step: int) -> Panel:
+def notch_angles(path: EquilibriumPath, step: int) -> Panel:
     """Return the angle of every notch in one state, base to tip."""
     quantity = QUANTITIES["notch_angle"]
+    labels = "notch [number], 1 at the base", quantity.label
     if not path.converged[step]:
-        return Panel([Note("not converged")], "notch [number], 1 at the base", quantity.label)
+        return Panel([Note("not converged")], *labels)
     angle = path.notch_angle[step] * quantity.scale
-    number = np.arange(1, len(angle) + 1)
-    points = np.stack([number, angle], axis=1)
-    items: list[Item] = [Line(points, BLUE, SOLID, marker="o", size=4.0, told=True)]
+    points = np.stack([np.arange(1, len(angle) + 1), angle], axis=1)
+    items: list[Mark] = [Line(points, BLUE, marker="o", size=4.0, hover=True)]
     closed = np.asarray(path.closed[step])
     if closed.any():
-        mark: dict[str, Any] = {
-            "dash": None,
-            "marker": "o",
-            "size": 5.0,
-            "layer": 3,
-            "group": "closed notch",
-        }
-        items.append(Line(points[closed], VERMILLION, name="closed notch", **mark))
-    return Panel(
-        items,
-        "notch [number], 1 at the base",
-        quantity.label,
-        legend=BESIDE if closed.any() else "",
-        x_range=(0.5, len(angle) + 0.5),
-        whole_x=True,
-    )
+        name = "closed notch"
+        items.append(dots(points[closed], VERMILLION, 5.0, name=name, group=name, layer=3))
+    legend = BESIDE if closed.any() else ""
+    return Panel(items, *labels, legend=legend, x_range=(0.5, len(angle) + 0.5), whole="x")
 
 
 def tension_along(path: EquilibriumPath, step: int) -> Panel:
     """Return the tension of every pulled tendon from span to span in one state."""
-    quantity = QUANTITIES["span_tension"]
-    x_label = "span of tendon [number], 0 at the base"
-    if not path.converged[step]:
-        return Panel([Note("not converged")], x_label, quantity.label)
+    labels = "span of tendon [number], 0 at the base", QUANTITIES["span_tension"].label
     pulled = [int(i) for i in np.flatnonzero(path.tension[step] > SLACK)][:MOST_TENDONS]
-    if not pulled:
-        return Panel([Note("all tendons are slack")], x_label, quantity.label)
-    items: list[Item] = []
+    if not path.converged[step] or not pulled:
+        note = "all tendons are slack" if path.converged[step] else "not converged"
+        return Panel([Note(note)], *labels)
+    several = path.tension.shape[1] > 1
+    items: list[Mark] = []
     for tendon, colour in zip(pulled, sequence_colours(len(pulled)), strict=True):
-        number = np.arange(spans_of(path, tendon))
-        points = np.stack([number, path.span_tension[step, tendon, : len(number)]], axis=1)
-        name = f"tendon {tendon + 1}" if path.tension.shape[1] > 1 else ""
-        options: dict[str, Any] = {"marker": "o", "size": 2.2, "told": True}
-        items.append(Line(points, colour, name=name, group=name, **options))
-    return Panel(
-        items,
-        x_label,
-        quantity.label,
-        legend=BESIDE if path.tension.shape[1] > 1 else "",
-        y_range=(0.0, None),
-        whole_x=True,
-    )
+        name = f"tendon {tendon + 1}" if several else ""
+        items.append(span_line(path, step, tendon, colour, size=2.2, name=name, group=name))
+    legend = BESIDE if several else ""
+    return Panel(items, *labels, legend=legend, y_range=(0.0, None), whole="x")

@@ -1,4 +1,4 @@
-"""A picture that can be shown and saved; each library is imported when it draws."""
+"""The picture that functions return: it can be shown and saved."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Picture(Sheet):
         return figure_of(self)
 
     def __repr__(self) -> str:
-        """What it shows, and how to write it."""
+        """Return its title and how to save it."""
         count = len(self.cells)
         return f"Picture {self.title!r} of {count} panel{'s' * (count != 1)}; .save(file) writes it"
 
@@ -50,9 +50,9 @@ class Picture(Sheet):
         return interactive_of(self)
 
     def save(self, target: str | FilePath) -> None:
-        """Write it as PNG, SVG, PDF or HTML, by the suffix; the file is whole or not there.
+        """Write it as PNG, SVG, PDF or HTML, by the suffix; completely or not at all.
 
-        An HTML file holds all it needs and asks no other host for anything.
+        An HTML file works without a network.
 
         Args:
             target: Path that ends in .png, .svg, .pdf or .html.

@@ -1,8 +1,8 @@
-"""One function for the picture of any result."""
+"""Describes the picture of any result."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -27,7 +27,7 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
         `interactive` that of plotly.
 
     Raises:
-        InputError: It is no result.
+        InputError: It is not one of these results.
 
     Example:
         >>> import tempfile
@@ -54,22 +54,22 @@ def _picture(result: Any) -> Picture:
     from notchflex.results import Equilibrium, EquilibriumPath
     from notchflex.robot import Robot
 
-    if isinstance(result, Robot):
-        return robot_picture(result)
-    if isinstance(result, EquilibriumPath):
-        return path_picture(result)
-    if isinstance(result, Equilibrium):
-        return state_picture(result.path, result.step)
-    if isinstance(result, Batch):
-        return batch_picture(result)
-    if isinstance(result, Comparison):
-        return comparison_picture(result)
+    kinds: dict[type, Callable[[Any], Picture]] = {
+        Robot: robot_picture,
+        EquilibriumPath: path_picture,
+        Equilibrium: lambda state: state_picture(state.path, state.step),
+        Batch: batch_picture,
+        Comparison: comparison_picture,
+    }
+    for kind, describe in kinds.items():
+        if isinstance(result, kind):
+            return describe(result)
     if isinstance(result, Mapping) and all(
         isinstance(one, EquilibriumPath) for one in result.values()
     ):
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
 
-    # Late: it takes a second to import, and those above do without.
+    # Imported late: it takes a second.
     from notchflex.fit import Calibration, FrictionRig
 
     if isinstance(result, Calibration):

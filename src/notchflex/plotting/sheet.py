@@ -1,13 +1,12 @@
-"""What a picture shows, told once: panels of lines, areas and arrows, with their axes.
+"""Describes a picture: panels of lines, areas and arrows with their axes, on a grid.
 
-matplotlib draws it for paper (`renderers/with_matplotlib.py`), plotly for a browser
-(`renderers/with_plotly.py`). What a result has to show is described in terms of this file and of
-nothing else, so that both show the same curves under the same names.
+matplotlib arranges and draws it (`renderers/with_matplotlib.py`). The interactive version
+(`renderers/with_plotly.py`) takes over that arrangement and draws the same marks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,30 +22,29 @@ DASHED, DOTTED, DASH_DOT = (4.0, 2.0), (1.0, 1.6), (6.4, 1.6, 1.0, 1.6)
 FINE, MIXED = (3.0, 2.0), (5.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 
 MARKERS = "osD^vP*X"
-"""Marks that a line can have at its points."""
+"""Markers of the points of a line."""
 
 INSIDE, BESIDE, BELOW = "inside", "beside", "below"
-"""Where the legend of a panel stands."""
+"""Positions of the legend of a panel."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """Points that are joined, marked or both; in the plane (k, 2) or in space (k, 3).
+    """Points that are connected, marked or both, (k, 2) in the plane or (k, 3) in space.
 
     Attributes:
-        points: Where it goes; a row of NaN is a gap.
-        colour: Its colour.
-        dash: Lengths of strokes and gaps; `SOLID`, or None for marks alone.
-        width: In points.
-        marker: The mark at every point, one of `MARKERS`, or "".
-        size: Of the marks, in points.
-        hollow: Whether marks have no filling.
-        name: What a legend calls it; "" for nothing.
-        group: What is shown and hidden together in a browser.
-        layer: Above what it lies.
-        told: Whether a browser tells the numbers under the pointer.
-        blunt: Whether its ends are cut off straight.
-        half: Half the height of the error bar at every point, (k,), NaN for none; in the plane.
+        points: Coordinates; a row of NaN is a gap. No points at all: a legend entry only.
+        colour: Colour of line and markers.
+        dash: Lengths of strokes and gaps; `SOLID`, or None for markers alone.
+        width: Line width [pt].
+        marker: One of `MARKERS`, or "".
+        size: Size of the markers [pt].
+        hollow: Whether the markers are open.
+        name: Legend entry; "" for none.
+        group: Marks of one group are shown and hidden together in a browser.
+        layer: Drawing order; higher is in front.
+        hover: Whether a browser shows the numbers under the pointer.
+        error: Half heights of error bars, (k,), NaN for none; None without error bars.
     """
 
     points: Any
@@ -59,9 +57,8 @@ class Line:
     name: str = ""
     group: str = ""
     layer: int = 2
-    told: bool = False
-    blunt: bool = False
-    half: Any = None
+    hover: bool = False
+    error: Any = None
 
     @property
     def rows(self) -> Points:
@@ -70,9 +67,15 @@ class Line:
         return points if points.size else np.zeros((0, 2))
 
 
+def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Line:
+    """Return round markers without a line; `options` are those of `Line`."""
+    look: dict[str, Any] = {"dash": None, "marker": "o", "size": size}
+    return Line(points, colour, **(look | options))
+
+
 @dataclass(frozen=True)
 class Area:
-    """Polygons of one kind in the plane, each (k, 2)."""
+    """Filled polygons in the plane, each (k, 2); none for a legend entry only."""
 
     polygons: Sequence[Points]
     face: Colour
@@ -86,18 +89,19 @@ class Area:
 
 @dataclass(frozen=True)
 class Faces:
-    """Flat pieces with four corners in space, (m, 4, 3), each of its own colour."""
+    """Quadrilaterals in space, (m, 4, 3), with a colour each; `colour` is that of the legend."""
 
     corners: Points
     colours: Sequence[Colour]
     colour: Colour
     name: str = ""
     group: str = ""
+    layer: int = 0
 
 
 @dataclass(frozen=True)
 class Arrow:
-    """An arrow, in the plane or in space; `bend` makes it an arc (1 a half circle or so)."""
+    """An arrow in the plane or in space; in the plane `bend` makes it an arc (1: a half circle)."""
 
     start: Points
     end: Points
@@ -105,124 +109,111 @@ class Arrow:
     bend: float = 0.0
     width: float = 1.4
     name: str = ""
+    group: str = ""
     layer: int = 9
     reach: Points | None = None
-    """Points that the axes must show beside it, (k, 2)."""
+    """Points that the axes must include, (k, 2); the ends of the arrow if None."""
 
 
 @dataclass(frozen=True)
-class Upright:
-    """A vertical line over the whole height of a panel."""
+class Span:
+    """A line or band across the whole panel, at one value or between two values of an axis.
 
-    at: float
-    colour: Colour = "#666666"
-    dash: tuple[float, ...] = DOTTED
-    width: float = 0.8
-    name: str = ""
-    group: str = ""
+    Attributes:
+        axis: "x" for a vertical line or band, "y" for a horizontal one.
+        low: Where it begins.
+        high: Where it ends; a line if equal to `low`.
+        colour: Colour of the line or the band.
+        dash: Of a line, as in `Line`.
+        width: Of a line [pt].
+        opacity: Of a band.
+        name: Legend entry; "" for none.
+        group: As in `Line`; the name if "".
+    """
 
-
-@dataclass(frozen=True)
-class Level:
-    """A horizontal line over the whole width of a panel."""
-
-    at: float
-    colour: Colour
-    dash: tuple[float, ...] = SOLID
-    width: float = 0.8
-    name: str = ""
-    group: str = ""
-
-
-@dataclass(frozen=True)
-class Stripe:
-    """All between two heights, over the whole width of a panel."""
-
+    axis: str
     low: float
     high: float
     colour: Colour
-    opacity: float
+    dash: tuple[float, ...] = SOLID
+    width: float = 0.8
+    opacity: float = 1.0
     name: str = ""
     group: str = ""
+    layer: int = 0
 
 
 @dataclass(frozen=True)
 class Bars:
-    """Bars to the right, one under the other, with their numbers."""
+    """Horizontal bars from top to bottom, with their values."""
 
     values: Sequence[float]
     names: Sequence[str]
     colours: Sequence[Colour]
-    form: str = ".2f"
+    layer: int = 0
 
 
 @dataclass(frozen=True)
 class Correlations:
-    """Correlations of n numbers as a square of colours, each with its value.
+    """A coloured matrix of correlations, each with its value.
 
     Attributes:
         values: From -1 to 1, (n, n); NaN where there is none.
-        names: Of the n numbers, which a browser tells under the pointer.
-        rows: What stands beside the rows; under the columns stand their numbers from 1.
+        names: Names of the n variables, which a browser shows under the pointer.
+        rows: Labels of the rows; the columns are numbered from 1.
     """
 
     values: Points
     names: Sequence[str]
     rows: Sequence[str]
+    layer: int = 0
 
     @property
     def texts(self) -> list[list[str]]:
-        """What stands in the square."""
+        """The values as text."""
         return [[f"{one:.2f}" if np.isfinite(one) else "-" for one in row] for row in self.values]
 
     @property
-    def letters(self) -> float:
-        """Size of the letters in it, in points, with which a value fits its place."""
+    def font_size(self) -> float:
+        """Font size [pt] at which a value fits its cell."""
         count = len(self.names)
         return 8.0 if count < 6 else 36.0 / count
-
-    @property
-    def outer_letters(self) -> float:
-        """Size of the letters beside and below it, in points."""
-        return min(7.0, 3.1 * self.letters)
 
 
 @dataclass(frozen=True)
 class Note:
-    """A sentence in the middle of a panel that has nothing else to show, or in its corner."""
+    """A sentence in the centre of an empty panel, or in its upper left corner."""
 
     text: str
     colour: Colour = "black"
     corner: bool = False
-    """Whether it stands at the upper left, beside what else is drawn."""
+    layer: int = 0
 
 
-Item = Line | Area | Faces | Arrow | Upright | Level | Stripe | Bars | Correlations | Note
+Mark = Line | Area | Faces | Arrow | Span | Bars | Correlations | Note
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair or triple of axes and what is drawn into them.
+    """Axes in the plane or in space and the marks in them.
 
     Attributes:
-        items: What is drawn.
-        x_label: What stands at the axis, with its unit.
-        y_label: The same upward.
-        z_label: The same in space; "" in the plane.
-        title: Above it, on the left.
+        items: The marks.
+        x_label: Label of the axis, with its unit.
+        y_label: The same for y.
+        z_label: The same for z; "" in the plane.
+        title: Title, left-aligned.
         legend: `INSIDE`, `BESIDE`, `BELOW`, or "" for none.
-        equal: Whether both axes have one scale.
-        scale: Panels of one name show the same part of the plane.
-        x_range: From where to where; None is found from what is drawn, also one end alone.
-        y_range: The same upward.
-        whole_x: Whether the axis has whole numbers only.
-        whole_y: The same upward.
-        most_x: How many numbers stand at the axis at most; None for what has room.
-        shared_x: Whether its horizontal axis is that of the other such panels.
-        shared_y: The same upward.
+        equal: Whether both axes have the same scale.
+        scale: Panels with the same name show the same part of the plane.
+        x_range: Limits; None is chosen to fit the marks, also for one end.
+        y_range: The same for y.
+        whole: Axes with integers only: "", "x", "y" or "xy".
+        shared: Axes with the same limits in all panels that share them, as `whole`.
+        most_x: Maximum number of ticks on the x axis; None for no limit.
     """
 
-    items: Sequence[Item]
+    items: Sequence[Mark]
     x_label: str
     y_label: str
     z_label: str = ""
@@ -232,11 +223,9 @@ class Panel:
     scale: str = ""
     x_range: tuple[float | None, float | None] | None = None
     y_range: tuple[float | None, float | None] | None = None
-    whole_x: bool = False
-    whole_y: bool = False
+    whole: str = ""
+    shared: str = ""
     most_x: int | None = None
-    shared_x: bool = False
-    shared_y: bool = False
 
     @property
     def in_space(self) -> bool:
@@ -246,23 +235,36 @@ class Panel:
 
 @dataclass(frozen=True)
 class Cell:
-    """A panel at its place: rows and columns of the grid, first and last and one."""
+    """A panel in one column of the grid, over one or more rows."""
 
     panel: Panel
-    rows: tuple[int, int]
-    columns: tuple[int, int]
+    row: int
+    column: int
+    height: int = 1
+
+
+def grid(panels: Sequence[Panel], columns: int, first: int = 0) -> list[Cell]:
+    """Arrange panels row by row in columns, counted from `first`."""
+    return [
+        Cell(panel, index // columns, first + index % columns) for index, panel in enumerate(panels)
+    ]
+
+
+def stack(panels: Iterable[Panel], column: int = 0, height: int = 1) -> list[Cell]:
+    """Arrange panels in one column from top to bottom, each over `height` rows."""
+    return [Cell(panel, height * row, column, height) for row, panel in enumerate(panels)]
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """Panels on a grid, under a heading.
+    """Panels on a grid, with a heading.
 
     Attributes:
         title: The heading.
-        width: In inches on paper.
-        height: In inches on paper.
+        width: Width on paper [in].
+        height: Height on paper [in].
         cells: The panels.
-        legend: Entries of a legend for all panels, below them.
+        legend: Entries of a common legend below the panels.
     """
 
     title: str
@@ -274,4 +276,5 @@ class Sheet:
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the grid."""
-        return max(one.rows[1] for one in self.cells), max(one.columns[1] for one in self.cells)
+        rows = max(one.row + one.height for one in self.cells)
+        return rows, max(one.column + 1 for one in self.cells)

@@ -1,7 +1,6 @@
-"""Look of all pictures: colours that colour-blind people tell apart, sizes, saving.
+"""Style of all pictures: colours for all kinds of colour vision, sizes, saving.
 
-Figures are made as objects (`matplotlib.figure.Figure`), never through pyplot: no window, no
-global state, no backend to choose.
+Figures are objects (`matplotlib.figure.Figure`), made without pyplot: no window, no global state.
 """
 
 from __future__ import annotations
@@ -54,13 +53,13 @@ SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def house_style() -> Generator[None]:
-    """Use the settings of our pictures inside the `with`, and only there."""
+    """Apply the settings of our pictures inside the `with` only."""
     with matplotlib.rc_context(SETTINGS):
         yield
 
 
 def new_figure(width: float, height: float, title: str = "") -> Figure:
-    """Return an empty figure of the given size in inches that arranges its axes by itself."""
+    """Return an empty figure of a size [in] that arranges its axes by itself."""
     figure = Figure(figsize=(width, height), layout="constrained")
     if title:
         figure.suptitle(title, fontsize=11.0)
@@ -78,7 +77,7 @@ def rgb(colour: Any) -> tuple[float, float, float]:
 
 
 def sequence_colours(count: int) -> list[tuple[float, float, float, float]]:
-    """Return `count` colours in an order that the eye sees, dark to light, also in grey print."""
+    """Return `count` colours from dark to light, also in grey print."""
     # The lightest fifth of the map is too pale for lines on white paper.
     return [tuple(c) for c in matplotlib.colormaps["viridis"](np.linspace(0.0, 0.82, count))]
 
@@ -89,7 +88,7 @@ def diverging_colours(count: int) -> list[tuple[float, float, float, float]]:
 
 
 def save(figure: Figure, target: str | FilePath) -> None:
-    """Write a figure as PNG, SVG or PDF, by the suffix; the file is whole or not there.
+    """Write a figure as PNG, SVG or PDF, by the suffix; completely or not at all.
 
     Args:
         figure: What to write.

@@ -1,7 +1,7 @@
 """A robot in the browser, with sliders for its loads (`pip install 'notchflex[viewer]'`).
 
-The model of the viewer (`Session`, `Way`, `Controls`) and its checks need no browser and none of
-the libraries of the extra; `Viewer` needs them.
+`Session`, `TargetQueue`, `Controls` and the checks need no browser and none of the libraries of the
+extra; `Viewer` needs them.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ from notchflex.viewer.server.address import HOST, PORT, check_host, check_instal
 if TYPE_CHECKING:
     from notchflex.viewer.controls import Controls
     from notchflex.viewer.session import Session
-    from notchflex.viewer.target_queue import Way
+    from notchflex.viewer.target_queue import TargetQueue
     from notchflex.viewer.viewer import Viewer
 
 __all__ = [
@@ -19,18 +19,23 @@ __all__ = [
     "PORT",
     "Controls",
     "Session",
+    "TargetQueue",
     "Viewer",
-    "Way",
     "check_host",
     "check_installed",
     "exposed",
 ]
 
-_HOME = {"Controls": "controls", "Session": "session", "Viewer": "viewer", "Way": "target_queue"}
+_HOME = {
+    "Controls": "controls",
+    "Session": "session",
+    "Viewer": "viewer",
+    "TargetQueue": "target_queue",
+}
 
 
 def __getattr__(name: str) -> Any:
-    """Load what computes on first use: the command line only checks whether it could."""
+    """Import a name on first use: the command line only needs the checks."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

@@ -1,4 +1,4 @@
-"""Other friction laws and materials for a robot, to see what each does."""
+"""Changes the friction law or the material of a robot."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from notchflex.robot import Friction, Material, Robot, kinds_of, list_robots, lo
 SECTIONS: dict[str, type] = {"friction": Friction, "material": Material}
 
 
-class Number(NamedTuple):
-    """A number of a part that can be changed.
+class PartNumber(NamedTuple):
+    """A number of a part.
 
     Attributes:
         key: Its key in the robot file, such as `coefficient`.
-        value: What it is now.
-        unit: Its unit; "" for a pure number.
-        text: What it is, in a few words.
+        value: Its value.
+        unit: Its unit; "" if dimensionless.
+        text: Its description.
     """
 
     key: str
@@ -28,24 +28,24 @@ class Number(NamedTuple):
 
 
 def kinds(section: str) -> list[str]:
-    """Return the words for the kinds of a part, `friction` or `material`."""
+    """Return the kinds of a part, `friction` or `material`."""
     return list(kinds_of(SECTIONS[section]))
 
 
 def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = None) -> Robot:
     """Return a robot with another kind of friction or material.
 
-    It keeps the values that both kinds share. Others come from the robot as its file has it, if
-    that is of this kind, else from the first ready robot that is.
+    Values that both kinds have are kept. Others come from the original robot if it is of this
+    kind, else from the first ready robot of this kind.
 
     Args:
         robot: The robot.
         section: `friction` or `material`.
-        kind: The word for the kind.
-        original: The robot as its file has it.
+        kind: The kind.
+        original: The robot as its file describes it.
 
     Raises:
-        InputError: There is no such kind, or nothing to take its values from.
+        InputError: The kind is unknown, or no robot has values for it.
     """
     if original is not None and getattr(original, section).kind == kind:
         return robot.replace(**{section: getattr(original, section)})
@@ -66,8 +66,8 @@ def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = No
     )
 
 
-def numbers(robot: Robot, section: str) -> Iterator[Number]:
-    """Return what can be changed bit by bit about a part: its numbers that are set.
+def numbers(robot: Robot, section: str) -> Iterator[PartNumber]:
+    """Return the numbers of a part.
 
     Args:
         robot: The robot.
@@ -83,7 +83,4 @@ def numbers(robot: Robot, section: str) -> Iterator[Number]:
         value = getattr(part, key)
         if isinstance(value, float):
             unit = str((field.json_schema_extra or {}).get("unit", ""))
-            yield Number(key, value, unit, str(field.description))
-
-
-__all__ = ["Number", "kinds", "numbers", "with_kind"]
+            yield PartNumber(key, value, unit, str(field.description))

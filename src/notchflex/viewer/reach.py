@@ -1,4 +1,4 @@
-"""How far sliders go: far enough to bend a robot well, in round numbers."""
+"""Ranges of the sliders: enough to bend a robot well, in round numbers."""
 
 from __future__ import annotations
 
@@ -13,30 +13,28 @@ from notchflex.loads import Load
 from notchflex.robot import Robot
 from notchflex.viewer.controls import STROKE, TENSION
 
-# Tensions from 1/64 N on are tried, each twice the one before, until the robot is well bent; a
-# slider goes half as far again.
+# Tensions are doubled from 1/64 N until the robot is well bent; a slider has half as much more.
 FIRST, MOST = 2.0**-6, 2.0**12
 WELL_BENT = math.radians(60.0)
 ROOM = 1.5
-# A force across a robot bends it as much as its tendon with a small part of the tension, because
-# its lever is the length of the robot and not its radius.
+# A lateral force bends a robot as much as a larger tension, because of its longer lever.
 FORCE_PART = 0.05
 GRAVITY = 9.81e-3  # N/g
 STRIDES = 60
 """Steps from one end of a slider to the other."""
 STRETCH = 10.0
-"""A slider can be made to go as many times as far as at first, or as many times less far."""
+"""Largest factor by which the end of a slider can be changed."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Ends of the sliders of a robot of t tendons; those of forces go as far both ways.
+    """Ends of the sliders of a robot of t tendons; forces have both directions.
 
     Attributes:
-        tension: Of each tendon, N, (t,).
-        stroke: Of each tendon, mm, (t,).
-        force: At the tip, N.
-        mass: At the tip, g.
+        tension: Of each tendon [N], (t,).
+        stroke: Of each tendon [mm], (t,).
+        force: At the tip [N].
+        mass: At the tip [g].
     """
 
     tension: tuple[float, ...]
@@ -48,22 +46,18 @@ class Reach:
         """Return the ends of the slider of a number of `Controls`.
 
         Args:
-            number: Its place in `Controls.numbers`.
-            by: `TENSION` or `STROKE`, where it is a tendon's.
+            number: Its index in `Controls.numbers`.
+            by: `TENSION` or `STROKE`, if it belongs to a tendon.
         """
         count = len(self.tension)
         if number < count:
             most = (self.tension if by == TENSION else self.stroke)[number]
-            # Drawn on one side, a tendon on the other is let out.
+            # While one tendon is pulled, another one is released.
             return (-most if by == STROKE and count > 1 else 0.0), most
         return (0.0, self.mass) if number == count + 3 else (-self.force, self.force)
 
     def stride(self, by: Sequence[str]) -> np.ndarray:
-        """Return the largest step of each number of `Controls`.
-
-        Args:
-            by: `TENSION` or `STROKE` for every tendon.
-        """
+        """Return the largest step of each number of `Controls`; `by` is that of every tendon."""
         ends = [self.ends(tendon, one)[1] for tendon, one in enumerate(by)]
         return np.array([*ends, *[2.0 * self.force] * 3, self.mass]) / STRIDES
 
@@ -75,7 +69,7 @@ class Reach:
 
 
 def reach_of(robot: Robot) -> Reach:
-    """Find out how far the sliders of a robot should go, by pulling each of its tendons."""
+    """Return the ranges of the sliders of a robot, found by pulling each of its tendons."""
     ends = [_pulled(robot, tendon) for tendon in range(robot.number_of_tendons)]
     tension, stroke = zip(*ends, strict=True)
     force = round_up(FORCE_PART * max(tension))
@@ -83,21 +77,31 @@ def reach_of(robot: Robot) -> Reach:
 
 
 def round_up(value: float) -> float:
-    """The next number above that is 1, 1.5, 2, 3, 4, 5, 6 or 8 times a power of ten.
+    """Return the next number above that is 1, 1.5, 2, 3, 4, 5, 6 or 8 times a power of ten.
 
     Example:
         >>> [round_up(value) for value in (0.031, 2.0, 9.0)]
         [0.04, 2.0, 10.0]
     """
     power = 10.0 ** math.floor(math.log10(value))
-    for factor in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0):
-        if factor * power >= value * (1.0 - 1e-9):
-            return float(f"{factor * power:.12g}")
-    return float(f"{10.0 * power:.12g}")
+    factors = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+    found = next(one for one in factors if one * power >= value * (1.0 - 1e-9))
+    return float(f"{found * power:.12g}")
+
+
+def round_down(value: float) -> float:
+    """Return the largest number of three digits that is not above.
+
+    Example:
+        >>> [round_down(value) for value in (3.7482, 0.0129, 15.0)]
+        [3.74, 0.0129, 15.0]
+    """
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{math.floor(value / unit * (1.0 + 1e-9)) * unit:.12g}")
 
 
 def _pulled(robot: Robot, tendon: int) -> tuple[float, float]:
-    """Tension and stroke at the ends of the sliders of a tendon, which bend the robot as far."""
+    """Return tension and stroke at the ends of the sliders of a tendon, for the same bend."""
     tension, drawn = FIRST, 0.0
     while tension <= MOST:
         found = _stroke(robot, tendon, tension)
@@ -113,30 +117,12 @@ def _pulled(robot: Robot, tendon: int) -> tuple[float, float]:
     return end, round_down(found[0]) if found and found[0] > drawn else round_up(max(drawn, 1e-3))
 
 
-def round_down(value: float) -> float:
-    """The largest number of three digits that is not above.
-
-    Example:
-        >>> [round_down(value) for value in (3.7482, 0.0129, 15.0)]
-        [3.74, 0.0129, 15.0]
-    """
-    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return float(f"{math.floor(value / unit * (1.0 + 1e-9)) * unit:.12g}")
-
-
 def _stroke(robot: Robot, tendon: int, tension: float) -> tuple[float, bool] | None:
-    """Stroke at a tension and whether the robot is well bent there; None without a solution."""
+    """Return the stroke at a tension and whether the robot is well bent; None if not solved."""
     state = solve(robot, Load(tension=[None] * tendon + [tension]))
     if not state.converged:
         return None
-    well = np.abs(state.notch_angle).sum() >= WELL_BENT or _closed(state.closed, state.gap)
-    return float(state.stroke[tendon]), bool(well)
-
-
-def _closed(closed: np.ndarray, gap: np.ndarray) -> bool:
-    """Whether every notch that can close has closed: more tension hardly bends it further."""
-    can = np.isfinite(gap)
-    return bool(can.any() and closed[can].all())
-
-
-__all__ = ["STRETCH", "STRIDES", "Reach", "reach_of", "round_down", "round_up"]
+    # With all its notches closed, a robot hardly bends further.
+    can_close = np.isfinite(state.gap)
+    closed = bool(can_close.any() and state.closed[can_close].all())
+    return float(state.stroke[tendon]), closed or np.abs(state.notch_angle).sum() >= WELL_BENT

@@ -1,4 +1,4 @@
-"""The viewer: one thread that solves and draws, fed by whoever moves a slider or saves a file."""
+"""The viewer: one thread that solves and draws, fed by the page and by saved files."""
 
 from __future__ import annotations
 
@@ -12,22 +12,20 @@ from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.viewer import parts
 from notchflex.viewer.controls import Controls
-from notchflex.viewer.page.notes import beyond, kept_between
 from notchflex.viewer.page.page import Page
-from notchflex.viewer.reach import STRETCH, Reach, reach_of
-from notchflex.viewer.scene.scene import Scene
-from notchflex.viewer.scene.shown import Shown
+from notchflex.viewer.page.readout import beyond
+from notchflex.viewer.reach import STRETCH, reach_of
+from notchflex.viewer.scene.scene import Scene, Shown
 from notchflex.viewer.server.address import HOST, PORT, check_host, check_installed
 from notchflex.viewer.server.origin import bracketed
 from notchflex.viewer.server.serving import serve
-from notchflex.viewer.session import Session, Step
-from notchflex.viewer.target_queue import Way
-from notchflex.viewer.tasks import Tasks
-from notchflex.viewer.watch import Watched
+from notchflex.viewer.session import Outcome, Session
+from notchflex.viewer.target_queue import TargetQueue
+from notchflex.viewer.tasks import Tasks, WatchedFile
 
-# What a browser draws: more steps a second than this are not seen.
+# A browser does not show more steps a second than this.
 MOST_STEPS = 60.0
-# Charts and numbers are renewed more seldom than shapes, s; and files are looked at, s.
+# Intervals in which charts and numbers are updated, and in which the file is checked [s].
 _TEXT, _LOOK = 0.1, 0.5
 
 
@@ -36,10 +34,10 @@ class Viewer:
 
     Args:
         robot: The robot.
-        read: Reads the robot's file again after it was saved; None where there is no file.
+        read: Reads the robot's file again after it was saved; None without a file.
         file: The file that is watched.
         host: Address to serve on.
-        port: Port to serve on; the next free one is taken where it is not free.
+        port: Port to serve on, or the next free one.
 
     Raises:
         InputError: The extra `viewer` is not installed, or nothing can be served there.
@@ -59,38 +57,41 @@ class Viewer:
         check_host(host, port)
         self.original = robot
         self.session = Session(robot)
-        self.reach: Reach = reach_of(robot)
-        self._first_reach = self.reach
-        self.way = Way(self.session.controls, self.reach.stride(self.session.controls.by))
+        self.reach = self._first_reach = reach_of(robot)
+        stride = self.reach.stride(self.session.controls.by)
+        self.targets = TargetQueue(self.session.controls, stride)
         self.shown = Shown()
         self.message = ""  # why something was not done
-        self.note = ""  # what was made of the last number that was set
+        self.note = ""  # how the last number was changed
         self.tasks = Tasks()
         self.interrupted = Event()  # the page asks to stop what takes long
         self._playing = False
         self._read = read
-        self._file = Watched(file) if file is not None and read is not None else None
-        self._stopped, self._looked, self._told = Event(), 0.0, 0.0
+        self._file = WatchedFile(file) if file is not None and read is not None else None
+        self._stopped, self._looked, self._updated = Event(), 0.0, 0.0
         self.server = serve(host, port)
         self.scene = Scene(self.server, robot, self.reach, self.shown)
         self.page = Page(self)
-        self._draw(told=True)
+        self._draw(update=True)
 
     @property
     def address(self) -> str:
-        """Where a browser finds it."""
+        """The address for a browser."""
         return f"http://{bracketed(self.server.get_host())}:{self.server.get_port()}"
 
     @property
     def goal(self) -> Controls:
-        """What the sliders show: where the robot goes, or, in a cycle, where it is."""
-        if self._playing and len(self.way):
-            return self.session.controls
-        return self.way.end
+        """The settings that the sliders show: the last target, or, in a cycle, the current one."""
+        return self.session.controls if self._playing and len(self.targets) else self.targets.end
 
     def ask(self, task: Callable[[], None]) -> None:
-        """Let the thread that solves do something next; any thread may call this."""
+        """Add a task of the solver thread; any thread may call this."""
         self.tasks.add(task)
+
+    def interrupt(self, task: Callable[[], None]) -> None:
+        """Stop what takes long and add a task; any thread may call this."""
+        self.interrupted.set()
+        self.ask(task)
 
     def run(self) -> None:
         """Solve and draw until `stop` is called."""
@@ -110,15 +111,15 @@ class Viewer:
         self.ask(lambda: None)
 
     def _turn(self) -> None:
-        """Do what is to be done next, or wait for it a little."""
+        """Do all tasks and one step toward the next target, or wait for a task."""
         started = time.monotonic()
         if started - self._looked > _LOOK:
             self._looked = started
             if self._file is not None and self._file.changed():
                 self.reload()
-        while (task := self.tasks.take(0.0 if len(self.way) else _LOOK)) is not None:
+        while (task := self.tasks.take(0.0 if len(self.targets) else _LOOK)) is not None:
             task()
-        controls = self.way.next()
+        controls = self.targets.next()
         if controls is None:
             return
         self.advance(controls)
@@ -126,106 +127,111 @@ class Viewer:
         if rest > 0.0:
             time.sleep(rest)
 
-    def advance(self, controls: Controls) -> Step:
-        """Solve the next setting and draw what came of it: one update."""
+    def advance(self, controls: Controls) -> Outcome:
+        """Solve a setting and draw the result."""
         if self.session.is_new(controls):
             self.page.busy("preparing: a new kind of load is compiled once, which takes seconds")
-        step = self.session.go(controls)
-        if step.reason:
-            self.way.clear(self.session.controls)
-            self.message = f"Not reached: {step.reason}"
-        self._draw(told=not len(self.way) or time.monotonic() - self._told > _TEXT)
-        return step
+        outcome = self.session.go(controls)
+        if outcome.reason:
+            self.targets.clear(self.session.controls)
+            self.message = f"Not reached: {outcome.reason}"
+        self._draw(update=not len(self.targets) or time.monotonic() - self._updated > _TEXT)
+        return outcome
 
-    def _draw(self, told: bool) -> None:
-        """Move the robot; renew numbers and charts if so told."""
+    def _draw(self, update: bool) -> None:
+        """Move the robot; with `update` also update numbers and charts."""
         self.scene.update(self.session.solved, self.session.controls)
-        if told:
-            self._told = time.monotonic()
-            self.page.tell()
+        if update:
+            self._updated = time.monotonic()
+            self.page.update()
+
+    def _quiet(self) -> None:
+        """Clear message and note."""
+        self.message = self.note = ""
 
     def set(self, number: int, value: float, label: str) -> None:
-        """Go to another value of a number of the controls, from wherever the robot is now.
+        """Set a number of the controls, from the current state of the robot.
 
         Args:
-            number: Its place in `Controls.numbers`.
-            value: Its new value; one beyond its slider becomes the end of the slider.
-            label: What the page calls it, with its unit in brackets.
+            number: Its index in `Controls.numbers`.
+            value: Its new value; limited to the range of its slider.
+            label: Label on the page, with its unit in brackets.
         """
         low, high = self.reach.ends(number, self.session.controls.command(number))
         kept = min(max(value, low), high)
         self._playing = False
-        self.message = self.note = ""
+        self._quiet()
         if kept != value:
             self.note = beyond(label, value, (low, high), number < len(self.session.controls.by))
-        self.way.turn(number, kept)
+        self.targets.set_number(number, kept)
         self.page.follow()
 
     def drive_by(self, tendon: int, by: str) -> None:
-        """Command a tendon (from 0) by tension or by stroke from now on; nothing moves."""
+        """Prescribe the tension or the stroke of a tendon (from 0) from now on; nothing moves."""
         self._playing = False
-        self.message = self.note = ""
+        self._quiet()
         goal = self.session.controls.with_tendon(tendon, by, self.session.where(tendon, by))
-        self.way.clear(goal)
+        self.targets.clear(goal)
         self.advance(goal)
-        self._stand(self.session.controls)
+        self._restart()
 
     def cycle(self, tendon: int) -> None:
-        """Pull a tendon (from 0) from nothing to the end of its slider and let it go again."""
-        self.message = self.note = ""
-        self.way.hold(tendon)
+        """Load a tendon (from 0) to the end of its slider and unload it."""
+        self._quiet()
+        self.targets.hold(tendon)
         most = self.reach.ends(tendon, self.session.controls.command(tendon))[1]
         for value in (0.0, most, 0.0):
-            end = self.way.end
-            self.way.add(end.with_tendon(tendon, end.by[tendon], value))
+            end = self.targets.end
+            self.targets.add(end.with_tendon(tendon, end.by[tendon], value))
         self._playing = True
 
     def halt(self) -> None:
-        """Stay where the robot is."""
+        """Stop at the current state."""
         self.note = ""
-        self.way.clear(self.session.controls)
-        self._stand(self.session.controls)
+        self.targets.clear(self.session.controls)
+        self._restart()
 
     def reset(self) -> None:
-        """Go back to the free robot without memory."""
+        """Return to the robot at rest without history."""
         self.session.reset()
-        self.message = self.note = ""
-        self.way.clear()
-        self._stand(self.session.controls)
+        self._quiet()
+        self.targets.clear()
+        self._restart()
 
-    def _stand(self, here: Controls) -> None:
-        """Stand somewhere and show it; what is still ahead and can be reached from there stays."""
+    def _restart(self) -> None:
+        """Continue from the current state of the session to the targets that are left."""
+        here = self.session.controls
         self.interrupted.clear()
-        self.way.stride = self.reach.stride(here.by)
-        self.way.restart(here)
-        self._draw(told=True)
+        self.targets.stride = self.reach.stride(here.by)
+        self.targets.restart(here)
+        self._draw(update=True)
 
     def point(self, pointing: str) -> None:
-        """Point the tube elsewhere and do again what was done."""
-        self._again(self.session.change(pointing=pointing, go_on=self._go_on))
+        """Change the direction of the tube and repeat the load history."""
+        self._repeated(self.session.change(pointing=pointing, go_on=self._go_on))
         self.page.look()
 
     def change(self, robot: Robot) -> None:
-        """Put another robot in and do to it what was done.
+        """Replace the robot and repeat the load history.
 
-        One with other tendons begins anew. Its solids are made anew only where its shape changed.
+        A robot with other tendons begins at rest. Solids are replaced only if the shape changed.
 
         Raises:
             InputError: The robot cannot be solved; the one before stays.
         """
         old = self.session.robot
-        self.message = self.note = ""
+        self._quiet()
         self.page.busy("preparing the robot")
-        step = self.session.change(robot, go_on=self._go_on)
+        outcome = self.session.change(robot, go_on=self._go_on)
         if (old.tube, old.notch, old.tendon) != (robot.tube, robot.notch, robot.tendon):
             self._reshape(robot)
             self.page.rebuild()
         self.scene.robot = robot
         self.page.name()
-        self._again(step)
+        self._repeated(outcome)
 
     def change_part(self, section: str, kind: str) -> None:
-        """Give the robot another kind of friction or material."""
+        """Change the kind of friction or material of the robot."""
         self.change(parts.with_kind(self.session.robot, section, kind, self.original))
 
     def change_number(self, key: str, value: float) -> None:
@@ -233,36 +239,36 @@ class Viewer:
         self.change(self.session.robot.with_value(key, value))
 
     def show(self, name: str, value: bool) -> None:
-        """Show something in the scene or not; see `Shown`."""
+        """Show or hide something in the scene; see `Shown`."""
         setattr(self.shown, name, value)
-        self._draw(told=False)
+        self._draw(update=False)
 
-    def _again(self, step: Step) -> None:
-        if step.reason:
-            self.message = f"Not reached: {step.reason}"
-            self.way.clear()
-        self._stand(self.session.controls)
+    def _repeated(self, outcome: Outcome) -> None:
+        if outcome.reason:
+            self.message = f"Not reached: {outcome.reason}"
+            self.targets.clear()
+        self._restart()
 
     def _reshape(self, robot: Robot) -> None:
         self.reach = self._first_reach = reach_of(robot)
         self.scene.remove()
         self.scene = Scene(self.server, robot, self.reach, self.shown)
 
-    def load(self, robot: Robot, file: Watched | None = None) -> None:
-        """Begin anew with another robot; a file that was watched is no more."""
+    def load(self, robot: Robot, file: WatchedFile | None = None) -> None:
+        """Begin again with another robot; the former file is no longer watched."""
         self.page.busy("preparing the robot")
         session = Session(robot, self.session.pointing)
         self.session, self.original = session, robot
         self._file = file
-        self.message = self.note = ""
+        self._quiet()
         self._reshape(robot)
-        self.way.clear(session.controls)
+        self.targets.clear(session.controls)
         self.page.rebuild()
-        self._stand(session.controls)
+        self._restart()
         self.page.look()
 
     def reload(self) -> None:
-        """Read the robot's file again and do to the robot what was done; tell if it is no good."""
+        """Read the robot's file again and repeat the load history; report an invalid file."""
         assert self._read is not None
         try:
             robot = self._read()
@@ -273,28 +279,25 @@ class Viewer:
         self.original = robot
 
     def stretch(self, tendon: int, by: str, end: float) -> None:
-        """Let a slider of a tendon (from 0) go to another end (N or mm), within sensible limits."""
+        """Change the end of the slider of a tendon (from 0) [N or mm], within limits."""
         first = self._first_reach.ends(tendon, by)[1]
-        now = (
-            abs(self.way.end.value[tendon]) if self.session.controls.command(tendon) == by else 0.0
-        )
+        here = self.session.controls.command(tendon) == by
+        now = abs(self.targets.end.value[tendon]) if here else 0.0
         low, high = max(now, first / STRETCH), first * STRETCH
         kept = min(max(end, low), high)
-        self.message = ""
-        self.note = "" if kept == end else kept_between(low, high)
+        self._quiet()
+        if kept != end:
+            self.note = f"The end of the slider must lie between {low:g} and {high:g}."
         self.reach = self.scene.reach = self.reach.stretched(tendon, by, kept)
-        self.way.stride = self.reach.stride(self.session.controls.by)
+        self.targets.stride = self.reach.stride(self.session.controls.by)
         self.page.follow()
 
     def _go_on(self, done: int, of: int) -> bool:
-        """Tell how far the robot is with what it does again, and whether it should go on."""
+        """Show the progress of a repeated history; return whether to continue."""
         if done % 20 == 0:
-            self.page.busy(f"doing again what was done: step {done} of {of}")
+            self.page.busy(f"repeating the load history: step {done} of {of}")
         return not self.interrupted.is_set()
 
     def _fail(self, sentence: str) -> None:
         self.message = sentence
-        self.page.tell()
-
-
-__all__ = ["Viewer"]
+        self.page.update()

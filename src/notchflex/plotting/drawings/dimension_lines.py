@@ -24,7 +24,7 @@ INK, FINE = "#222222", "#555555"
 
 
 def label(axes: Axes, x: float, y: float, text: str, **options: Any) -> None:
-    """Write a text on a white ground, so that no line crosses it."""
+    """Write a text on a white background."""
     settings: dict[str, Any] = {
         "ha": "center",
         "va": "center",
@@ -44,7 +44,7 @@ def line(axes: Axes, x: Sequence[float], y: Sequence[float], **options: Any) -> 
 
 
 def centre_line(axes: Axes, x: Sequence[float], y: Sequence[float]) -> None:
-    """Draw an axis of symmetry or the trace of a section: long and short strokes in turn."""
+    """Draw an axis of symmetry or the trace of a section, dash-dotted."""
     line(axes, x, y, dashes=(9, 2, 1.5, 2), zorder=7)
 
 
@@ -56,7 +56,7 @@ def arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], **lo
 
 
 def _arrows(axes: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
-    """Draw the line of a dimension with an arrow at either end, outside where there is no room."""
+    """Draw the line of a dimension with arrows at both ends, outside if there is no room."""
     first, last = np.asarray(start), np.asarray(end)
     size = float(np.hypot(*(last - first)))
     if size >= SHORTEST:
@@ -69,15 +69,15 @@ def _arrows(axes: Axes, start: tuple[float, float], end: tuple[float, float]) ->
 
 
 def horizontal(axes: Axes, start: float, end: float, at: float, edge: float, text: str) -> None:
-    """Draw a dimension along the tube.
+    """Draw a dimension along the tube from `start` to `end`, with a text above it.
 
     Args:
-        axes: Where.
-        start: Its left end.
-        end: Its right end.
+        axes: Axes in inches of paper.
+        start: Left end.
+        end: Right end.
         at: Height of its line.
-        edge: Height from which its two extension lines come.
-        text: What stands above it.
+        edge: Height at which its extension lines start.
+        text: Its text.
     """
     over = 0.05 if at > edge else -0.05
     for x in (start, end):
@@ -87,14 +87,9 @@ def horizontal(axes: Axes, start: float, end: float, at: float, edge: float, tex
 
 
 def vertical(axes: Axes, start: float, end: float, at: float, edge: float) -> None:
-    """Draw a dimension across the tube, without its text.
+    """Draw a dimension across the tube from `start` to `end` at `at`, without its text.
 
-    Args:
-        axes: Where.
-        start: Its lower end.
-        end: Its upper end.
-        at: How far to the right its line stands.
-        edge: Where its two extension lines come from.
+    Its extension lines start at `edge`.
     """
     over = 0.05 if at > edge else -0.05
     for y in (start, end):
@@ -103,7 +98,7 @@ def vertical(axes: Axes, start: float, end: float, at: float, edge: float) -> No
 
 
 def levels(intervals: Sequence[tuple[float, float, str]]) -> list[int]:
-    """Give every dimension along the tube a level on which its text meets no other.
+    """Return a level for every dimension along the tube, so that no texts overlap.
 
     Args:
         intervals: Left end, right end and text of each, in inches.
@@ -133,7 +128,7 @@ def levels(intervals: Sequence[tuple[float, float, str]]) -> list[int]:
 
 
 def broken(axes: Axes, x: float, low: float, high: float) -> None:
-    """Draw the mark of a left-out part across a piece: a white band between two zigzags."""
+    """Draw the mark of an omitted part: a white band between two zigzag lines."""
     y = np.linspace(low - 0.06, high + 0.06, 13)
     aside = 0.035 * np.where(np.arange(13) % 2 == 0, -1.0, 1.0)
     left, right = x - 0.035 + aside, x + 0.035 + aside
@@ -149,15 +144,7 @@ def broken(axes: Axes, x: float, low: float, high: float) -> None:
 
 
 def angular(axes: Axes, centre: tuple[float, float], radius: float, half: float, up: bool) -> None:
-    """Draw the dimension of an angle that lies symmetrically above or below a centre.
-
-    Args:
-        axes: Where.
-        centre: The centre of the arc.
-        radius: The radius of its line.
-        half: Half the angle [rad].
-        up: Whether it lies above the centre; else below.
-    """
+    """Draw the dimension of an angle 2 `half` [rad], symmetric above or below its centre."""
     sign = 1.0 if up else -1.0
     angles = np.linspace(-half, half, 61)
     x, y = centre[0] + radius * np.sin(angles), centre[1] + sign * radius * np.cos(angles)

@@ -18,11 +18,11 @@ from notchflex.robot import Robot
 from notchflex.robot.kinds import Notch
 
 MOST = 6
-"""A drawing shows so many shapes of notches; a sentence names the others."""
+"""Maximum number of shapes of notches in a drawing; a sentence names the others."""
 DIAMETER, ROOM = 1.9, 5.0
-"""Largest size on paper of the outer diameter and of the side view, in inches."""
+"""Largest outer diameter and side view on paper [in]."""
 LEFT, COLUMN, RIGHT = 1.05, 0.85, 1.2
-"""Room for the diameters, for a column of lengths and beside the cross-section, in inches."""
+"""Room for the diameters, for a column of lengths and beside the cross-section [in]."""
 TUBE = "#C9DDEB"
 
 
@@ -30,7 +30,7 @@ def dimensioned_figure(robot: Robot) -> Figure:
     """Draw the tube and every shape of notch with their dimensions, to scale [mm].
 
     Args:
-        robot: The robot; its values stand in the drawing under the names of the robot file.
+        robot: The robot; its dimensions have the names of the robot file.
 
     Returns:
         The drawing; `notchflex.plotting.save` writes it.
@@ -87,7 +87,7 @@ def save_dimensioned(robot: Robot, target: str | FilePath) -> None:
 
 
 def _shapes(robot: Robot) -> list[tuple[str, int]]:
-    """Return the different notches: their numbers in words, and which of `robot.notch` it is."""
+    """Return the different notches: their numbers as text, and the index in `robot.notch`."""
     found: dict[Notch, tuple[list[str], int]] = {}
     first = 1
     for place, notch in enumerate(robot.notch):
@@ -100,7 +100,7 @@ def _shapes(robot: Robot) -> list[tuple[str, int]]:
 
 
 def _scale(view: NotchView, robot: Robot) -> float:
-    """Return inches of paper for one mm."""
+    """Return the scale [in/mm]."""
     return min(DIAMETER / robot.tube.outer_diameter, ROOM / view.length)
 
 
@@ -116,7 +116,7 @@ def _row_height(view: NotchView, robot: Robot) -> float:
 
 
 def _section_at(view: NotchView, robot: Robot) -> tuple[float, float]:
-    """Return the middle and the right end of the cross-section, in inches from the left."""
+    """Return the centre and the right end of the cross-section [in]."""
     scale = _scale(view, robot)
     columns = LEFT + scale * view.length + COLUMN * len(view.across)
     outer = scale * robot.tube.outer_radius
@@ -206,7 +206,7 @@ def _side_view(
 def _tendons(
     axes: Axes, robot: Robot, notch: Notch, scale: float, axis: float, right: float
 ) -> None:
-    """Draw the tendons in the side view, and where the tip lies."""
+    """Draw the tendons in the side view, and the direction of the tip."""
     for tendon in robot.tendon:
         turn = math.radians(tendon.direction_deg - notch.direction_deg)
         y = axis + scale * tendon.radius * math.cos(turn)

@@ -1,4 +1,4 @@
-"""The cross-section of a dimensioned drawing: what a cut leaves, the tendons and the directions."""
+"""The cross-section of a dimensioned drawing: remaining wall, tendons and directions."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def section_view(
     scale: float,
     centre: tuple[float, float],
 ) -> None:
-    """Draw the cross-section as seen from the tip, the bend upward.
+    """Draw the cross-section as seen from the tip, with the bend upward.
 
     Args:
         axes: Axes in inches of paper.
         robot: The robot.
         notch: The notch.
-        view: Where its cross-section is taken and what is left there.
-        scale: Inches of paper for one mm.
-        centre: Where the tube axis lies, in inches.
+        view: Its views.
+        scale: Scale [in/mm].
+        centre: Position of the tube axis [in].
     """
     x, y = centre
     outer, inner = scale * robot.tube.outer_radius, scale * robot.tube.inner_radius
@@ -80,7 +80,7 @@ def section_view(
 
 
 def _directions(axes: Axes, notch: Notch, centre: tuple[float, float], outer: float) -> None:
-    """Draw where the notch bends to, and the axes x and y of the base."""
+    """Draw the direction of bending, and the axes x and y of the base."""
     x, y = centre
     draw.arrow(
         axes,

@@ -1,4 +1,4 @@
-"""Views of one kind of notch for a dimensioned drawing: what is cut away, and what is measured.
+"""Views of one kind of notch for a dimensioned drawing: cuts and dimensions.
 
 All lengths are in mm. In the side view the first coordinate runs along the tube toward the tip, the
 second across it toward the bend, both from the tube axis at the left end of the view. A new kind
@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import singledispatch
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +23,14 @@ from notchflex.robot.kinds import Notch
 Points = NDArray[np.float64]
 
 STUB = 0.35
-"""Length of a neighbouring piece that is only begun, in outer diameters."""
+"""Drawn length of a neighbouring piece, in outer diameters."""
 LONGEST = 1.6
-"""Longest uncut piece that is drawn in full, in outer diameters; a longer one is broken."""
+"""Longest uncut piece that is not broken, in outer diameters."""
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """One measured length: from where to where it goes [mm], and its name with its value."""
+    """A dimension: its two ends [mm], and its name with its value."""
 
     start: float
     end: float
@@ -38,12 +39,11 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Cut:
-    """One cut in the side view: its edge from surface to surface, (k, 2).
+    """A cut in the side view.
 
     Attributes:
-        edge: Corners of the edge, the first and last on the outer surface.
-        face: Height of a second visible edge below the first, such as that of a slanted cut face,
-            as two ends, (2, 2); None where there is none.
+        edge: Corners of its edge, the first and the last on the outer surface, (k, 2).
+        face: Ends of a second visible edge, as of a slanted cut face, (2, 2); or None.
     """
 
     edge: Points
@@ -55,20 +55,20 @@ class NotchView:
     """Side view and cross-section of one kind of notch.
 
     Attributes:
-        length: Length of tube that the side view shows [mm].
+        length: Length of tube in the side view [mm].
         held: Whether the left end is the proximal face of the robot.
         tip: Whether the right end is the tip.
-        breaks: Where the view leaves out a part of the tube [mm].
-        cuts: What is cut away.
-        along: Lengths along the tube.
-        across: Columns of lengths across the tube; each is measured from the tube axis.
-        projected: Extension lines of those: where each begins, its height [mm], its column.
-        section_at: Where the cross-section is taken [mm].
-        section_from: Up to which height the cross-section is left [mm], from the tube axis.
+        breaks: Positions at which a part of the tube is omitted [mm].
+        cuts: The cuts.
+        along: Dimensions along the tube.
+        across: Columns of dimensions across the tube, from the tube axis.
+        projected: Extension lines of those: start, height [mm], index of the column.
+        section_at: Position of the cross-section [mm].
+        section_from: Height of the edge of the remaining section [mm], from the tube axis.
         radial: Whether the edges of the cut are radial (on-axis) or one straight line.
-        toward: Whether what is left lies on the side of the bend; else opposite.
-        notes: What else is measured, in words.
-        absent: Lengths that are 0, so that the side view does not show them.
+        toward: Whether the remaining section lies on the side of the bend.
+        notes: Further dimensions in words.
+        absent: Names of dimensions that are 0.
     """
 
     length: float
@@ -83,8 +83,8 @@ class NotchView:
     section_from: float
     radial: bool = False
     toward: bool = False
-    notes: Sequence[str] = field(default_factory=tuple[str, ...])
-    absent: Sequence[str] = field(default_factory=tuple[str, ...])
+    notes: Sequence[str] = ()
+    absent: Sequence[str] = ()
 
 
 @singledispatch
@@ -92,16 +92,13 @@ def notch_view(notch: Notch, robot: Robot, first: bool, following: Notch | None)
     """Describe the views of a notch.
 
     Args:
-        notch: The notch as the robot file has it, with `repeat`.
-        robot: The robot that it belongs to.
-        first: Whether it is the first of the robot.
-        following: The next notch toward the tip; None behind the last one.
-
-    Returns:
-        Its side view and cross-section.
+        notch: The notch of the robot file, with `repeat`.
+        robot: The robot.
+        first: Whether it is the first notch of the robot.
+        following: The next notch toward the tip; None for the last one.
 
     Raises:
-        InputError: There is no drawing of its kind.
+        InputError: Its kind has no drawing.
     """
     del robot, first, following
     raise InputError.UNSUPPORTED(
@@ -110,18 +107,21 @@ def notch_view(notch: Notch, robot: Robot, first: bool, following: Notch | None)
     )
 
 
-@dataclass
-class _Line:
-    """A side view that grows toward the tip."""
+class _SideView:
+    """A side view that is drawn from the base or the body before toward the tip."""
 
-    diameter: float
-    at: float = 0.0
-    breaks: list[float] = field(default_factory=list[float])
-    along: list[Dimension] = field(default_factory=list[Dimension])
-    absent: list[str] = field(default_factory=list[str])
+    def __init__(self, robot: Robot, first: bool) -> None:
+        self.diameter, self.held, self.at = robot.tube.outer_diameter, first, 0.0
+        self.breaks: list[float] = []
+        self.along: list[Dimension] = []
+        self.absent: list[str] = []
+        if first:
+            self.piece(robot.tube.base_length, "base length")
+        else:
+            self.stub()
 
     def piece(self, length: float, name: str = "") -> tuple[float, float]:
-        """Add a piece; one that is too long is broken. Return from where to where it is drawn."""
+        """Add a piece, broken if it is too long; return its ends in the drawing."""
         start, most = self.at, LONGEST * self.diameter
         self.at += min(length, most)
         if length > most:
@@ -132,18 +132,16 @@ class _Line:
             self.absent.append(name)
         return start, self.at
 
-    def begin(self, robot: Robot, first: bool) -> None:
-        """Begin with the base, or with a part of the body before."""
-        if first:
-            self.piece(robot.tube.base_length, "base length")
-        else:
-            self.stub()
-
     def stub(self) -> None:
         """Add a part of a neighbouring body, broken off at its outer end."""
         start = self.at
         self.at += STUB * self.diameter
         self.breaks.append(start if start == 0.0 else self.at)
+
+    def view(self, **others: Any) -> NotchView:
+        """Return the view; `others` are the fields of `NotchView` that are not known here."""
+        known: dict[str, Any] = {"length": self.at, "held": self.held, "breaks": self.breaks}
+        return NotchView(**known, along=self.along, absent=self.absent, **others)
 
 
 @notch_view.register
@@ -154,8 +152,7 @@ def _arc(notch: ArcNotch, robot: Robot, first: bool, following: Notch | None) ->
     radial = notch.cut == "on-axis"
     # A radial cut face is seen from its outer to its inner corner.
     slanted = corner * inner / outer if radial else corner
-    line = _Line(robot.tube.outer_diameter)
-    line.begin(robot, first)
+    line = _SideView(robot, first)
     cuts: list[Cut] = []
     shown = min(notch.repeat, 2)
     for number in range(shown):
@@ -173,14 +170,9 @@ def _arc(notch: ArcNotch, robot: Robot, first: bool, following: Notch | None) ->
         line.stub()
     tip = shown == 1 and following is None
     left = robot.tube.outer_diameter - notch.depth
-    return NotchView(
-        length=line.at,
-        held=first,
+    return line.view(
         tip=tip,
-        breaks=line.breaks,
         cuts=cuts,
-        along=line.along,
-        absent=line.absent,
         across=[
             [
                 Dimension(corner, outer, f"depth\n{notch.depth:.4g}"),
@@ -197,12 +189,9 @@ def _arc(notch: ArcNotch, robot: Robot, first: bool, following: Notch | None) ->
 @notch_view.register
 def _strip(notch: StripNotch, robot: Robot, first: bool, following: Notch | None) -> NotchView:
     """Describe a pair of triangular notches with the strip between them (Liu 2022)."""
-    del (
-        following
-    )  # the last notch may reach beyond the tip, so that the view is broken off there too
+    del following  # the last notch may reach beyond the tip, so the view is broken off there too
     outer = robot.tube.outer_radius
-    line = _Line(robot.tube.outer_diameter)
-    line.begin(robot, first)
+    line = _SideView(robot, first)
     cuts: list[Cut] = []
     vertex = 0.0
     for number in range(min(notch.repeat, 2)):
@@ -219,14 +208,9 @@ def _strip(notch: StripNotch, robot: Robot, first: bool, following: Notch | None
     corner = notch.depth - outer
     left = robot.tube.outer_diameter - notch.depth
     length, walls = notch.strip_length_in(robot.tube), notch.wall_width_in(robot.tube)
-    return NotchView(
-        length=line.at,
-        held=first,
+    return line.view(
         tip=False,
-        breaks=line.breaks,
         cuts=cuts,
-        along=line.along,
-        absent=line.absent,
         across=[
             [
                 Dimension(-corner, outer, f"depth\n{notch.depth:.4g}"),
@@ -250,8 +234,7 @@ def _strip(notch: StripNotch, robot: Robot, first: bool, following: Notch | None
 def _u_link(notch: ULink, robot: Robot, first: bool, following: Notch | None) -> NotchView:
     """Describe a row of slots with round ends (Gao 2017)."""
     outer, radius, half = robot.tube.outer_radius, notch.slot_radius, 0.5 * notch.strip_length
-    line = _Line(robot.tube.outer_diameter)
-    line.begin(robot, first)
+    line = _SideView(robot, first)
     cuts: list[Cut] = []
     side = -1.0 if notch.proximal_slot == "away" else 1.0
     shown = range(notch.slots) if notch.slots <= 4 else (0, 1, 2, notch.slots - 1)
@@ -278,14 +261,9 @@ def _u_link(notch: ULink, robot: Robot, first: bool, following: Notch | None) ->
     ends = [(section_at, -half), (centres[-1.0], half)]
     corner = -half - radius
     depth = outer + half + radius
-    return NotchView(
-        length=line.at,
-        held=first,
+    return line.view(
         tip=following is None,
-        breaks=line.breaks,
         cuts=cuts,
-        along=line.along,
-        absent=line.absent,
         across=[
             [Dimension(-half, half, f"strip\nlength\n{notch.strip_length:.4g}")],
             [Dimension(corner, outer, f"depth\n{depth:.4g}")],

@@ -17,39 +17,24 @@ from notchflex.plotting.fits.calibration_rows import (
     residual_panel,
 )
 from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import DASHED, Area, Cell, Line, Panel
+from notchflex.plotting.sheet import DASHED, Area, Line, Panel, dots, grid
 from notchflex.plotting.style import BLUE, GREY, VERMILLION
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from notchflex.fit import Calibration
 
 COLUMNS = 4
 
 
-def calibration_figure(found: Calibration) -> Figure:
-    """Draw a fit with matplotlib; for what it shows see `calibration_picture`.
-
-    Args:
-        found: The fit.
-
-    Returns:
-        The figure; `notchflex.plotting.save` writes it.
-    """
-    return calibration_picture(found).figure()
-
-
 def calibration_picture(found: Calibration) -> Picture:
     """Describe a fit.
 
-    Robot by robot every notch and what else was measured over the load: measured points are open
-    markers, the line is the model with the constants that were found, and its band is where the
-    model lies with 95 % as the constants do, in a straight-line view. Then the
-    residuals of all notches, over the noise, the profile likelihood of every constant with the line
-    that ends its 95 % interval, and the correlations of the constants.
+    For every robot each notch and each other measured quantity over the load: measured points are
+    open markers, the line is the model with the estimated constants, and the band is its linearised
+    95 % interval. Then the residuals over the noise, the profile likelihood of every constant with
+    the limit of its 95 % interval, and the correlations of the constants.
 
-    Of a robot with many notches some are drawn, the first and the last among them.
+    Of a robot with many notches some are drawn, with the first and the last.
 
     Args:
         found: The fit.
@@ -65,22 +50,17 @@ def calibration_picture(found: Calibration) -> Picture:
     if len(found.names) > 1:
         panels.append(correlation_panel(found))
     columns = min(COLUMNS, len(panels))
-    cells = [
-        Cell(
-            panel, (index // columns, index // columns + 1), (index % columns, index % columns + 1)
-        )
-        for index, panel in enumerate(panels)
-    ]
     rows = math.ceil(len(panels) / columns)
     title = f"{', '.join(found.given)}: {found.counted} numbers"
+    cells = grid(panels, columns)
     return Picture(title, 3.0 * columns, 2.6 * rows + 0.4, cells, _legend(found, panels))
 
 
 def _legend(found: Calibration, panels: Sequence[Panel]) -> list[Line | Area]:
-    """Entries for what the panels show."""
+    """Return the legend entries of what the panels show."""
     measured = "measured, a kind of marker for each pull"
     entries: list[Line | Area] = [
-        Line([], GREY, None, marker="o", size=4.0, hollow=True, name=measured, group=MEASURED),
+        dots([], GREY, 4.0, hollow=True, name=measured, group=MEASURED),
         Line([], BLUE, name=MODEL, group=MODEL),
         band([], "95 % band of the model"),
         Line([], VERMILLION, DASHED, 1.0, name="end of the 95 % interval", group=END),

@@ -1,4 +1,4 @@
-"""Constants of a fit: how the misfit rises beside each, and how they make up for one another."""
+"""Panels of the constants of a fit: profiles of the misfit, and correlations."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from notchflex.plotting.sheet import (
     DASHED,
     DOTTED,
     Correlations,
-    Item,
-    Level,
     Line,
+    Mark,
     Note,
     Panel,
-    Upright,
+    Span,
+    dots,
 )
 from notchflex.plotting.style import BLUE, GREY, VERMILLION
 
@@ -23,21 +23,21 @@ if TYPE_CHECKING:
     from notchflex.fit import Calibration
 
 END = "end of the interval"
-"""What shows and hides all ends of intervals together."""
+"""Group of the ends of all intervals."""
 
 
 def profile_panel(found: Calibration, name: str) -> Panel:
-    """Return by how much twice the misfit rises where one constant is held, all others at best."""
+    """Return the rise of twice the misfit over one constant, with all others optimal."""
     interval = found.intervals[name]
     value, rise = interval.profile.T
     line = found.allowed_rise(name)
-    items: list[Item] = [
-        Level(line, GREY, DOTTED, 1.2),
+    items: list[Mark] = [
+        Span("y", line, line, GREY, DOTTED, 1.2),
         Line(_smooth(value, rise, found.values[name]), BLUE),
-        Line(interval.profile, BLUE, None, marker="o", group="profile", layer=3, told=True),
+        dots(interval.profile, BLUE, group="profile", layer=3, hover=True),
     ]
     ends = [end for end in (interval.lower, interval.upper) if end is not None]
-    items += [Upright(end, VERMILLION, DASHED, 1.0, group=END) for end in ends]
+    items += [Span("x", end, end, VERMILLION, DASHED, 1.0, group=END) for end in ends]
     sides = ["below"] * (interval.lower is None) + ["above"] * (interval.upper is None)
     if sides:
         items.append(Note(f"open {' and '.join(sides)}", VERMILLION, corner=True))
@@ -54,11 +54,11 @@ def profile_panel(found: Calibration, name: str) -> Panel:
 
 
 def correlation_panel(found: Calibration) -> Panel:
-    """Return the correlations of the constants as a square of numbers."""
-    few = len(found.names) < 6  # of more, a row has no room for two lines
+    """Return the correlation matrix of the constants."""
+    few = len(found.names) < 6  # else a row has no room for two lines
     names = [_short(name) if few else name for name in found.names]
     rows = [f"{name}  {number + 1}" for number, name in enumerate(names)]
-    if found.intervals:  # the profiles have the same numbers; names would make all panels narrow
+    if found.intervals:  # numbered as the profiles; names would make all panels narrow
         rows = [str(number + 1) for number in range(len(found.names))]
     return Panel(
         [Correlations(found.correlation, found.names, rows)],
@@ -69,7 +69,7 @@ def correlation_panel(found: Calibration) -> Panel:
 
 
 def _smooth(value: np.ndarray, rise: np.ndarray, best: float) -> np.ndarray:
-    """A curve through the points: their signed roots are nearly straight, so lines join those."""
+    """Return a curve through the points, which interpolates their nearly linear signed roots."""
     known = np.isfinite(rise)
     value, root = value[known], np.sqrt(rise[known]) * np.sign(value[known] - best)
     x = np.linspace(value[0], value[-1], 200)
@@ -77,7 +77,7 @@ def _smooth(value: np.ndarray, rise: np.ndarray, best: float) -> np.ndarray:
 
 
 def _short(name: str) -> str:
-    """A name on few lines: the section on a line of its own where it is long."""
+    """Return a name, with the section on a line of its own if it is long."""
     if len(name) < 24 or "." not in name:
         return name
     head, _, tail = name.rpartition(".")

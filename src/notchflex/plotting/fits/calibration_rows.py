@@ -1,4 +1,4 @@
-"""What was measured over the load, with the model and its band, and what is left between them."""
+"""Panels of the measurements of a fit over the load: model, its band, and residuals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.sheet import MARKERS, Area, Item, Level, Line, Panel, Stripe
+from notchflex.plotting.sheet import MARKERS, Area, Line, Mark, Panel, Span, dots
 from notchflex.plotting.style import BLUE, GREY, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from notchflex.fit import Calibration
 
 MEASURED, MODEL, BAND = "measured", "model", "band"
-"""What shows and hides lines of all panels together."""
+"""Groups of marks in all panels."""
 
 MOST_NOTCHES = 6
 """Of a robot with more notches some are drawn."""
 
-MOST_TOLD = 8
-"""Of so many notches a legend tells the first and the last colour."""
+MOST_NAMED = 8
+"""Of so many notches a legend has the first and the last colour only."""
 
 
-class Part(NamedTuple):
-    """A measured number of every row: robot, quantity, and its component as residuals have it."""
+class MeasuredPart(NamedTuple):
+    """A measured number of every row: robot, quantity, and component in the residuals."""
 
     label: str
     quantity: str
@@ -35,7 +35,7 @@ class Part(NamedTuple):
     title: str
 
 
-class _Line(NamedTuple):
+class _ModelLine(NamedTuple):
     """The rows of one pull, or of all pulls from rest of one file, in the order of a line."""
 
     x: NDArray[np.float64]
@@ -44,46 +44,48 @@ class _Line(NamedTuple):
     half: NDArray[np.float64]
     pulls: NDArray[np.intp]
     names: list[str]
-    """What the measurements call the pull of every row."""
+    """Names of the pulls of the rows."""
 
 
-def parts_shown(found: Calibration, label: str) -> list[Part]:
-    """What is drawn of a robot: some notches, and one panel for each other number."""
+def parts_shown(found: Calibration, label: str) -> list[MeasuredPart]:
+    """Return what is drawn of a robot: some notches, and every other number."""
     from notchflex.fit.measurements.measurements import OBSERVED
 
     residuals = found.residuals
     own = residuals.robot == list(found.given).index(label)
-    parts: list[Part] = []
+    parts: list[MeasuredPart] = []
     for number, quantity in enumerate(OBSERVED):
         there = np.unique(residuals.part[own & (residuals.quantity == number)])
-        if quantity == "axis_points":  # thirty points and more: their residuals tell
+        if quantity == "axis_points":  # thirty points and more: only their residuals
             continue
         if len(there) > MOST_NOTCHES:
             spread = np.linspace(0, len(there) - 1, MOST_NOTCHES).round().astype(int)
             there = there[spread]
-        parts += [Part(label, quantity, int(one), _title(quantity, int(one))) for one in there]
+        parts += [
+            MeasuredPart(label, quantity, int(one), _title(quantity, int(one))) for one in there
+        ]
     return parts
 
 
-def data_panel(found: Calibration, part: Part) -> Panel:
+def data_panel(found: Calibration, part: MeasuredPart) -> Panel:
     """Return one number over the load: measured, model, and the band of the model."""
     from notchflex.fit.assessment.errors_of_parts import edge
 
     _, unit, scale = edge(part.quantity)
-    items: list[Item] = []
+    items: list[Mark] = []
     for line in _lines(found, part):
         measured, model, half = (one * scale for one in (line.measured, line.model, line.half))
         if np.isfinite(half).all():
             ends = [np.stack([line.x, model + way * half], axis=1) for way in (-1.0, 1.0)]
             items.append(band([np.concatenate([ends[0], ends[1][::-1]])]))
         curve = np.stack([line.x, model], axis=1)
-        items.append(Line(curve, BLUE, group=MODEL, layer=3, told=True))
+        items.append(Line(curve, BLUE, group=MODEL, layer=3, hover=True))
         for pull, name in dict.fromkeys(zip(line.pulls.tolist(), line.names, strict=True)):
             mine = line.pulls == pull
             points = np.stack([line.x[mine], measured[mine]], axis=1)
-            mark: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "size": 3.2}
-            mark |= {"name": f"{MEASURED}, pull {name}", "group": MEASURED, "layer": 4}
-            items.append(Line(points, GREY, None, hollow=True, told=True, **mark))
+            look: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
+            look |= {"name": f"{MEASURED}, pull {name}", "group": MEASURED, "layer": 4}
+            items.append(dots(points, GREY, 3.2, hover=True, **look))
     return Panel(
         items,
         _abscissa(found, part.label)[1],
@@ -93,12 +95,12 @@ def data_panel(found: Calibration, part: Part) -> Panel:
 
 
 def band(polygons: Sequence[NDArray[np.float64]], name: str = "") -> Area:
-    """Return where the model lies with 95 %."""
+    """Return the 95 % band of the model."""
     return Area(polygons, BLUE, BLUE, 0.25, 0.0, name=name, group=BAND)
 
 
 def residual_panel(found: Calibration, label: str) -> Panel:
-    """Return what is left of every number of a robot over its noise; notches by colour.
+    """Return the residuals of a robot over their noise, notches by colour.
 
     A total angle that is the sum of the notches has no noise of its own and is not drawn.
     """
@@ -107,13 +109,16 @@ def residual_panel(found: Calibration, label: str) -> Panel:
     points = np.stack(
         [_abscissa(found, label)[0], found.residuals.values / found.noise.deviation], axis=1
     )
-    items: list[Item] = [Stripe(-1.96, 1.96, GREY, 0.15), Level(0.0, GREY)]
+    items: list[Mark] = [
+        Span("y", -1.96, 1.96, GREY, opacity=0.15),
+        Span("y", 0.0, 0.0, GREY),
+    ]
     if (own & ~angles).any():
-        items.append(replace(_OTHERS, points=points[own & ~angles], told=True, layer=1))
+        items.append(replace(_OTHERS, points=points[own & ~angles], hover=True, layer=1))
     for one, entry in _notch_entries(found).items():
         mine = points[angles & (notch == one)]
         if len(mine):
-            items.append(replace(entry, points=mine, told=True, layer=3))
+            items.append(replace(entry, points=mine, hover=True, layer=3))
     title = "model less measured"
     return Panel(
         items,
@@ -124,37 +129,36 @@ def residual_panel(found: Calibration, label: str) -> Panel:
 
 
 def residual_entries(found: Calibration) -> list[Line]:
-    """Return what a legend tells of the residuals: colours of notches, marks of all others."""
+    """Return the legend entries of the residuals: colours of notches, marks of all others."""
     every = list(_notch_entries(found).values())
-    told = every if len(every) < MOST_TOLD else [every[0], every[-1]]
-    return [*told, _OTHERS]
+    return [*(every if len(every) < MOST_NAMED else [every[0], every[-1]]), _OTHERS]
 
 
-_OTHERS = Line([], GREY, None, marker="X", size=3.5, name="residuals of others", group="others")
+_OTHERS = dots([], GREY, 3.5, marker="X", name="residuals of others", group="others")
 
 
 def _notch_entries(found: Calibration) -> dict[int, Line]:
-    """Every notch (from 0) with its mark, the same for all robots."""
+    """Return the marker of every notch (from 0), the same for all robots."""
     angles = np.any([_own(found, label)[1] for label in found.given], axis=0)
     notches = np.unique(found.residuals.part[angles]).tolist()
     colours = sequence_colours(len(notches))
     names = [f"residuals of notch {notch + 1}" for notch in notches]
     return {
-        notch: Line([], colour, None, marker="o", size=3.0, name=name, group=name)
+        notch: dots([], colour, name=name, group=name)
         for notch, colour, name in zip(notches, colours, names, strict=True)
     }
 
 
 def _own(found: Calibration, label: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which residuals are those of a robot, and which of these are angles of notches."""
+    """Return which residuals belong to a robot, and which of them are notch angles."""
     from notchflex.fit.measurements.measurements import OBSERVED
 
     own = found.residuals.robot == list(found.given).index(label)
     return own, own & (found.residuals.quantity == OBSERVED.index("notch_angle"))
 
 
-def _lines(found: Calibration, part: Part) -> list[_Line]:
-    """The rows of a part as lines: all from rest of a file by load, or pull by pull in order."""
+def _lines(found: Calibration, part: MeasuredPart) -> list[_ModelLine]:
+    """Return the rows of a part as lines: by load if measured from rest, else pull by pull."""
     from notchflex.fit.measurements.measurements import OBSERVED
 
     residuals = found.residuals
@@ -165,7 +169,7 @@ def _lines(found: Calibration, part: Part) -> list[_Line]:
     )
     x = _abscissa(found, part.label)[0]
     half = found.half_width(found.residuals.slopes)
-    lines: list[_Line] = []
+    lines: list[_ModelLine] = []
     for number in np.unique(residuals.sample[own]):
         measured = found.problem.samples.every[number].measured
         mine = np.flatnonzero(own & (residuals.sample == number))
@@ -173,24 +177,16 @@ def _lines(found: Calibration, part: Part) -> list[_Line]:
         if not measured.from_rest:
             groups = [mine[residuals.pull[mine] == one] for one in np.unique(residuals.pull[mine])]
         for rows in groups:
-            model = _model(found, rows, part, measured)
-            values = model - residuals.values[rows]
+            table = measured.observed[part.quantity]
+            seen = table.reshape(len(table), -1)[residuals.row[rows], part.component]
             names = [str(measured.pull[row]) for row in residuals.row[rows]]
-            lines.append(_Line(x[rows], values, model, half[rows], residuals.pull[rows], names))
+            model = seen + residuals.values[rows]
+            lines.append(_ModelLine(x[rows], seen, model, half[rows], residuals.pull[rows], names))
     return lines
 
 
-def _model(
-    found: Calibration, rows: NDArray[np.intp], part: Part, measured: Any
-) -> NDArray[np.float64]:
-    """The model's number at some residuals: what was measured, and what the model is more."""
-    table = measured.observed[part.quantity]
-    seen = table.reshape(len(table), -1)[found.residuals.row[rows], part.component]
-    return seen + found.residuals.values[rows]
-
-
 def _abscissa(found: Calibration, label: str) -> tuple[NDArray[np.float64], str]:
-    """What was done to a tendon at every residual of a robot, and the label of its axis."""
+    """Return tension or stroke of a tendon at every residual of a robot, and its label."""
     residuals = found.residuals
     x = np.full(len(residuals), np.nan)
     samples = found.problem.samples.every

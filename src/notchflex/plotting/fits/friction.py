@@ -1,4 +1,4 @@
-"""The picture of the friction rig: the readings over turn and load, with the estimate."""
+"""The picture of the friction rig: readings over wrap angle and load, with the estimate."""
 
 from __future__ import annotations
 
@@ -9,35 +9,21 @@ from numpy.typing import NDArray
 
 from notchflex._quantity import DEGREES
 from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import BESIDE, Cell, Item, Level, Line, Panel, Stripe
+from notchflex.plotting.sheet import BESIDE, Line, Mark, Panel, Span, dots, grid
 from notchflex.plotting.style import BLUE, GREY, ORANGE, VERMILLION
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from notchflex.fit import FrictionRig
 
 _READING = "#333333"
 
 
-def friction_figure(rig: FrictionRig) -> Figure:
-    """Draw the friction rig with matplotlib; for what it shows see `friction_picture`.
-
-    Args:
-        rig: The estimate.
-
-    Returns:
-        The figure; `notchflex.plotting.save` writes it.
-    """
-    return friction_picture(rig).figure()
-
-
 def friction_picture(rig: FrictionRig) -> Picture:
     """Describe the coefficients of all readings of the friction rig.
 
-    Left over the turn, right over the load: readings with their standard deviations where known,
-    outliers marked, the estimate with its 95 % interval and the spread of the readings as bands,
-    and the line of the other model where a constant is not enough.
+    Left over the wrap angle, right over the load: readings with their standard deviations where
+    known, marked outliers, the estimate with its 95 % interval and the spread of the readings as
+    bands, and the line of the alternative model if a constant does not fit.
 
     Args:
         rig: The estimate.
@@ -59,40 +45,39 @@ def friction_picture(rig: FrictionRig) -> Picture:
         over_turn += _other_model(rig, turn, test.by_turn / DEGREES)
         over_load += _other_model(rig, load, test.by_load, logarithmic=True)
     label = r"coefficient of friction $\mu$ [-]"
-    left = Panel(over_turn, "turn over both edges [deg]", label, shared_y=True)
-    right = Panel(over_load, "weight 1 [g]", label, legend=BESIDE, shared_y=True)
-    cells = [Cell(left, (0, 1), (0, 1)), Cell(right, (0, 1), (1, 2))]
-    return Picture(f"Coefficient of friction, {readings.source}", 9.6, 3.6, cells)
+    left = Panel(over_turn, "turn over both edges [deg]", label, shared="y")
+    right = Panel(over_load, "weight 1 [g]", label, legend=BESIDE, shared="y")
+    title = f"Coefficient of friction, {readings.source}"
+    return Picture(title, 9.6, 3.6, grid([left, right], 2))
 
 
-def _items(rig: FrictionRig, x: NDArray[np.float64]) -> list[Item]:
-    """The estimate and the readings, over what changed from reading to reading."""
-    readings = rig.readings
+def _items(rig: FrictionRig, x: NDArray[np.float64]) -> list[Mark]:
+    """Return the estimate and the readings, over what changed from reading to reading."""
+    readings, at = rig.readings, rig.coefficient
     low, high = rig.interval
-    items: list[Item] = []
+    items: list[Mark] = []
     if np.isfinite(rig.spread):
-        ends = rig.coefficient - rig.spread, rig.coefficient + rig.spread
-        items.append(Stripe(*ends, GREY, 0.15, name="spread of readings"))
+        ends = at - rig.spread, at + rig.spread
+        items.append(Span("y", *ends, GREY, opacity=0.15, name="spread of readings"))
     if np.isfinite(low):
-        items.append(Stripe(low, high, BLUE, 0.3, name="95 % interval"))
-    name = rf"$\mu$ = {rig.coefficient:.4g}"
-    items.append(Level(rig.coefficient, BLUE, width=1.4, name=name, group="estimate"))
+        items.append(Span("y", low, high, BLUE, opacity=0.3, name="95 % interval"))
+    name = rf"$\mu$ = {at:.4g}"
+    items.append(Span("y", at, at, BLUE, width=1.4, name=name, group="estimate"))
     points = np.stack([x, readings.coefficient], axis=1)
     deviation = readings.coefficient_deviation
-    half = deviation if np.isfinite(deviation).any() else None
-    dots: dict[str, Any] = {"dash": None, "marker": "o", "told": True, "half": half}
-    items.append(Line(points, _READING, name="reading", group="reading", **dots))
+    error = deviation if np.isfinite(deviation).any() else None
+    look: dict[str, Any] = {"hover": True, "error": error}
+    items.append(dots(points, _READING, name="reading", group="reading", **look))
     if rig.outliers:
-        off = points[list(rig.outliers)]
-        mark: dict[str, Any] = {"dash": None, "marker": "o", "size": 8.0, "hollow": True}
-        items.append(Line(off, VERMILLION, name="outlier", group="outlier", layer=3, **mark))
+        look = {"hollow": True, "layer": 3, "name": "outlier", "group": "outlier"}
+        items.append(dots(points[list(rig.outliers)], VERMILLION, 8.0, **look))
     return items
 
 
 def _other_model(
     rig: FrictionRig, x: NDArray[np.float64], slope: float, *, logarithmic: bool = False
-) -> list[Item]:
-    """How the other model depends on one of the two, the other one at its mean."""
+) -> list[Mark]:
+    """Return the alternative model over one variable, with the other one at its mean."""
     if not np.isfinite(slope):
         return []
     places = np.linspace(x.min(), x.max(), 100)

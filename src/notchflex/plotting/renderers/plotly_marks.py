@@ -1,7 +1,4 @@
-"""What a panel in the plane shows, as traces, shapes and annotations of plotly.
-
-Its texts are HTML already (`labels.py`).
-"""
+"""Draws the marks of a panel as traces, shapes and annotations of plotly."""
 
 from __future__ import annotations
 
@@ -10,215 +7,220 @@ from typing import Any
 
 import numpy as np
 
+from notchflex.plotting.labels import for_browser
 from notchflex.plotting.sheet import (
     Area,
     Arrow,
     Bars,
     Correlations,
-    Level,
+    Faces,
     Line,
     Note,
     Panel,
-    Stripe,
-    Upright,
+    Span,
 )
 from notchflex.plotting.style import diverging_colours, rgb
 
-POINT = 1.3
-"""Pixels of a browser for a point of a line or letter of the paper."""
+INCH = 100.0
+"""Pixels for an inch of paper, if the window is as wide as the picture."""
+POINT = INCH / 72.0
+"""Pixels for a point."""
 
 _SYMBOLS = {
     "o": "circle", "s": "square", "^": "triangle-up", "D": "diamond", "v": "triangle-down",
     "P": "cross", "*": "star", "X": "x",
 }  # fmt: skip
-_IN_SPACE = {"circle", "square", "diamond", "cross", "x"}
 
 
-def draw_item(
-    item: Any, panel: Panel, where: dict[str, str], layout: dict[str, Any]
+def traces(
+    item: Any, panel: Panel, where: dict[str, Any], layout: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the traces of an item; what plotly draws as a shape or annotation joins `layout`."""
+    """Yield the traces of a mark; shapes, notes and tick labels are added to `layout`."""
     match item:
         case Line():
             yield line_trace(item, panel)
         case Area():
             yield area_trace(item)
+        case Faces():
+            yield _mesh(item)
         case Arrow():
             yield from _arrow(item)
-        case Upright() | Level() | Stripe():
+        case Span():
             layout["shapes"].append(_shape(item, where))
-            if item.name:
-                yield _entry(item)
+            if item.name:  # a shape has no entry in a legend
+                look: dict[str, Any] = {"name": item.name, "group": item.group or item.name}
+                if item.low == item.high:
+                    yield line_trace(Line([], item.colour, item.dash, item.width, **look), None)
+                else:
+                    yield area_trace(Area([], item.colour, item.colour, item.opacity, 0.0, **look))
         case Bars():
+            names = [for_browser(name) for name in item.names]
+            _axis(layout, where, "y").update(
+                tickvals=list(range(len(names))), ticktext=names, showgrid=False, ticks=""
+            )
             yield {
                 "type": "bar", "orientation": "h", "x": list(item.values),
-                "y": list(item.names),
-                "marker": {"color": [css(colour) for colour in item.colours]},
-                "text": [format(value, item.form) for value in item.values],
+                "marker": {"color": [css(colour) for colour in item.colours]}, "width": 0.6,
+                "text": [f"{value:.2f}" for value in item.values], "customdata": names,
                 "textposition": "outside", "cliponaxis": False, "showlegend": False,
-                "hoverinfo": "x+y",
+                "hovertemplate": "%{customdata}: %{x}<extra></extra>",
             }  # fmt: skip
         case Correlations():
-            yield _correlations(item)
+            yield _correlations(item, where, layout)
         case Note():
-            place = {"x": 0.5, "y": 0.5}
+            place: dict[str, Any] = {"x": 0.5, "y": 0.5}
             if item.corner:
                 place = {"x": 0.03, "y": 0.95, "xanchor": "left", "yanchor": "top"}
             layout["annotations"].append(
-                {
-                    "text": item.text, "showarrow": False, **place,
-                    "font": {"color": css(item.colour)},
-                    "xref": f"{where['xaxis']} domain", "yref": f"{where['yaxis']} domain",
-                }
+                {"text": for_browser(item.text), "font": {"color": css(item.colour)}, **place,
+                 "xref": f"{where['xaxis']} domain", "yref": f"{where['yaxis']} domain",
+                 "showarrow": False}
             )  # fmt: skip
         case _:
             raise NotImplementedError(f"plotly draws no {type(item).__name__}")
 
 
 def line_trace(item: Line, panel: Panel | None) -> dict[str, Any]:
-    """Return a line as a trace; one of a panel in space is a trace in space."""
-    points = item.rows
+    """Return a line as a trace; without a panel it is only the entry of a legend."""
     in_space = panel is not None and panel.in_space
-    if not len(points):  # only the entry of a legend
-        points = np.full((1, 3 if in_space else 2), np.nan)
+    rows = item.rows if len(item.rows) else np.full((1, 3 if in_space else 2), np.nan)
+    colour = css(item.colour)
     symbol = _SYMBOLS.get(item.marker, "circle")
-    mark: dict[str, Any] = {"size": POINT * item.size, "color": css(item.colour)}
-    if in_space:
-        symbol = symbol if symbol in _IN_SPACE else "circle"
-    if item.hollow:
-        symbol = f"{symbol}-open"
     trace: dict[str, Any] = {
-        "type": "scatter3d" if in_space else "scatter",
-        "mode": "+".join(
-            ["lines"] * (item.dash is not None) + ["markers"] * bool(item.marker)
-        ),
-        "line": {"color": css(item.colour), "width": POINT * item.width * (2 if in_space else 1)},
-        "marker": mark | {"symbol": symbol},
-        **named(item),
-        "hoverinfo": "skip",
+        "type": "scatter3d" if in_space else "scatter", **dict(zip("xyz", rows.T, strict=False)),
+        "mode": "+".join(["lines"] * (item.dash is not None) + ["markers"] * bool(item.marker)),
+        "line": {"color": colour, "width": POINT * item.width * (2 if in_space else 1)},
+        "marker": {"size": POINT * item.size, "color": colour,
+                   "symbol": f"{symbol}-open" if item.hollow else symbol},
+        "hoverinfo": "skip", **_named(item),
     }  # fmt: skip
-    for axis, values in zip("xyz", points.T, strict=False):
-        trace[axis] = plain(values)
     if item.dash and not in_space:
-        trace["line"]["dash"] = _dashes(item.dash, item.width)
-    give_or_take = ""
-    if item.half is not None:
+        trace["line"]["dash"] = _dashes(item)
+    error = ""
+    if item.error is not None:
         trace["error_y"] = {
-            "type": "data", "array": plain(item.half), "width": 0, "thickness": POINT * 0.7,
-            "color": css(item.colour),
+            "type": "data", "array": np.asarray(item.error), "width": 0, "thickness": POINT * 0.7,
+            "color": colour,
         }  # fmt: skip
-        trace["text"] = [f" ± {one:.2g}" if np.isfinite(one) else "" for one in item.half]
-        give_or_take = "%{text}"
-    if item.told and panel is not None:
+        trace["text"] = [f" ± {one:.2g}" if np.isfinite(one) else "" for one in item.error]
+        error = "%{text}"
+    if item.hover and panel is not None:
+        name, x, y = map(for_browser, (item.name or item.group, panel.x_label, panel.y_label))
         trace["hoverinfo"] = "all"
         trace["hovertemplate"] = (
-            f"{item.name or item.group}<br>{panel.x_label}: %{{x:.4g}}"
-            f"<br>{panel.y_label}: %{{y:.4g}}{give_or_take}<extra></extra>"
+            f"{name}<br>{x}: %{{x:.4g}}<br>{y}: %{{y:.4g}}{error}<extra></extra>"
         )
     return trace
 
 
 def area_trace(item: Area) -> dict[str, Any]:
-    """Return polygons as a trace; none at all are the entry of a legend."""
-    x: list[float | None] = []
-    y: list[float | None] = []
-    for polygon in item.polygons or [np.full((1, 2), np.nan)]:  # closed, and apart from the next
-        for values, into in ((polygon[:, 0], x), (polygon[:, 1], y)):
-            numbers = plain(values)
-            into += [*numbers, numbers[0], None]
+    """Return polygons as a trace, closed and with a gap behind each."""
+    gap = np.full((1, 2), np.nan)
+    rows = np.concatenate([gap, *(part for one in item.polygons for part in (one, one[:1], gap))])
     return {
-        "type": "scatter", "mode": "lines", "fill": "toself", "x": x, "y": y,
+        "type": "scatter", "mode": "lines", "fill": "toself", "x": rows[1:, 0], "y": rows[1:, 1],
         "fillcolor": css(item.face, item.opacity),
         "line": {"color": css(item.edge), "width": POINT * item.width},
-        "hoverinfo": "skip", **named(item),
+        "hoverinfo": "skip", **_named(item),
+    }  # fmt: skip
+
+
+def _mesh(item: Faces) -> dict[str, Any]:
+    corners = item.corners.reshape(-1, 3)
+    first = 4 * np.arange(len(item.corners))
+    triangles = np.concatenate(
+        [np.stack([first, first + 1, first + 2]), np.stack([first, first + 2, first + 3])], axis=1
+    )
+    return {
+        "type": "mesh3d", **dict(zip("xyz", corners.T, strict=True)),
+        **dict(zip("ijk", triangles, strict=True)),
+        "facecolor": [css(colour) for colour in item.colours] * 2, "flatshading": True,
+        "lighting": {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}, "hoverinfo": "skip",
+        # The faces have colours of their own; this one is that of the legend.
+        "color": css(item.colour), **_named(item),
     }  # fmt: skip
 
 
 def _arrow(item: Arrow) -> Iterator[dict[str, Any]]:
     start, end = np.asarray(item.start, float), np.asarray(item.end, float)
-    middle = 0.5 * (start + end)
-    step = end - start
-    # As matplotlib's arc3: a parabola whose control point lies aside by `bend` of the length.
-    control = middle + item.bend * np.array([step[1], -step[0]])
+    step, colour = end - start, css(item.colour)
+    look: dict[str, Any] = {"hoverinfo": "skip", **_named(item)}
+    if len(start) == 3:
+        ends = zip("xyz", np.stack([start, end]).T, strict=True)
+        line = {"color": colour, "width": 3.0 * item.width}
+        yield {"type": "scatter3d", "mode": "lines", "line": line, **dict(ends), **look}
+        yield {
+            "type": "cone", "anchor": "tip", "sizemode": "raw", "showscale": False,
+            "colorscale": [[0, colour], [1, colour]], "hoverinfo": "skip", "showlegend": False,
+            **dict(zip("xyzuvw", np.concatenate([end, 0.3 * step])[:, None], strict=True)),
+        }  # fmt: skip
+        return
+    # As matplotlib's arc3: a parabola whose control point is offset by `bend` of the length.
+    control = 0.5 * (start + end) + item.bend * np.array([step[1], -step[0]])
     part = np.linspace(0.0, 1.0, 21)[:, None]
     curve = (1 - part) ** 2 * start + 2 * part * (1 - part) * control + part**2 * end
     yield {
-        "type": "scatter", "mode": "lines+markers",
-        "x": plain(curve[:, 0]), "y": plain(curve[:, 1]),
-        "line": {"color": css(item.colour), "width": POINT * item.width},
-        "marker": {
-            "symbol": "arrow", "angleref": "previous", "color": css(item.colour),
-            "size": [0.0] * 20 + [11.0],
-        },
-        "hoverinfo": "skip", **named(item),
+        "type": "scatter", "mode": "lines+markers", "x": curve[:, 0], "y": curve[:, 1],
+        "line": {"color": colour, "width": POINT * item.width},
+        "marker": {"symbol": "arrow", "angleref": "previous", "color": colour,
+                   "size": [0.0] * 20 + [11.0]}, **look,
     }  # fmt: skip
-    if item.reach is not None:  # seen by nobody, but the axes make room for it
-        yield {
-            "type": "scatter", "mode": "markers", "x": plain(item.reach[:, 0]),
-            "y": plain(item.reach[:, 1]), "marker": {"opacity": 0.0}, "hoverinfo": "skip",
-            "showlegend": False,
-        }  # fmt: skip
 
 
-def _shape(item: Upright | Level | Stripe, where: dict[str, str]) -> dict[str, Any]:
-    """What goes through the whole panel; hidden and shown with the traces of its group."""
-    x, y = where["xaxis"], where["yaxis"]
-    group = item.group or item.name
-    shape: dict[str, Any] = {"legendgroup": group} if group else {}
-    if isinstance(item, Stripe):
-        shape |= {"type": "rect", "line": {"width": 0}, "layer": "below"}
-        shape |= {"fillcolor": css(item.colour, item.opacity)}
-    else:
+def _shape(item: Span, where: dict[str, Any]) -> dict[str, Any]:
+    """Return what goes across the whole panel; it is shown and hidden with its group."""
+    own, other = ("x", "y") if item.axis == "x" else ("y", "x")
+    shape: dict[str, Any] = {
+        f"{own}0": item.low, f"{own}1": item.high, f"{own}ref": where[f"{own}axis"],
+        f"{other}0": 0, f"{other}1": 1, f"{other}ref": f"{where[f'{other}axis']} domain",
+    }  # fmt: skip
+    if group := item.group or item.name:
+        shape["legendgroup"] = for_browser(group)
+    if item.low == item.high:
         line: dict[str, Any] = {"color": css(item.colour), "width": POINT * item.width}
-        if item.dash:
-            line["dash"] = _dashes(item.dash, item.width)
-        shape |= {"type": "line", "line": line}
-    if isinstance(item, Upright):
-        low, high = item.at, item.at
-        return shape | {"x0": low, "x1": high, "xref": x, "y0": 0, "y1": 1, "yref": f"{y} domain"}
-    low, high = (item.low, item.high) if isinstance(item, Stripe) else (item.at, item.at)
-    return shape | {"y0": low, "y1": high, "yref": y, "x0": 0, "x1": 1, "xref": f"{x} domain"}
+        return shape | {"type": "line", "line": line | {"dash": _dashes(item) or "solid"}}
+    fill = css(item.colour, item.opacity)
+    return shape | {"type": "rect", "line": {"width": 0}, "layer": "below", "fillcolor": fill}
 
 
-def _entry(item: Upright | Level | Stripe) -> dict[str, Any]:
-    """The entry of a legend for what is no trace."""
-    name, group = item.name, item.group or item.name
-    if isinstance(item, Stripe):
-        entry = Area([], item.colour, item.colour, item.opacity, 0.0, name, group)
-        return area_trace(entry)
-    return line_trace(Line([], item.colour, item.dash, item.width, name=name, group=group), None)
-
-
-def _correlations(item: Correlations) -> dict[str, Any]:
-    colours = diverging_colours(21)
+def _correlations(
+    item: Correlations, where: dict[str, Any], layout: dict[str, Any]
+) -> dict[str, Any]:
+    count = len(item.names)
+    for name, texts in (("x", [str(one + 1) for one in range(count)]), ("y", item.rows)):
+        size = POINT * min(7.0, 3.1 * item.font_size)
+        _axis(layout, where, name).update(
+            tickvals=list(range(count)), ticktext=[for_browser(text) for text in texts],
+            tickfont={"size": size}, showgrid=False,
+        )  # fmt: skip
+    names = [for_browser(name) for name in item.names]
     return {
-        "type": "heatmap", "z": [plain(row) for row in item.values], "zmin": -1.0, "zmax": 1.0,
-        "colorscale": [[i / 20, css(colour)] for i, colour in enumerate(colours)],
-        "showscale": False, "text": item.texts, "texttemplate": "%{text}",
-        "textfont": {"size": POINT * item.letters},
-        "customdata": [[f"{one}<br>{other}" for other in item.names]
-                       for one in item.names],
+        "type": "heatmap", "z": item.values, "zmin": -1.0, "zmax": 1.0, "showscale": False,
+        "colorscale": [[i / 20, css(colour)] for i, colour in enumerate(diverging_colours(21))],
+        "text": item.texts, "texttemplate": "%{text}",
+        "textfont": {"size": POINT * item.font_size},
+        "customdata": [[f"{one}<br>{other}" for other in names] for one in names],
         "hovertemplate": "%{customdata}<br>%{text}<extra></extra>",
     }  # fmt: skip
 
 
-def named(item: Any) -> dict[str, Any]:
-    """Return what a legend calls an item, and with what it is shown and hidden."""
-    group = getattr(item, "group", "")
-    named = {"name": item.name or group, "showlegend": bool(item.name)}
+def _axis(layout: dict[str, Any], where: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return the layout of the axis x or y of a panel, whose name for plotly is like x2."""
+    return layout[f"{name}axis{where[f'{name}axis'][1:]}"]
+
+
+def _named(item: Any) -> dict[str, Any]:
+    """Return the legend entry of a mark, and the group with which it is shown and hidden."""
+    group = for_browser(item.group)
+    named = {"name": for_browser(item.name) or group, "showlegend": bool(item.name)}
     return named | ({"legendgroup": group} if group else {})
 
 
-def plain(values: Any) -> list[float | None]:
-    """Return numbers as JSON knows them: a gap where there is none."""
-    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in values]
-
-
-def _dashes(dash: tuple[float, ...], width: float) -> str:
-    return ",".join(f"{POINT * width * one:.1f}px" for one in dash)
+def _dashes(item: Line | Span) -> str:
+    return ",".join(f"{POINT * item.width * one:.1f}px" for one in item.dash or ())
 
 
 def css(colour: Any, opacity: float = 1.0) -> str:
-    """Return a colour as a browser takes it."""
+    """Return a colour as HTML takes it."""
     red, green, blue = (round(255 * part) for part in rgb(colour))
     return f"rgba({red},{green},{blue},{opacity:g})"

@@ -1,17 +1,19 @@
-"""A picture drawn by matplotlib, for paper."""
+"""Draws a picture with matplotlib."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from notchflex.plotting.renderers.labels import for_paper, heading_lines, translated
+from notchflex.plotting.labels import for_paper, heading_lines
 from notchflex.plotting.sheet import (
     BELOW,
     BESIDE,
@@ -20,13 +22,11 @@ from notchflex.plotting.sheet import (
     Bars,
     Correlations,
     Faces,
-    Level,
     Line,
     Note,
     Panel,
     Sheet,
-    Stripe,
-    Upright,
+    Span,
 )
 from notchflex.plotting.style import DIVERGING, house_style, new_figure, rgb
 
@@ -35,27 +35,24 @@ ELEVATION, AZIMUTH = 18.0, -60.0
 
 def figure_of(picture: Sheet) -> Figure:
     """Return a picture as a figure of matplotlib."""
-    heading = heading_lines(picture.title, picture.width)
-    picture = translated(picture, for_paper)
     with house_style():
-        title = "\n".join(map(for_paper, heading))
-        figure = new_figure(picture.width, picture.height, title)
-        grid = figure.add_gridspec(*picture.shape)
+        heading = "\n".join(map(for_paper, heading_lines(picture.title, picture.width)))
+        figure = new_figure(picture.width, picture.height, heading)
+        places = figure.add_gridspec(*picture.shape)
         scales: dict[str, list[Axes]] = {}
         shared: dict[str, Axes] = {}
         for cell in picture.cells:
             panel = cell.panel
-            place = grid[slice(*cell.rows), slice(*cell.columns)]
+            place = places[cell.row : cell.row + cell.height, cell.column]
             options: dict[str, Any] = {"projection": "3d"} if panel.in_space else {}
-            sharing = [name for name in "xy" if getattr(panel, f"shared_{name}")]
-            options |= {f"share{name}": shared.get(name) for name in sharing}
+            options |= {f"share{name}": shared.get(name) for name in panel.shared}
             axes: Any = figure.add_subplot(place, **options)
-            for name in sharing:
+            for name in panel.shared:
                 shared.setdefault(name, axes)
-            _draw_panel(axes, panel)
+            draw_panel(axes, panel)
             if panel.scale:
                 scales.setdefault(panel.scale, []).append(axes)
-        # matplotlib shares no axes of equal scale, so that each learns what the others show.
+        # matplotlib cannot share axes of equal scale, so each takes in what the others show.
         for group in scales.values():
             for axes in group:
                 for other in group:
@@ -63,7 +60,7 @@ def figure_of(picture: Sheet) -> Figure:
                 axes.autoscale_view()
         if picture.legend:
             entries = [
-                _line_2d(one)
+                Line2D([], [], **_line_look(one))
                 if isinstance(one, Line)
                 else _polygon(one, np.zeros((1, 2)), one.name)
                 for one in picture.legend
@@ -74,7 +71,7 @@ def figure_of(picture: Sheet) -> Figure:
 
 
 def _columns(names: list[str], width: float) -> int:
-    """How many columns a legend has, 8 at most, to be no wider than its picture [in]."""
+    """Return the number of columns, 8 at most, with which a legend fits a width [in]."""
     # Room for the mark and the gap, and the mean width of a letter of 8 points.
     wide = [0.55 + 0.068 * len(name) for name in names]
     for columns in range(min(8, len(names)), 1, -1):
@@ -85,41 +82,34 @@ def _columns(names: list[str], width: float) -> int:
 
 def draw_panel(axes: Any, panel: Panel) -> None:
     """Draw a panel into axes of matplotlib, of three dimensions where it is in space."""
-    _draw_panel(axes, translated(panel, for_paper))
-
-
-def _draw_panel(axes: Any, panel: Panel) -> None:
     faces = [item for item in panel.items if isinstance(item, Faces)]
     if faces:
         _draw_faces(axes, faces)
     for item in panel.items:
         _draw(axes, item)
     if panel.in_space:
-        _equal_in_space(axes, panel)
+        _set_equal_in_space(axes, panel)
         axes.view_init(elev=ELEVATION, azim=AZIMUTH)
-        axes.set_zlabel(panel.z_label, labelpad=12.0)
+        axes.set_zlabel(for_paper(panel.z_label), labelpad=12.0)
     else:
         axes.autoscale_view()
     if panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(panel.x_label)
-    axes.set_ylabel(panel.y_label)
+    axes.set(xlabel=for_paper(panel.x_label), ylabel=for_paper(panel.y_label))
     if panel.title:
-        axes.set_title(panel.title, loc="left")
-    for name, wanted, whole in (
-        ("x", panel.x_range, panel.whole_x),
-        ("y", panel.y_range, panel.whole_y),
-    ):
-        if whole:
-            getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(integer=True))
-        if name == "x" and panel.most_x is not None:
-            axes.locator_params(axis="x", nbins=panel.most_x)
-        if wanted is not None:
-            getattr(axes, f"set_{name}lim")(*wanted)
+        axes.set_title(for_paper(panel.title), loc="left")
+    for name in panel.whole:
+        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(integer=True))
+    if panel.most_x is not None:
+        axes.locator_params(axis="x", nbins=panel.most_x)
+    if panel.x_range is not None:
+        axes.set_xlim(*panel.x_range)
+    if panel.y_range is not None:
+        axes.set_ylim(*panel.y_range)
     if panel.legend == BELOW:  # axes of three dimensions have no empty corner
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.085))
     elif panel.legend == BESIDE:
-        # In space the numbers and the name of the upright axis stand there too.
+        # In space the labels of the vertical axis are there too.
         at = (1.25, 1.0) if panel.in_space else (1.0, 1.0)
         axes.legend(loc="upper left", bbox_to_anchor=at, borderaxespad=0.2)
     elif panel.legend:
@@ -129,55 +119,35 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
 def _draw(axes: Any, item: Any) -> None:
     match item:
         case Line():
-            axes.add_line(_line(axes, item))
-            if item.half is not None:
-                x, y = item.rows.T
+            rows = item.rows if len(item.rows) else np.zeros((0, 3 if axes.name == "3d" else 2))
+            axes.plot(*rows.T, **_line_look(item))
+            if item.error is not None:
                 bars: dict[str, Any] = {"ecolor": item.colour, "elinewidth": 0.7}
-                half = np.nan_to_num(item.half)  # no bar has no height
-                axes.errorbar(x, y, yerr=half, fmt="none", zorder=item.layer, **bars)
+                half = np.nan_to_num(item.error)  # a bar without height is not seen
+                axes.errorbar(*rows.T, yerr=half, fmt="none", zorder=item.layer, **bars)
         case Area():
             for index, polygon in enumerate(item.polygons):
                 axes.add_patch(_polygon(item, polygon, "" if index else item.name))
         case Arrow():
             _draw_arrow(axes, item)
-        case Upright():
-            axes.axvline(item.at, **_straight(item))
-        case Level():
-            axes.axhline(item.at, **_straight(item))
-        case Stripe():
-            look: dict[str, Any] = {"color": item.colour, "alpha": item.opacity, "linewidth": 0.0}
-            axes.axhspan(item.low, item.high, label=item.name or None, **look)
+        case Span():
+            _draw_span(axes, item)
         case Bars():
             _draw_bars(axes, item)
         case Correlations():
             _draw_correlations(axes, item)
         case Note():
-            place = (0.03, 0.95, item.text) if item.corner else (0.5, 0.5, item.text)
+            at = (0.03, 0.95) if item.corner else (0.5, 0.5)
             aligned = {"va": "top"} if item.corner else {"ha": "center"}
-            axes.text(*place, transform=axes.transAxes, color=item.colour, **aligned)
+            look: dict[str, Any] = {"transform": axes.transAxes, "color": item.colour} | aligned
+            write = axes.text2D if axes.name == "3d" else axes.text
+            write(*at, for_paper(item.text), **look)
         case _:
             pass  # faces are drawn together, before
 
 
-def _line(axes: Any, item: Line) -> Any:
-    """A line of the axes, in space where it has three coordinates."""
-    made = _line_2d(item)
-    points = item.rows
-    if not len(points):
-        if axes.name == "3d":
-            from mpl_toolkits.mplot3d.art3d import line_2d_to_3d
-
-            line_2d_to_3d(made)
-    elif points.shape[1] == 3:
-        from mpl_toolkits.mplot3d.art3d import Line3D
-
-        space = Line3D(*points.T)
-        space.update_from(made)
-        space.set_label(made.get_label())
-        return space
-    else:
-        made.set_data(*points.T)
-    return made
+def _label(name: str) -> str | None:
+    return for_paper(name) or None
 
 
 def _polygon(item: Area, points: Any, name: str) -> Polygon:
@@ -188,74 +158,57 @@ def _polygon(item: Area, points: Any, name: str) -> Polygon:
         linewidth=item.width,
         joinstyle="round",
         zorder=item.layer,
-        label=name or None,
+        label=_label(name),
     )
 
 
-def _straight(item: Upright | Level) -> dict[str, Any]:
+def _dashes(dash: tuple[float, ...] | None) -> Any:
+    return "" if dash is None else (0, dash) if dash else "-"
+
+
+def _line_look(item: Line) -> dict[str, Any]:
     return {
-        "color": item.colour, "linestyle": _dashes(item.dash), "linewidth": item.width,
-        "label": item.name or None,
-    }  # fmt: skip
-
-
-def _dashes(dash: tuple[float, ...]) -> Any:
-    return (0, dash) if dash else "-"
-
-
-def _line_2d(item: Line) -> Any:
-    from matplotlib.lines import Line2D
-
-    colour: Any = item.colour
-    style: Any = "" if item.dash is None else _dashes(item.dash)
-    options: dict[str, Any] = {"label": item.name} if item.name else {}
-    if item.blunt:
-        options["solid_capstyle"] = "butt"
-    return Line2D(
-        [],
-        [],
-        color=colour,
-        linestyle=style,
-        linewidth=item.width,
-        marker=item.marker or None,
-        markersize=item.size,
-        markerfacecolor="none" if item.hollow else colour,
-        markeredgewidth=0.8 if item.hollow else None,
-        zorder=item.layer,
-        **options,
-    )
+        "color": item.colour,
+        "linestyle": _dashes(item.dash),
+        "linewidth": item.width,
+        "marker": item.marker or None,
+        "markersize": item.size,
+        "markerfacecolor": "none" if item.hollow else item.colour,
+        "markeredgewidth": 0.8 if item.hollow else None,
+        "zorder": item.layer,
+        "label": for_paper(item.name),
+    }
 
 
 def _draw_arrow(axes: Any, item: Arrow) -> None:
     start, end = np.asarray(item.start, float), np.asarray(item.end, float)
-    label = item.name or None
+    look: dict[str, Any] = {"color": item.colour, "linewidth": item.width}
     if len(start) == 3:
-        axes.quiver(*start, *(end - start), color=item.colour, linewidth=item.width, label=label)
+        axes.quiver(*start, *(end - start), label=_label(item.name), **look)
         return
-    axes.add_patch(
-        FancyArrowPatch(
-            tuple(start),
-            tuple(end),
-            arrowstyle="-|>",
-            connectionstyle=f"arc3,rad={item.bend}",
-            mutation_scale=9.0,
-            shrinkA=0.0,
-            shrinkB=0.0,
-            color=item.colour,
-            linewidth=item.width,
-            zorder=item.layer,
-        )
-    )
+    shape: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 9.0}
+    shape |= {"connectionstyle": f"arc3,rad={item.bend}", "shrinkA": 0.0, "shrinkB": 0.0}
+    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), zorder=item.layer, **shape, **look))
     axes.update_datalim(np.stack([start, end]) if item.reach is None else item.reach)
-    if label:
-        axes.plot([], [], color=item.colour, marker=">", markersize=4.0, label=label)
+    if item.name:
+        axes.plot([], [], color=item.colour, marker=">", markersize=4.0, label=_label(item.name))
+
+
+def _draw_span(axes: Any, item: Span) -> None:
+    look: dict[str, Any] = {"color": item.colour, "label": _label(item.name)}
+    if item.low == item.high:
+        line = axes.axvline if item.axis == "x" else axes.axhline
+        line(item.low, linestyle=_dashes(item.dash), linewidth=item.width, **look)
+    else:
+        band = axes.axvspan if item.axis == "x" else axes.axhspan
+        band(item.low, item.high, alpha=item.opacity, linewidth=0.0, **look)
 
 
 def _draw_bars(axes: Any, item: Bars) -> None:
     places = np.arange(len(item.values))
     bars = axes.barh(places, item.values, color=item.colours, height=0.6)
-    axes.bar_label(bars, fmt=f"{{:{item.form}}}", padding=3, fontsize=8.0)
-    axes.set_yticks(places, list(item.names))
+    axes.bar_label(bars, fmt="{:.2f}", padding=3, fontsize=8.0)
+    axes.set_yticks(places, [for_paper(name) for name in item.names])
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
 
@@ -265,16 +218,16 @@ def _draw_correlations(axes: Any, item: Correlations) -> None:
     texts = item.texts
     for (row, column), value in np.ndenumerate(item.values):
         shade = "white" if abs(value) > 0.7 else "black"
-        look: dict[str, Any] = {"fontsize": item.letters, "color": shade}
+        look: dict[str, Any] = {"fontsize": item.font_size, "color": shade}
         axes.text(column, row, texts[row][column], ha="center", va="center", **look)
-    places = range(len(item.names))
-    axes.set_xticks(places, [str(number + 1) for number in places], fontsize=item.outer_letters)
-    axes.set_yticks(places, list(item.rows), fontsize=item.outer_letters)
+    places, size = range(len(item.names)), min(7.0, 3.1 * item.font_size)
+    axes.set_xticks(places, [str(number + 1) for number in places], fontsize=size)
+    axes.set_yticks(places, [for_paper(row) for row in item.rows], fontsize=size)
     axes.grid(visible=False)
 
 
-def _draw_faces(axes: Any, faces: list[Faces]) -> None:
-    # In one collection, so that all pieces are sorted by how far away they are.
+def _draw_faces(axes: Any, faces: Sequence[Faces]) -> None:
+    # In one collection, so that all of them are sorted by their distance.
     together = np.concatenate([one.corners for one in faces])
     colours = [colour for one in faces for colour in one.colours]
     axes.add_collection3d(
@@ -282,15 +235,13 @@ def _draw_faces(axes: Any, faces: list[Faces]) -> None:
     )
     for one in faces:
         if one.name:
-            axes.plot([], [], [], color=one.colour, linewidth=5.0, label=one.name)
+            axes.plot([], [], [], color=one.colour, linewidth=5.0, label=_label(one.name))
 
 
-def _equal_in_space(axes: Any, panel: Panel) -> None:
-    points = [
-        np.asarray(corners, float).reshape(-1, 3)
-        for item in panel.items
-        for corners in _corners(item)
-    ]
+def _set_equal_in_space(axes: Any, panel: Panel) -> None:
+    """Show all faces and arrows with one scale on the three axes."""
+    points = [item.corners.reshape(-1, 3) for item in panel.items if isinstance(item, Faces)]
+    points += [np.stack([one.start, one.end]) for one in panel.items if isinstance(one, Arrow)]
     if not points:
         return
     every = np.concatenate(points)
@@ -298,13 +249,7 @@ def _equal_in_space(axes: Any, panel: Panel) -> None:
     room = 0.02 * float((high - low).max())
     for name, first, last in zip("xyz", low - room, high + room, strict=True):
         getattr(axes, f"set_{name}lim")(first, last)
-        axis = getattr(axes, f"{name}axis")
         part = (last - first) / (high - low).max()
-        axis.set_major_locator(MaxNLocator(nbins=max(2, round(6 * part))))
+        locator = MaxNLocator(nbins=max(2, round(6 * part)))
+        getattr(axes, f"{name}axis").set_major_locator(locator)
     axes.set_box_aspect(high - low + 2.0 * room, zoom=0.92)
-
-
-def _corners(item: Any) -> list[Any]:
-    if isinstance(item, Faces):
-        return [item.corners]
-    return [item.start, item.end] if isinstance(item, Arrow) else []

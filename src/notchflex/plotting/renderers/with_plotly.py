@@ -1,6 +1,6 @@
-"""A picture drawn by plotly, for a browser: one file that holds all it needs.
+"""Draws a picture with plotly: one HTML file that needs no network.
 
-Its panels are drawn by `plotly_axes.py` and `plotly_marks.py`, in space by `plotly_space.py`.
+matplotlib arranges the panels, limits and legends; `plotly_marks.py` draws the marks there.
 """
 
 from __future__ import annotations
@@ -9,32 +9,17 @@ from html import escape
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from notchflex._extras import need
-from notchflex.plotting.renderers.labels import for_browser, heading_lines, translated
-from notchflex.plotting.renderers.plotly_axes import (
-    FONT,
-    LABELS,
-    Place,
-    axes_of,
-    legend_height,
-    legend_of,
-    ranges_of,
-)
-from notchflex.plotting.renderers.plotly_marks import area_trace, draw_item, line_trace
-from notchflex.plotting.renderers.plotly_space import draw_in_space, scene_of
-from notchflex.plotting.sheet import BELOW, BESIDE, Area, Bars, Correlations, Panel, Sheet
+from notchflex.plotting.labels import for_browser, heading_lines
+from notchflex.plotting.renderers.plotly_marks import INCH, POINT, area_trace, line_trace, traces
+from notchflex.plotting.renderers.with_matplotlib import figure_of
+from notchflex.plotting.sheet import Area, Panel, Sheet
 from notchflex.results.files.writing import write_text
 
-INCH = 64.0
-"""Pixels of a browser for an inch of the paper, where the window is as wide as the picture."""
-
 NARROWEST = 0.75
-"""A picture follows the width of its window down to this part of its own; then it is scrolled."""
-
-# notation: room in pixels round the panels, beside and between them, and a line of text.
-_ABOVE, _BELOW, _LEFT, _RIGHT = 70.0, 64.0, 76.0, 20.0
-_BESIDE, _BETWEEN = 150.0, 78.0
-_LETTER, _HEADING_LINE = 7.0, 22.0
+"""A picture shrinks with its window to this part of its width; below it is scrolled."""
 
 
 def interactive_of(picture: Sheet) -> Any:
@@ -46,78 +31,37 @@ def interactive_of(picture: Sheet) -> Any:
     need("plotly", "plot", "an interactive picture")
     import plotly.graph_objects as go
 
-    places, width, height = _places(picture)
-    heading = heading_lines(picture.title, width / INCH)
-    picture = translated(picture, for_browser)
-    figure = go.Figure()
+    paper = figure_of(picture)
+    paper.draw_without_rendering()  # arranges everything
+    width, height = INCH * picture.width, INCH * picture.height
+    heading = heading_lines(picture.title, picture.width)
     layout: dict[str, Any] = {
-        "font": {"size": FONT, "family": "DejaVu Sans, Verdana, sans-serif", "color": "#222"},
-        "template": None,
-        "paper_bgcolor": "white",
-        "plot_bgcolor": "white",
-        "hovermode": "closest",
-        "margin": {"t": 0, "b": 0, "l": 0, "r": 0},
-        "annotations": [],
-        "shapes": [],
-    }
-    # The width is that of the window; `meta` tells the one that the places are made for.
-    layout |= {"autosize": True, "height": height, "meta": {"width": width}}
-    layout["title"] = {
-        "text": "<br>".join(map(for_browser, heading)), "x": 0.5, "font": {"size": 17},
-        "yref": "container", "y": 1.0 - 12.0 / height, "yanchor": "top",
+        "font": {"size": 9.0 * POINT, "family": "DejaVu Sans, Verdana, sans-serif",
+                 "color": "#222"},
+        "template": None, "paper_bgcolor": "white", "plot_bgcolor": "white",
+        "hovermode": "closest", "margin": {"t": 0, "b": 0, "l": 0, "r": 0},
+        # The width is that of the window; `meta` holds the one of the arrangement.
+        "autosize": True, "height": height, "meta": {"width": width},
+        "annotations": [], "shapes": [],
+        "title": {
+            "text": "<br>".join(map(for_browser, heading)), "x": 0.5, "font": {"size": 17},
+            "yref": "container", "y": 1.0 - 8.0 / height, "yanchor": "top",
+        },
     }  # fmt: skip
-    ranges = ranges_of(picture)
+    figure = go.Figure()
     shared: dict[str, str] = {}
-    flat = space = 0
-    for number, (cell, place) in enumerate(zip(picture.cells, places, strict=True), 1):
-        panel = cell.panel
-        if panel.in_space:
-            space += 1
-            layout[_numbered("scene", space)] = scene_of(panel, place)
-            where = {"scene": _numbered("scene", space)}
-        else:
-            flat += 1
-            x, y = _numbered("x", flat), _numbered("y", flat)
-            across, upward = axes_of(panel, place, x, y, ranges[number - 1])
-            for own, axis, sharing in (
-                (x, across, panel.shared_x),
-                (y, upward, panel.shared_y),
-            ):
-                if sharing and shared.setdefault(own[0], own) != own:
-                    axis["matches"] = shared[own[0]]
-            layout[_numbered("xaxis", flat)] = across
-            layout[_numbered("yaxis", flat)] = upward
-            where = {"xaxis": x, "yaxis": y}
-        legend = _numbered("legend", number + 1)
-        if panel.legend:
-            layout[legend] = legend_of(panel, place)
-        if panel.title:
-            layout["annotations"].append(
-                {
-                    "text": panel.title, "x": place.left, "xref": "paper", "xanchor": "left",
-                    "y": place.top, "yref": "paper", "yanchor": "bottom", "showarrow": False,
-                    "font": {"size": FONT + 0.5},
-                }
-            )  # fmt: skip
-        for item in sorted(panel.items, key=_layer):
-            drawn = (
-                draw_in_space(item, panel)
-                if panel.in_space
-                else draw_item(item, panel, where, layout)
-            )
-            for trace in drawn:
-                options: dict[str, Any] = (
-                    {"legend": legend} if panel.legend else {"showlegend": False}
-                )
-                figure.add_trace(trace | where | options)
-    if picture.legend:
-        layout["legend"] = {
-            "orientation": "h", "x": 0.5, "xanchor": "center", "yanchor": "bottom",
-            "y": 4.0 / height, "yref": "container",
-        }  # fmt: skip
+    for number, (cell, axes) in enumerate(zip(picture.cells, paper.axes, strict=True), 1):
+        where = _add_axes(cell.panel, axes, number, layout, shared)
+        where |= _add_legend(axes.get_legend(), f"legend{number + 1}", layout)
+        for item in sorted(cell.panel.items, key=lambda item: item.layer):
+            for trace in traces(item, cell.panel, where, layout):
+                figure.add_trace(trace | where)
+    for legend in paper.legends:
+        _add_legend(legend, "legend", layout)
+        layout["legend"] |= {"orientation": "h", "x": 0.5, "xanchor": "center"}
         for entry in picture.legend:
             trace = area_trace(entry) if isinstance(entry, Area) else line_trace(entry, None)
-            figure.add_trace(trace | {"showlegend": True, "legend": "legend"})
+            figure.add_trace(trace | {"legend": "legend"})
     figure.update_layout(layout)
     return figure
 
@@ -128,8 +72,7 @@ def save_html(picture: Sheet, target: str | FilePath) -> None:
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
     """
-    figure = interactive_of(picture)
-    text = figure.to_html(
+    text = interactive_of(picture).to_html(
         include_plotlyjs=True,
         full_html=True,
         default_width="100%",
@@ -140,63 +83,72 @@ def save_html(picture: Sheet, target: str | FilePath) -> None:
             "toImageButtonOptions": {"format": "svg"},
         },
     )
-    narrowest = round(NARROWEST * figure.layout.meta["width"])
+    narrowest = round(NARROWEST * INCH * picture.width)
     head = f"<head><title>{escape(picture.title)}</title>"
     head += f"<style>#notchflex {{min-width: {narrowest}px}}</style>"
     write_text(target, text.replace("<head>", head, 1))
 
 
-def _places(picture: Sheet) -> tuple[list[Place], float, float]:
-    """Where every panel stands, and width and height of the whole in pixels."""
-    rows, columns = picture.shape
-    beside = [
-        _BESIDE
-        if any(c.panel.legend == BESIDE and c.columns[1] == column + 1 for c in picture.cells)
-        else 0.0
-        for column in range(columns)
-    ]
-    width = INCH * picture.width / columns
-    # A column may divide its height into other rows than its neighbour.
-    lines = max(sum(c.columns[0] == column for c in picture.cells) for column in range(columns))
-    body = INCH * picture.height + (lines - 1) * _BETWEEN
-    height = (body - (rows - 1) * _BETWEEN) / rows
-    before = [
-        max((_names_before(c.panel) for c in picture.cells if c.columns[0] == column), default=0.0)
-        for column in range(columns)
-    ]
-    starts = [
-        _LEFT + column * (width + _BETWEEN) + sum(beside[:column]) + sum(before[: column + 1])
-        for column in range(columns)
-    ]
-    whole = starts[-1] + width + beside[-1] + _RIGHT
-    above = _ABOVE + _HEADING_LINE * (len(heading_lines(picture.title, whole / INCH)) - 1)
-    tall = above + rows * height + (rows - 1) * _BETWEEN + _BELOW
-    tall += 40.0 if picture.legend else 0.0
-    places: list[Place] = []
-    for cell in picture.cells:
-        top = tall - above - cell.rows[0] * (height + _BETWEEN)
-        bottom = tall - above - cell.rows[1] * (height + _BETWEEN) + _BETWEEN
-        if cell.panel.legend == BELOW:
-            bottom += legend_height(cell.panel)
-        left, right = starts[cell.columns[0]], starts[cell.columns[1] - 1] + width
-        foot = bottom - LABELS
-        places.append(Place(left / whole, right / whole, bottom / tall, top / tall, foot / tall))
-    return places, whole, tall
+def _add_axes(
+    panel: Panel, axes: Any, number: int, layout: dict[str, Any], shared: dict[str, str]
+) -> dict[str, str]:
+    """Add the axes of a panel where matplotlib has them; return where its traces belong."""
+    box = axes.get_position()
+    suffix = "" if number == 1 else str(number)
+    if panel.title:
+        layout["annotations"].append(
+            {"text": for_browser(panel.title), "x": box.x0, "xref": "paper", "xanchor": "left",
+             "y": box.y1, "yref": "paper", "yanchor": "bottom", "showarrow": False}
+        )  # fmt: skip
+    domain = {"x": [box.x0, box.x1], "y": [box.y0, box.y1]}
+    found: dict[str, Any] = {}
+    for name in "xyz" if panel.in_space else "xy":
+        label = for_browser(getattr(panel, f"{name}_label"))
+        found[name] = {
+            "title": {"text": label, "standoff": 6, "font": {"size": 9.0 * POINT}},
+            "gridcolor": "#e6e6e6", "zeroline": False,
+            "range": list(getattr(axes, f"get_{name}lim")()),
+        }  # fmt: skip
+        if name in panel.whole:
+            found[name] |= {"tickformat": "d", "nticks": 8}
+    if panel.in_space:
+        for axis in found.values():
+            axis["title"].pop("standoff")
+            axis |= {"nticks": 5, "backgroundcolor": "white"}
+        span = {name: float(np.ptp(axis["range"])) for name, axis in found.items()}
+        layout[f"scene{suffix}"] = {
+            "domain": domain, "aspectmode": "manual",
+            "aspectratio": {name: one / max(span.values()) for name, one in span.items()},
+            "camera": {"eye": {"x": 0.8, "y": -1.7, "z": 0.55}},
+            **{f"{name}axis": axis for name, axis in found.items()},
+        }  # fmt: skip
+        return {"scene": f"scene{suffix}"}
+    for name, other in ("xy", "yx"):
+        found[name] |= {
+            "domain": domain[name], "anchor": other + suffix, "showline": True,
+            "linecolor": "#444", "ticks": "outside", "ticklen": 4,
+        }  # fmt: skip
+        own = name + suffix
+        if name in panel.shared and shared.setdefault(name, own) != own:
+            found[name]["matches"] = shared[name]
+        layout[f"{name}axis{suffix}"] = found[name]
+    if panel.most_x is not None:
+        found["x"]["nticks"] = panel.most_x
+    if axes.get_aspect() == 1.0:
+        found["y"]["scaleanchor"] = f"x{suffix}"
+        if axes.get_adjustable() == "box":
+            found["x"]["constrain"] = found["y"]["constrain"] = "domain"
+    return {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
 
 
-def _names_before(panel: Panel) -> float:
-    """What names at the vertical axis of a panel need more than numbers do, in pixels."""
-    names: list[str] = []
-    for item in panel.items:
-        if isinstance(item, (Bars, Correlations)):
-            names += item.names if isinstance(item, Bars) else item.rows
-    longest = max((len(line) for name in names for line in name.split("\n")), default=0)
-    return max(0.0, _LETTER * longest - (_LEFT - 10.0))
-
-
-def _numbered(name: str, number: int) -> str:
-    return name if number == 1 else f"{name}{number}"
-
-
-def _layer(item: Any) -> int:
-    return getattr(item, "layer", 0)
+def _add_legend(legend: Any, name: str, layout: dict[str, Any]) -> dict[str, Any]:
+    """Add a legend where matplotlib has it; return what its traces have for it."""
+    if legend is None:
+        return {"showlegend": False}
+    figure = legend.get_figure()
+    box = legend.get_window_extent().transformed(figure.transFigure.inverted())
+    layout[name] = {
+        "x": box.x0, "xanchor": "left", "y": box.y1, "yanchor": "top", "indentation": -4,
+        "font": {"size": 7.5 * POINT}, "bgcolor": "rgba(255,255,255,0.7)", "tracegroupgap": 0,
+    }  # fmt: skip
+    return {"legend": name}

@@ -1,8 +1,8 @@
 """The outline of a bent robot, to scale, as seen from the side.
 
-A view looks across the tube: its horizontal axis is a direction across the base, its other axis
-the tube axis of the base turned up. A body is drawn as the wall that it has on either side and
-what joins the two; what a cut leaves is a bent strip, as thick as its section.
+The horizontal axis of a view is a direction across the base, the vertical axis is the tube axis of
+the base. A body is drawn as its walls on both sides and what joins them, a flexure as a bent strip
+with the thickness of its section.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.bent import HELD, Bent
+from notchflex.plotting.shapes.robot_shape import HELD, UP, RobotShape
 from notchflex.robot import Robot
 
-_CLAMP = 1.7  # half the width of what holds the tube, in outer radii
+_CLAMP = 1.7  # half the width of the clamp, in outer radii
 
 
 @dataclass(frozen=True)
@@ -25,12 +25,12 @@ class Outline:
 
     Attributes:
         bodies: Outline of every body, base first.
-        bores: Lines of the inner wall of every body, one for each side on which it has wall.
+        bores: Lines of the inner wall of every body, one for each side with a wall.
         flexures: Strip of every notch.
         tendons: Line of every tendon.
-        lips: Point between the lips of every notch, where it closes.
+        lips: Point of every notch where its edges meet when it closes.
         centre_line: The tube axis from base to tip.
-        held: What holds the tube, from the base downward.
+        held: The clamp below the base.
     """
 
     bodies: list[NDArray[np.float64]]
@@ -42,31 +42,36 @@ class Outline:
     held: NDArray[np.float64]
 
 
+def project(points: Any, view: float) -> NDArray[np.float64]:
+    """Return points (..., 3) as a view shows them: across the base and along it, (..., 2)."""
+    points = np.asarray(points)
+    return np.stack([points @ _across(view), points[..., 2]], axis=-1)
+
+
+def _across(view: float) -> NDArray[np.float64]:
+    return np.array([np.cos(view), np.sin(view), 0.0])
+
+
 def bending_plane(robot: Robot, offset: float = 1e-9) -> float | None:
-    """Return the direction [rad] in which all notches of a robot bend; None if they do not.
+    """Return the direction [rad] of the plane in which all notches bend; None if they do not.
 
     Args:
         robot: The robot.
-        offset: How far directions may differ and still be one plane.
+        offset: Largest difference of directions [rad] in one plane.
     """
     directions = np.radians([notch.direction_deg for notch in robot.notches])
     first = float(directions[0])
     return first if np.all(np.abs(np.sin(directions - first)) < offset) else None
 
 
-def outline(shape: Bent, view: float) -> Outline:
+def outline(shape: RobotShape, view: float) -> Outline:
     """Return the outline of a robot in one state.
 
     Args:
         shape: The robot.
         view: Direction across the base that is drawn to the right [rad]; 0 is x.
     """
-    across = np.array([np.cos(view), np.sin(view), 0.0])
-
-    def flat(points: Any) -> NDArray[np.float64]:
-        points = np.asarray(points)
-        return np.stack([points @ across, points[..., 2]], axis=-1)
-
+    across = _across(view)
     outer, inner = shape.robot.tube.outer_radius, shape.robot.tube.inner_radius
     bodies, bores = [], []
     for body in range(len(shape.position)):
@@ -74,8 +79,7 @@ def outline(shape: Bent, view: float) -> Outline:
 
         def place(points: Any, body: int = body) -> NDArray[np.float64]:
             local = np.asarray(points, float)
-            inside = local[:, :1] * across + local[:, 1:] * np.array([0.0, 0.0, 1.0])
-            return flat(shape.on_body(body, inside))
+            return project(shape.on_body(body, local[:, :1] * across + local[:, 1:] * UP), view)
 
         bodies.append(place(polygon))
         for sign, wall in zip((1.0, -1.0), _sides(shape, body, view), strict=True):
@@ -84,21 +88,23 @@ def outline(shape: Bent, view: float) -> Outline:
     below = np.array([0.0, 0.0, -HELD * outer])
     clamp = [side * _CLAMP * outer * across for side in (-1.0, 1.0)]
     flexures = [
-        np.concatenate([flat(one.fibre(-one.spine)), flat(one.fibre(one.near))[::-1]])
+        np.concatenate(
+            [project(one.fibre(-one.spine), view), project(one.fibre(one.near), view)[::-1]]
+        )
         for one in shape.flexures
     ]
     return Outline(
         bodies=bodies,
         bores=bores,
         flexures=flexures,
-        tendons=[flat(shape.tendon(number)) for number in range(len(shape.robot.tendon))],
-        lips=[flat(shape.lips(notch)) for notch in range(len(shape.flexures))],
-        centre_line=flat(_centre_line(shape)),
-        held=flat(shape.on_body(0, [*clamp, clamp[1] + below, clamp[0] + below])),
+        tendons=[project(shape.tendon(number), view) for number in range(len(shape.robot.tendon))],
+        lips=[project(shape.lips(notch), view) for notch in range(len(shape.flexures))],
+        centre_line=project(_centre_line(shape), view),
+        held=project(shape.on_body(0, [*clamp, clamp[1] + below, clamp[0] + below]), view),
     )
 
 
-def body_corners(shape: Bent, body: int, view: float) -> list[tuple[float, float]]:
+def body_corners(shape: RobotShape, body: int, view: float) -> list[tuple[float, float]]:
     """Return the outline of a body in its own frame: corners (across, along) [mm], in order.
 
     Args:
@@ -106,19 +112,19 @@ def body_corners(shape: Bent, body: int, view: float) -> list[tuple[float, float
         body: Which body, 0 is the base.
         view: Direction across the tube that is drawn to the right [rad].
     """
-    across = np.array([np.cos(view), np.sin(view), 0.0])
     tube = shape.robot.tube
     right, left = _sides(shape, body, view)
-    return _body(right, left, tube.outer_radius, _reach(shape, body, across, tube.inner_radius))
+    reach = _reach(shape, body, _across(view), tube.inner_radius)
+    return _body(right, left, tube.outer_radius, reach)
 
 
-def _sides(shape: Bent, body: int, view: float) -> list[tuple[float, float] | None]:
-    """From where to where a body has wall on the right and the left."""
+def _sides(shape: RobotShape, body: int, view: float) -> list[tuple[float, float] | None]:
+    """Return the ends of the wall of a body on the right and the left; None if no wall."""
     return [shape.walls(np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
 
 
-def _centre_line(shape: Bent) -> NDArray[np.float64]:
-    """The tube axis, along the bodies and, where a notch has a spine beside it, the notches."""
+def _centre_line(shape: RobotShape) -> NDArray[np.float64]:
+    """Return the tube axis along the bodies, and along notches with a spine beside it."""
     rods = shape.chain.rods
     points: list[NDArray[np.float64]] = []
     for body, length in enumerate(shape.body_length):
@@ -131,11 +137,11 @@ def _centre_line(shape: Bent) -> NDArray[np.float64]:
 
 
 def _reach(
-    shape: Bent, body: int, across: NDArray[np.float64], inner: float
+    shape: RobotShape, body: int, across: NDArray[np.float64], inner: float
 ) -> tuple[float, float]:
-    """How near to the axis the wall of a body comes on the right and the left.
+    """Return the distance of the wall of a body from the axis on the right and the left.
 
-    To the inside of the tube, or farther where a flexure is joined to it.
+    The inner radius, or less where a flexure is attached.
     """
     reach = [inner, inner]
     joined = []
@@ -158,16 +164,16 @@ def _body(
     outer: float,
     reach: tuple[float, float],
 ) -> list[tuple[float, float]]:
-    """Corners of a body (across, along), from the lower right one upward, then down on the left."""
+    """Return the corners of a body (across, along), counter-clockwise from the lower right."""
     if right is None or left is None:
         sign, wall, inside = (-1.0, left, reach[1]) if right is None else (1.0, right, reach[0])
-        assert wall is not None  # a body has wall somewhere
+        assert wall is not None  # every body has a wall
         low, high = wall
         return [
             (sign * at, z) for at, z in ((outer, low), (outer, high), (inside, high), (inside, low))
         ]
     low, high = max(right[0], left[0]), min(right[1], left[1])
-    # Both walls are joined where they stand side by side, else from one to the other aslant.
+    # Walls that overlap are connected at right angles, others diagonally.
     top = [(reach[0], high), (-reach[1], high)] if high > low else []
     foot = [(-reach[1], low), (reach[0], low)] if high > low else []
     return [

@@ -1,1 +1,1 @@
-"""What stands on the page: controls, charts, legend, readout."""
+"""The page: controls, charts, legend, readout."""

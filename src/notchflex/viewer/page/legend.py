@@ -1,4 +1,4 @@
-"""What the colours of the scene and of the charts mean: for the page and for pictures."""
+"""The legend of the colours of the scene and the charts, for the page and for pictures."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from notchflex.viewer.scene.colours import (
     TENDON,
     UNKNOWN,
     css,
-    of_strain,
+    strain_colour,
 )
 
 BALL, LINE = "ball", "line"
 
 
-class Entry(NamedTuple):
+class LegendEntry(NamedTuple):
     """A colour and what it means.
 
     Attributes:
-        colour: As a page writes it.
-        mark: What is drawn in it, `BALL` or `LINE`.
-        text: What it means.
+        colour: Colour in CSS.
+        mark: `BALL` or `LINE`.
+        text: Meaning.
     """
 
     colour: str
@@ -39,32 +39,32 @@ class Entry(NamedTuple):
     text: str
 
 
-def entries(robot: Robot) -> list[Entry]:
-    """Return what each colour means, but for the scale of the strain."""
+def entries(robot: Robot) -> list[LegendEntry]:
+    """Return the meaning of each colour, except the scale of the strain."""
     allowed = robot.material.allowed_strain
     if allowed is None:
-        strain = Entry(css(METAL), BALL, "notch: the robot file sets no allowed strain")
+        strain = LegendEntry(css(METAL), BALL, "notch: the robot file sets no allowed strain")
     else:
-        strain = Entry(css(BEYOND), BALL, f"notch strained beyond {100.0 * allowed:g} %")
+        strain = LegendEntry(css(BEYOND), BALL, f"notch strained beyond {100.0 * allowed:g} %")
     return [
         strain,
-        Entry(css(CLOSED), BALL, "closed notch"),
-        *(Entry(CONTACT[one], BALL, f"contact: {CONTACT_STATES[one]}") for one in CONTACT),
-        Entry(UNKNOWN, BALL, "contact without friction, or slack"),
-        Entry(css(TENDON), LINE, "tendon"),
-        *(Entry(colour, LINE, f"loop: {way}") for way, colour in COLOUR.items()),
-        Entry(LOAD["force"], LINE, "force at the tip"),
-        Entry(LOAD["moment"], LINE, "moment at the tip"),
+        LegendEntry(css(CLOSED), BALL, "closed notch"),
+        *(LegendEntry(CONTACT[one], BALL, f"contact: {CONTACT_STATES[one]}") for one in CONTACT),
+        LegendEntry(UNKNOWN, BALL, "contact without friction, or slack"),
+        LegendEntry(css(TENDON), LINE, "tendon"),
+        *(LegendEntry(colour, LINE, f"loop: {way}") for way, colour in COLOUR.items()),
+        LegendEntry(LOAD["force"], LINE, "force at the tip"),
+        LegendEntry(LOAD["moment"], LINE, "moment at the tip"),
     ]
 
 
 def strain_scale(count: int) -> list[str]:
-    """Return colours from no strain to the allowed one."""
-    return [css(of_strain(part)) for part in np.linspace(0.0, 1.0, count).tolist()]
+    """Return colours from zero strain to the allowed one."""
+    return [css(strain_colour(part)) for part in np.linspace(0.0, 1.0, count).tolist()]
 
 
 def legend_html(robot: Robot, cell: float) -> str:
-    """Return what colours and marks mean, as HTML.
+    """Return the legend as HTML.
 
     Args:
         robot: The robot.
@@ -77,21 +77,18 @@ def legend_html(robot: Robot, cell: float) -> str:
             f'background:linear-gradient(to right,{",".join(strain_scale(9))})"></span> '
             f"{100.0 * allowed:g} % allowed</div>"
         )
-    told = [one for one in entries(robot) if not one.text.endswith("at the tip")]
-    marks = "".join(_mark(one) for one in told)
+    listed = [one for one in entries(robot) if not one.text.endswith("at the tip")]
+    marks = "".join(_mark(one) for one in listed)
     return (
         f'<div data-name="legend" style="font-size:12px;line-height:1.3;padding:0 6px">{scale}'
         f"{marks}<div>axes x red, y green, z blue; grid {cell:g} mm</div></div>"
     )
 
 
-def _mark(one: Entry) -> str:
+def _mark(one: LegendEntry) -> str:
     height, radius = (10, 5) if one.mark == BALL else (3, 0)
     return (
         f'<div><span style="display:inline-block;width:10px;height:{height}px;'
         f"border-radius:{radius}px;vertical-align:middle;background:{one.colour};"
         f'margin-right:5px"></span>{escape(one.text)}</div>'
     )
-
-
-__all__ = ["BALL", "LINE", "Entry", "entries", "legend_html", "strain_scale"]

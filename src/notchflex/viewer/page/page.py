@@ -1,4 +1,4 @@
-"""The page around the scene: controls, numbers, charts, and what a person does with them."""
+"""The page around the scene: controls, numbers and charts."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 CHARTS_WIDTH, CONTROLS_WIDTH = 280, 290
 
-# viser's own messages, such as that there is no graphics card, lie over the scene until somebody
-# closes them. There they are small, at the lower edge and let the mouse through.
+# viser's messages, such as that there is no graphics card, cover the scene until they are closed.
+# This makes them small, at the lower edge.
 STYLE = """<style>
 .mantine-Notifications-root { top: auto !important; bottom: 0.5em !important; max-width: 16em; }
 .mantine-Notification-root { padding: 2px 6px 2px 16px; }
@@ -27,14 +27,10 @@ STYLE = """<style>
 
 
 class Page:
-    """What stands beside the scene; all of it is called by the thread that solves.
-
-    Args:
-        viewer: Whose page it is.
-    """
+    """The panels beside the scene; all methods are called by the solver thread."""
 
     def __init__(self, viewer: Viewer) -> None:
-        """Lay the page out."""
+        """Add all panels."""
         self.viewer = viewer
         gui = viewer.server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
@@ -54,10 +50,9 @@ class Page:
         self.rebuild()
 
     def rebuild(self) -> None:
-        """Lay the controls out anew, for another robot.
+        """Replace the controls for another robot.
 
-        Once for each change: of controls that are taken away before they were sent, viser still
-        sends the updates, to a page that does not know them.
+        Once for each change, because viser would send updates for controls that had been removed.
         """
         viewer = self.viewer
         for folder in self._folders:
@@ -70,13 +65,13 @@ class Page:
         self._first_look()
 
     def name(self) -> None:
-        """Write the name of the robot, and what colours mean on it."""
+        """Update the name of the robot and the legend."""
         viewer = self.viewer
         viewer.server.gui.set_panel_label(viewer.session.robot.name)
         self._legend.content = legend_html(viewer.session.robot, viewer.scene.grid_cell)
 
-    def tell(self) -> None:
-        """Renew numbers and charts, and all that `follow` does."""
+    def update(self) -> None:
+        """Update numbers and charts, controls and notice."""
         session = self.viewer.session
         tendon = min(self.loads.active, session.robot.number_of_tendons - 1)
         self._readout.content = readout(session)
@@ -85,22 +80,22 @@ class Page:
         self.follow()
 
     def follow(self) -> None:
-        """Show in controls and notice what the robot has and where it goes."""
+        """Update controls and notice."""
         viewer = self.viewer
         self._notice.content = notice(viewer.message or viewer.note)
         self.loads.follow(viewer.goal)
         self.model.follow(viewer.session.robot)
 
     def busy(self, sentence: str) -> None:
-        """Say at once what takes longer."""
+        """Show at once what takes longer."""
         self._notice.content = notice(sentence, waiting=True)
         self.viewer.server.flush()
 
     def look(self, side: bool = False) -> None:
-        """Let every browser look at the robot, from where it is seen best or straight from a side.
+        """Move the camera of every browser to the default view of the robot.
 
         Args:
-            side: Look at right angles on the plane in which the robot bends.
+            side: Look normal to the plane in which the robot bends.
         """
         viewer = self.viewer
         for client in viewer.server.get_clients().values():
@@ -108,10 +103,7 @@ class Page:
             client.camera.position, client.camera.look_at = eye.position, eye.target
 
     def _first_look(self) -> None:
-        """The same for browsers that come later."""
+        """Set the first camera of browsers that connect later."""
         eye = self.viewer.scene.eye(self.viewer.session.pointing)
         camera = self.viewer.server.initial_camera
         camera.position, camera.look_at = eye.position, eye.target
-
-
-__all__ = ["Page"]

@@ -1,4 +1,4 @@
-"""The picture that is saved: the robot as it is seen, its loop, its numbers and a legend."""
+"""The saved picture: the robot as it is seen, its loop, its numbers and a legend."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.acting import acting_at
-from notchflex.plotting.shapes.bent import bent_at
+from notchflex.plotting.renderers.with_matplotlib import draw_panel
+from notchflex.plotting.shapes.applied_loads import applied_loads
+from notchflex.plotting.shapes.robot_shape import shape_at
 from notchflex.plotting.style import house_style
-from notchflex.viewer.page.charts import Loop, loop
+from notchflex.viewer.page.charts import loop
 from notchflex.viewer.page.legend import BALL, entries, strain_scale
 from notchflex.viewer.page.readout import rows
 from notchflex.viewer.session import Session
@@ -28,8 +29,8 @@ def picture(session: Session, view: NDArray[np.uint8], tendon: int) -> bytes:
     """Return a PNG file.
 
     Args:
-        session: What was done to the robot.
-        view: The robot as a camera sees it, on a clear ground, (height, width, 4).
+        session: The robot and its load history.
+        view: The robot on a transparent background, (height, width, 4).
         tendon: The tendon of the loop, from 0.
     """
     from matplotlib.figure import Figure
@@ -41,35 +42,24 @@ def picture(session: Session, view: NDArray[np.uint8], tendon: int) -> bytes:
         place = figure.add_axes((0.01, 0.02, 0.58, 0.9))
         place.imshow(view)
         place.set_axis_off()
-        _draw_loop(figure.add_axes((0.67, 0.52, 0.31, 0.41)), loop(session, tendon))
+        draw_panel(figure.add_axes((0.67, 0.52, 0.31, 0.41)), loop(session, tendon))
         _write(figure.add_axes((0.62, 0.02, 0.37, 0.42)), session)
         target = io.BytesIO()
         figure.savefig(target, format="png", dpi=_DOTS)
     return target.getvalue()
 
 
-def _draw_loop(axes: Axes, found: Loop) -> None:
-    """Draw the chart of the page."""
-    for line in found.lines:
-        if line.width > 0.0:
-            axes.plot(line.x, line.y, color=line.colour, linewidth=line.width)
-        if line.dots:
-            axes.plot(line.x, line.y, "o", color=line.dots[0], markersize=1.5 * line.size)
-    axes.set_xlabel(found.x_label)
-    axes.set_ylabel(found.y_label)
-
-
 def _write(axes: Axes, session: Session) -> None:
-    """Write numbers and loads, and what the colours mean."""
+    """Write numbers and loads, and a legend of the colours."""
     from matplotlib.lines import Line2D
 
     axes.set_axis_off()
-    shape = bent_at(session.solved, 0)
-    loads = [one.label for one in acting_at(session.solved, 0, shape)]
-    told = [f"{row.label}: {row.value}" for row in rows(session)]
-    told.append(f"loads at the tip: {', '.join(loads) or 'none'}")
+    shape = shape_at(session.solved, 0)
+    loads = [one.label for one in applied_loads(session.solved, 0, shape)]
+    lines = [f"{row.label}: {row.value}" for row in rows(session)]
+    lines.append(f"loads at the tip: {', '.join(loads) or 'none'}")
     axes.text(
-        0.0, 1.0, "\n".join(told), va="top", fontsize=9, parse_math=False, transform=axes.transAxes
+        0.0, 1.0, "\n".join(lines), va="top", fontsize=9, parse_math=False, transform=axes.transAxes
     )
     marks: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 7}
     shown = entries(session.robot)
@@ -91,7 +81,7 @@ def _write(axes: Axes, session: Session) -> None:
 
 
 def _strain_scale(axes: Axes, allowed: float) -> None:
-    """Draw the colours of strain up to the allowed one, %."""
+    """Draw the colour scale of the strain up to the allowed one [%]."""
     from matplotlib.colors import ListedColormap
 
     scale = axes.inset_axes((0.24, 0.44, 0.34, 0.035))
@@ -101,6 +91,3 @@ def _strain_scale(axes: Axes, allowed: float) -> None:
     y = 0.457
     axes.text(0.0, y, "notch strain   0", va="center", fontsize=8, transform=axes.transAxes)
     axes.text(0.6, y, f"{allowed:g} % allowed", va="center", fontsize=8, transform=axes.transAxes)
-
-
-__all__ = ["SHAPE", "picture"]

@@ -1,4 +1,4 @@
-"""The numbers of the state as a small table for the page, and its notices."""
+"""The numbers of the state as a table for the page, and notices."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _CELL = (
 _WARNING = f' data-warning="true" style="background:{css(BEYOND)};color:white"'
 
 
-class Row(NamedTuple):
-    """A line of the table.
+class ReadoutRow(NamedTuple):
+    """A row of the table.
 
     Attributes:
-        name: What programs call it.
-        label: What people call it, with its unit.
-        value: Its value.
-        warns: Whether it asks for care.
+        name: Name in the HTML.
+        label: Label, with the unit.
+        value: The value as text.
+        warns: Whether it is marked as a warning.
     """
 
     name: str
@@ -35,24 +35,26 @@ class Row(NamedTuple):
     warns: bool = False
 
 
-def rows(session: Session) -> list[Row]:
+def rows(session: Session) -> list[ReadoutRow]:
     """Return the numbers of a session's state."""
     state, robot = session.state, session.robot
-    found: list[Row] = []
+    found: list[ReadoutRow] = []
     for name in ("tension", "stroke"):
         values = np.asarray(getattr(state, name))
         for tendon, value in enumerate(values):
             of = f" {tendon + 1}" if len(values) > 1 else ""
             label = axis(name).replace("tendon ", f"tendon{of} ")
-            found.append(Row(f"{name}_{tendon + 1}", label, fixed(float(value), 3)))
+            found.append(ReadoutRow(f"{name}_{tendon + 1}", label, fixed(float(value), 3)))
     angle = QUANTITIES["total_angle"].scale * float(state.total_angle)
-    found.append(Row("total_angle", axis("total_angle"), fixed(angle, 2)))
+    found.append(ReadoutRow("total_angle", axis("total_angle"), fixed(angle, 2)))
     place = ", ".join(fixed(float(value), 2) for value in state.tip_position)
-    found.append(Row("tip_position", axis("tip_position"), place))
-    found.append(Row("peak_strain", "largest strain", *_strain(session)))
+    found.append(ReadoutRow("tip_position", axis("tip_position"), place))
+    found.append(ReadoutRow("peak_strain", "largest strain", *_strain(session)))
     closed = [str(number) for number in np.flatnonzero(state.closed) + 1]
-    told = ", ".join(closed) if len(closed) <= 8 else f"{len(closed)}"
-    found.append(Row("closed", f"closed notches of {robot.number_of_notches}", told or "none"))
+    text = ", ".join(closed) if len(closed) <= 8 else f"{len(closed)}"
+    found.append(
+        ReadoutRow("closed", f"closed notches of {robot.number_of_notches}", text or "none")
+    )
     return found
 
 
@@ -68,7 +70,7 @@ def readout(session: Session) -> str:
 
 
 def _strain(session: Session) -> tuple[str, bool]:
-    """The largest strain beside what is allowed, and whether it is more."""
+    """Return the largest strain and the allowed one, and whether it is exceeded."""
     largest = float(np.max(np.abs(session.state.peak_strain)))
     allowed = session.robot.material.allowed_strain
     text = f"{100.0 * largest:.2f} %"
@@ -80,7 +82,7 @@ def _strain(session: Session) -> tuple[str, bool]:
 
 
 def notice(text: str, waiting: bool = False) -> str:
-    """Return a sentence as a framed note; nothing where there is none to tell."""
+    """Return a sentence as a framed note; an empty one for no sentence."""
     if not text:
         return '<div data-name="notice" role="status"></div>'
     colour, role = (BLUE, "status") if waiting else (VERMILLION, "alert")
@@ -91,14 +93,33 @@ def notice(text: str, waiting: bool = False) -> str:
     )
 
 
+def beyond(label: str, value: float, ends: tuple[float, float], further: bool) -> str:
+    """Return the notice that a value lies outside its slider, and which one is set.
+
+    Args:
+        label: Label of the slider, with its unit in brackets.
+        value: The typed value.
+        ends: Least and largest value of the slider.
+        further: Whether the end of the slider can be changed.
+
+    Example:
+        >>> beyond("tension [N]", 30.0, (0.0, 3.0), further=False)
+        'tension: 30 N is outside its slider, from 0 to 3 N. It is set to 3 N.'
+    """
+    name, _, unit = label.removesuffix("]").partition(" [")
+    low, high = ends
+    remedy = "; change the end under 'slider to'" if further and value > high else ""
+    return (
+        f"{name}: {value:g} {unit} is outside its slider, from {low:g} to {high:g} {unit}. "
+        f"It is set to {min(max(value, low), high):g} {unit}{remedy}."
+    )
+
+
 def fixed(value: float, digits: int) -> str:
-    """Return a number with as many decimals, and no sign before a zero.
+    """Return a number with some decimals, without a sign before a zero.
 
     Example:
         >>> fixed(-1e-9, 2), fixed(-0.126, 2)
         ('0.00', '-0.13')
     """
     return f"{round(value, digits) + 0.0:.{digits}f}"
-
-
-__all__ = ["Row", "fixed", "notice", "readout", "rows"]

@@ -1,12 +1,14 @@
-"""Loading other robots, saving what is seen, and what is shown."""
+"""Visibility, other robots, and files to save."""
 
 from __future__ import annotations
 
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from notchflex.robot import list_robots, load_robot, robot_from_text
+from notchflex.errors import InputError
+from notchflex.robot import Robot, list_robots, load_robot, robot_from_text
 from notchflex.viewer.page import saving
+from notchflex.viewer.page.sliders import Dropdown, add_button
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
@@ -16,17 +18,13 @@ _SHOWN = {
     "contacts": "contacts",
     "frames": "base and tip frames",
     "loads": "loads at the tip",
-    "see_through": "tube to see through",
+    "see_through": "transparent tube",
 }
 _CHOOSE = "choose ..."
 
 
 class RobotControls:
-    """The folders "Show", "Robot" and "Save" of a page.
-
-    Args:
-        viewer: What they act on.
-    """
+    """The folders "Show", "Robot" and "Save" of a page."""
 
     def __init__(self, viewer: Viewer) -> None:
         """Add them."""
@@ -35,50 +33,23 @@ class RobotControls:
         with gui.add_folder("Show", order=5.0, expand_by_default=False) as show:
             for field in dataclasses.fields(viewer.shown):
                 self._switch(field.name)
-            view = gui.add_button("View from the side")
-            whole = gui.add_button("View as at first")
+            side = "View from the side"
+            add_button(gui, side, lambda _: viewer.ask(lambda: viewer.page.look(side=True)))
+            add_button(gui, "View as at first", lambda _: viewer.ask(viewer.page.look))
         with gui.add_folder("Robot", order=6.0, expand_by_default=False) as robot:
-            ready = gui.add_dropdown("ready robot", (_CHOOSE, *list_robots()))
+            Dropdown(gui, "ready robot", (_CHOOSE, *list_robots()), self._load)
             file = gui.add_upload_button("Load a robot file", mime_type=".toml")
         with gui.add_folder("Save", order=7.0, expand_by_default=False) as save:
-            picture = gui.add_button("Picture (PNG)", hint="with loads, loop, numbers and legend")
-            table = gui.add_button("Table (CSV)", hint="all steps, as notchflex simulate writes")
-            toml = gui.add_button("Robot file (TOML)", hint="with the friction and material set")
+            hint = "with loads, loop, numbers and legend"
+            add_button(gui, "Picture (PNG)", self._picture, hint)
+            add_button(gui, "Table (CSV)", self._table, "all steps, as notchflex simulate writes")
+            add_button(gui, "Robot file (TOML)", self._file, "with this friction and material")
         self.folders: list[Any] = [show, robot, save]
-
-        @view.on_click
-        async def _(_: Any) -> None:
-            viewer.ask(lambda: viewer.page.look(side=True))
-
-        @whole.on_click
-        async def _(_: Any) -> None:
-            viewer.ask(viewer.page.look)
-
-        @ready.on_update
-        async def _(event: Any) -> None:
-            name = str(ready.value)
-            if event.client is not None and name != _CHOOSE:
-                viewer.ask(lambda: viewer.load(load_robot(name)))
 
         @file.on_upload
         async def _(_: Any) -> None:
             found = file.value
             viewer.ask(lambda: viewer.load(_robot(found.name, found.content)))
-
-        @picture.on_click
-        async def _(event: Any) -> None:
-            viewer.page.busy("drawing the picture")
-            viewer.ask(lambda: _picture(viewer, event.client))
-
-        @table.on_click
-        async def _(event: Any) -> None:
-            viewer.page.busy("writing the table")
-            viewer.ask(lambda: saving.send_table(event.client, viewer.session))
-            viewer.ask(viewer.page.tell)
-
-        @toml.on_click
-        async def _(event: Any) -> None:
-            viewer.ask(lambda: saving.send_robot(event.client, viewer.session))
 
     def _switch(self, name: str) -> None:
         viewer = self._viewer
@@ -90,19 +61,33 @@ class RobotControls:
                 value = bool(box.value)
                 viewer.ask(lambda: viewer.show(name, value))
 
+    def _load(self, name: str) -> None:
+        if name != _CHOOSE:
+            self._viewer.ask(lambda: self._viewer.load(load_robot(name)))
 
-def _picture(viewer: Viewer, client: Any) -> None:
-    """Send a picture of what is seen, and say again what there is to say."""
-    try:
-        saving.send_picture(client, viewer.session, viewer.scene, viewer.page.loads.active)
-    finally:
-        viewer.page.tell()
+    def _picture(self, client: Any) -> None:
+        viewer = self._viewer
+
+        def send() -> None:
+            try:
+                saving.send_picture(client, viewer.session, viewer.scene, viewer.page.loads.active)
+            finally:
+                viewer.page.update()
+
+        viewer.page.busy("drawing the picture")
+        viewer.ask(send)
+
+    def _table(self, client: Any) -> None:
+        self._viewer.page.busy("writing the table")
+        self._viewer.ask(lambda: saving.send_table(client, self._viewer.session))
+        self._viewer.ask(self._viewer.page.update)
+
+    def _file(self, client: Any) -> None:
+        self._viewer.ask(lambda: saving.send_robot(client, self._viewer.session))
 
 
-def _robot(name: str, content: bytes) -> Any:
-    """The robot of a file that a browser sent."""
-    from notchflex.errors import InputError
-
+def _robot(name: str, content: bytes) -> Robot:
+    """Read a robot file that a browser sent."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -110,6 +95,3 @@ def _robot(name: str, content: bytes) -> Any:
             f"{name} is not UTF-8 text; a robot file is a TOML text file"
         ) from None
     return robot_from_text(text, name)
-
-
-__all__ = ["RobotControls"]

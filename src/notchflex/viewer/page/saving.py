@@ -1,4 +1,4 @@
-"""What is saved from the page: a picture, a table and the robot, sent to the browser that asked."""
+"""Sends a picture, a table or the robot to the browser that asked for it."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ def send_robot(client: viser.ClientHandle, session: Session) -> None:
 
 
 def send_picture(client: viser.ClientHandle, session: Session, scene: Scene, tendon: int) -> None:
-    """Send a picture of the robot from where that browser sees it, with its loop and a legend.
+    """Send a picture of the robot as that browser sees it, with its loop and a legend.
 
     Args:
         client: The browser.
-        session: What was done to the robot.
-        scene: The scene that the browser draws.
+        session: The robot and its load history.
+        scene: The scene of the browser.
         tendon: The tendon of the loop, from 0.
 
     Raises:
@@ -90,6 +90,3 @@ def send_picture(client: viser.ClientHandle, session: Session, scene: Scene, ten
         ) from None
     content = picture(session, view, tendon)
     client.send_file_download(file_name(session.robot, "png"), content, save_immediately=True)
-
-
-__all__ = ["file_name", "send_picture", "send_robot", "send_table", "table_bytes"]

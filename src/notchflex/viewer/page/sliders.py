@@ -1,4 +1,4 @@
-"""A slider for one of the numbers that load the robot, with the field beside it."""
+"""Sliders and number fields of the page."""
 
 from __future__ import annotations
 
@@ -16,17 +16,41 @@ _JUMP = 0.03  # a larger part of the slider at once was typed or clicked, not dr
 _DIGITS = 3  # of the smallest step that a field shows, at least
 
 
-class Slider:
-    """A slider that shows where the robot goes, and sends it elsewhere.
+class _Control:
+    """A control of the page; it calls `act` in the solver thread."""
 
-    It always stands for the same number in the same unit, so what it sends cannot be mistaken.
+    def __init__(
+        self, viewer: Viewer, handle: Any, key: tuple[str, str], act: Callable[[float], None]
+    ) -> None:
+        self._viewer, self._handle, self._key, self._act = viewer, handle, key, act
+
+        @handle.on_update
+        async def _(event: Any) -> None:
+            if event.client is not None:
+                self._changed(float(handle.value))
+
+    def _changed(self, value: float) -> None:
+        self._send(value, PAUSE)
+
+    def _send(self, value: float, pause: float) -> None:
+        self._viewer.tasks.add(lambda: self._act(value), self._key, pause)
+
+    def show(self, visible: bool) -> None:
+        """Show or hide it."""
+        self._handle.visible = visible
+
+
+class Slider(_Control):
+    """A slider that shows the target of a number and sends new ones.
+
+    It always belongs to the same number in the same unit, so what it sends is unambiguous.
 
     Args:
-        viewer: What it acts on.
-        number: Place in `Controls.numbers`.
-        label: Its text, with the unit.
+        viewer: The viewer.
+        number: Index in `Controls.numbers`.
+        label: Its label, with the unit.
         ends: Least and largest value.
-        moved: Called with the value by the thread that solves.
+        act: Called with the value by the solver thread.
     """
 
     def __init__(
@@ -35,35 +59,27 @@ class Slider:
         number: int,
         label: str,
         ends: tuple[float, float],
-        moved: Callable[[float], None],
+        act: Callable[[float], None],
     ) -> None:
         """Add it at 0."""
-        self._viewer, self._key = viewer, ("slider", label)
         low, high = ends
-        self._handle = viewer.server.gui.add_slider(label, low, high, (high - low) / _FINE, 0.0)
-        self._handle.precision = _digits(high)
-        self._heard = 0.0  # the value before
+        handle = viewer.server.gui.add_slider(label, low, high, (high - low) / _FINE, 0.0)
+        handle.precision = _digits(high)
+        self._number, self._before = number, 0.0
+        super().__init__(viewer, handle, ("slider", label), act)
 
-        @self._handle.on_update
-        async def _(event: Any) -> None:
-            if event.client is None:
-                return
-            value = float(self._handle.value)
-            low, high = float(self._handle.min), float(self._handle.max)
-            before, self._heard = self._heard, value
-            if value == min(max(before, low), high) != before:
-                return  # the page itself puts back, when it is left, what was typed beyond an end
-            jump = abs(value - before) > _JUMP * (high - low)
-            if jump:  # at once, though the new value may still be typed
-                viewer.way.hold(number)
-            viewer.tasks.add(lambda: moved(value), self._key, PAUSE if jump else 0.0)
-
-    def show(self, visible: bool) -> None:
-        """Show it on the page or not."""
-        self._handle.visible = visible
+    def _changed(self, value: float) -> None:
+        low, high = float(self._handle.min), float(self._handle.max)
+        before, self._before = self._before, value
+        if value == min(max(before, low), high) != before:
+            return  # when it is left, the page itself resets what was typed beyond an end
+        jump = abs(value - before) > _JUMP * (high - low)
+        if jump:  # at once, though the new value may still be typed
+            self._viewer.targets.hold(self._number)
+        self._send(value, PAUSE if jump else 0.0)
 
     def stretch(self, ends: tuple[float, float]) -> None:
-        """Let it go to other ends."""
+        """Change its ends."""
         low, high = ends
         if (self._handle.min, self._handle.max) != (low, high):
             self._handle.min, self._handle.max = low, high
@@ -71,24 +87,24 @@ class Slider:
             self._handle.precision = _digits(high)
 
     def put(self, value: float) -> None:
-        """Put it where the robot goes, but not while a value that it sent waits to be obeyed."""
+        """Show a value, unless one that it sent waits."""
         if self._viewer.tasks.has(self._key):
             return
         value = min(max(float(value), float(self._handle.min)), float(self._handle.max))
-        self._heard = value
+        self._before = value
         if abs(float(self._handle.value) - value) > 1e-9:
             self._handle.value = value
 
 
-class Field:
-    """A number that is typed; it is obeyed when typing pauses.
+class NumberField(_Control):
+    """A number that is typed; it is sent after a pause of typing.
 
     Args:
-        viewer: What it acts on.
-        key: What tells it from all other fields.
-        label: Its text, with the unit.
-        value: What it shows first.
-        typed: Called with the value by the thread that solves.
+        viewer: The viewer.
+        key: Unique name of the field.
+        label: Its label, with the unit.
+        value: Its first value.
+        act: Called with the value by the solver thread.
         options: More for viser's `add_number`.
     """
 
@@ -98,32 +114,48 @@ class Field:
         key: str,
         label: str,
         value: float,
-        typed: Callable[[float], None],
+        act: Callable[[float], None],
         **options: Any,
     ) -> None:
         """Add it."""
-        self._viewer, self._key = viewer, ("field", key)
-        self._handle = viewer.server.gui.add_number(label, float(value), **options)
-
-        @self._handle.on_update
-        async def _(event: Any) -> None:
-            if event.client is not None:
-                value = float(self._handle.value)
-                viewer.tasks.add(lambda: typed(value), self._key, PAUSE)
-
-    def show(self, visible: bool) -> None:
-        """Show it on the page or not."""
-        self._handle.visible = visible
+        handle = viewer.server.gui.add_number(label, float(value), **options)
+        super().__init__(viewer, handle, ("field", key), act)
 
     def put(self, value: float) -> None:
-        """Show another number, unless one that was typed waits to be obeyed."""
+        """Show a number, unless a typed one waits."""
         if not self._viewer.tasks.has(self._key) and self._handle.value != value:
             self._handle.value = float(value)
 
 
+class Dropdown:
+    """A drop-down list; `act` is called with what a person selects, in the event loop."""
+
+    def __init__(
+        self, gui: Any, label: str, options: tuple[str, ...], act: Callable[[str], None],
+        value: str | None = None, **more: Any,
+    ) -> None:  # fmt: skip
+        """Add it."""
+        self.handle = gui.add_dropdown(label, options, initial_value=value, **more)
+
+        @self.handle.on_update
+        async def _(event: Any) -> None:
+            if event.client is not None:
+                act(str(self.handle.value))
+
+    def put(self, value: str) -> None:
+        """Show a selection."""
+        if self.handle.value != value:
+            self.handle.value = value
+
+
+def add_button(gui: Any, label: str, act: Callable[[Any], None], hint: str | None = None) -> None:
+    """Add a button; `act` is called with the browser's handle, in the event loop."""
+
+    @gui.add_button(label, hint=hint).on_click
+    async def _(event: Any) -> None:
+        act(event.client)
+
+
 def _digits(end: float) -> int:
-    """Decimals that resolve a slider to an end."""
+    """Return the decimals that resolve a slider to an end."""
     return max(4, _DIGITS - math.floor(math.log10(end)))
-
-
-__all__ = ["Field", "Slider"]

@@ -1,4 +1,4 @@
-"""Where a camera stands so that points fill its picture."""
+"""Places a camera so that points fill its picture."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]
 
 FOV = np.radians(75.0)
-"""Angle of view of the page from its lower to its upper edge, rad: that of viser."""
+"""Vertical angle of view of viser [rad]."""
 
 
-class Eye(NamedTuple):
+class CameraPose(NamedTuple):
     """A camera.
 
     Attributes:
-        position: Where it stands, mm.
-        target: The point in the middle of its picture, mm.
+        position: Its position [mm].
+        target: The point in the centre of its picture [mm].
     """
 
     position: Vector
@@ -26,22 +26,22 @@ class Eye(NamedTuple):
 
     @property
     def rotation(self) -> Vector:
-        """Axes of its picture as columns: right, down, forward; with z of the world upward."""
+        """Its axes as columns: right, down, forward; z of the world is up."""
         forward, right, up = _axes(self.position - self.target)
         return np.stack([right, -up, forward], axis=1)
 
 
 def framed(
     points: Vector, toward: Vector, aspect: float, fov: float = FOV, room: float = 1.0
-) -> Eye:
-    """Return a camera that sees points as large as they can be seen, in the middle.
+) -> CameraPose:
+    """Return a camera that shows points as large as possible.
 
     Args:
-        points: What is to be seen, mm, (p, 3).
+        points: The points [mm], (p, 3).
         toward: Direction from the points to the camera, not along z.
         aspect: Width of the picture by its height.
-        fov: Angle of view from the lower to the upper edge, rad.
-        room: How many times as large as the points the picture is.
+        fov: Vertical angle of view [rad].
+        room: Size of the picture in that of the points.
 
     Example:
         >>> wall = np.array([[-1.0, 0.0, -1.0], [1.0, 0.0, 1.0]])
@@ -54,25 +54,29 @@ def framed(
     middle = 0.5 * (own.min(axis=0) + own.max(axis=0))
     x, y, depth = (own - middle).T
     slope = np.tan(0.5 * fov)
-    # A point that is nearer must be as far inside the edges of the picture.
+    # Near points must lie inside the edges of the picture too.
     away = room * np.maximum(np.abs(x) / (slope * aspect), np.abs(y) / slope) - depth
-    return Eye((middle - float(away.max()) * np.array([0.0, 0.0, 1.0])) @ axes, middle @ axes)
+    return CameraPose(
+        (middle - float(away.max()) * np.array([0.0, 0.0, 1.0])) @ axes, middle @ axes
+    )
 
 
-def first_eye(direction_deg: float, length: float, turn: Vector, side: bool, aspect: float) -> Eye:
-    """Return a camera that sees a robot at rest, with room for it to bend.
+def first_eye(
+    direction_deg: float, length: float, turn: Vector, side: bool, aspect: float
+) -> CameraPose:
+    """Return a camera for a robot at rest, with room for it to bend.
 
     Args:
         direction_deg: Direction in which it bends.
-        length: Its length, mm.
+        length: Its length [mm].
         turn: Rotation of its base, (3, 3).
-        side: Look at right angles on the plane in which it bends; else a little from above.
+        side: Look normal to the plane in which it bends; else a little from above.
         aspect: Width of the picture by its height.
     """
     angle = np.radians(direction_deg)
     across = np.array([np.cos(angle), np.sin(angle), 0.0])
     along = np.array([0.0, 0.0, 1.0])
-    # Bent to either side it is about half as wide as it is long.
+    # RobotShape to either side it is about half as wide as it is long.
     corners = [across * x + along * z for x in (-0.2, 0.75) for z in (-0.15, 1.05)]
     toward = turn @ np.cross(across, along)
     if abs(toward[2]) > 0.9:  # its plane is level: from the front
@@ -90,11 +94,8 @@ def quaternions(rotation: Vector) -> Vector:
 
 
 def _axes(toward: Vector) -> tuple[Vector, Vector, Vector]:
-    """Forward, right and up of a camera that looks against `toward`."""
+    """Return forward, right and up of a camera that looks against `toward`."""
     forward = -toward / np.linalg.norm(toward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right = right / np.linalg.norm(right)
     return forward, right, np.cross(right, forward)
-
-
-__all__ = ["FOV", "Eye", "first_eye", "framed", "quaternions"]

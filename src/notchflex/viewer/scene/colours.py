@@ -1,4 +1,4 @@
-"""What colours mean in the viewer: strain of a notch, what a contact does."""
+"""Colours of the viewer: strain of a notch, state of a contact."""
 
 from __future__ import annotations
 
@@ -23,45 +23,41 @@ Colour = tuple[int, int, int]
 
 
 def rgb(code: str) -> Colour:
-    """Return a colour code such as `#0072B2` as three numbers from 0 to 255.
-
-    Example:
-        >>> rgb("#0072B2")
-        (0, 114, 178)
-    """
-    return int(code[1:3], 16), int(code[3:5], 16), int(code[5:7], 16)
+    """Return a colour code such as `#0072B2` as three numbers from 0 to 255."""
+    red, green, blue = bytes.fromhex(code[1:])
+    return red, green, blue
 
 
 METAL: Colour = (176, 182, 190)
 TENDON = rgb(ORANGE)
 CLOSED = rgb(BLACK)
 BEYOND: Colour = (214, 0, 147)
-"""A strain beyond the allowed one, outside the scale of the others."""
+"""Colour of a strain above the allowed one, outside the scale."""
 LOAD = {"force": PURPLE, "moment": SKY}
 CONTACT = {0: GREEN, 1: BLUE, -1: VERMILLION}
-"""Colour of a friction contact by its state: sticks, slips toward the base, toward the tip."""
+"""Colour of a friction contact by its state: sticking, slipping toward the base or the tip."""
 UNKNOWN = GREY
 SLACK = 1e-9
 """A tendon with less tension [N] at the base is slack."""
 SMOOTH = 1e-9
-"""A contact whose log tension ratio is bound to less than this has no friction."""
+"""A contact with a smaller bound of its log tension ratio has no friction."""
 
-# From no strain to the allowed one, dark to light as far as an eye without red and green sees it.
+# From zero strain to the allowed one, also for eyes that do not distinguish red and green.
 _SCALE = np.array([(60, 80, 160), (80, 160, 190), (240, 215, 90), (230, 130, 40), (190, 20, 20)])
 STEPS = 64
-"""How many colours of strain there are; a notch is painted anew only when its colour changes."""
+"""Number of colours of strain; a notch is updated only if its colour changes."""
 
 
 def is_beyond(part: float) -> bool:
-    """Whether a strain, as a part of the allowed one, is larger than that."""
+    """Return whether a strain, as a fraction of the allowed one, exceeds it."""
     return abs(part) > 1.0
 
 
-def of_strain(part: float | None) -> Colour:
+def strain_colour(part: float | None) -> Colour:
     """Return the colour of a strain.
 
     Args:
-        part: The strain as a part of the allowed one; None where no strain is allowed or forbidden.
+        part: The strain as a fraction of the allowed one; None without an allowed strain.
     """
     if part is None or not np.isfinite(part):
         return METAL
@@ -73,10 +69,10 @@ def of_strain(part: float | None) -> Colour:
     return red, green, blue
 
 
-def of_contacts(state: Equilibrium, tendon: int) -> list[str]:
+def contact_colours(state: Equilibrium, tendon: int) -> list[str]:
     """Return the colours of the contacts of a tendon (from 0), base to tip.
 
-    A contact that cannot hold any tension back, or a slack tendon's, neither sticks nor slips.
+    A contact without friction, or of a slack tendon, neither sticks nor slips.
     """
     found = np.asarray(state.contact_state, float)[tendon]
     bound = np.asarray(state.contact_bound, float)[tendon]
@@ -91,7 +87,7 @@ def of_contacts(state: Equilibrium, tendon: int) -> list[str]:
 def linear(codes: Sequence[str]) -> NDArray[np.uint8]:
     """Return colour codes as linear light from 0 to 255, (count, 3).
 
-    viser takes the colours of many like things at once for linear light, and all others as sRGB.
+    viser takes the colours of batched meshes and arrows as linear light, and all others as sRGB.
 
     Example:
         >>> linear(["#0072B2", "#FFFFFF"]).tolist()
@@ -103,22 +99,5 @@ def linear(codes: Sequence[str]) -> NDArray[np.uint8]:
 
 
 def css(colour: Colour) -> str:
-    """Return a colour as a page writes it."""
+    """Return a colour in CSS."""
     return "#" + "".join(f"{part:02x}" for part in colour)
-
-
-__all__ = [
-    "BEYOND",
-    "CLOSED",
-    "CONTACT",
-    "LOAD",
-    "METAL",
-    "TENDON",
-    "UNKNOWN",
-    "css",
-    "is_beyond",
-    "linear",
-    "of_contacts",
-    "of_strain",
-    "rgb",
-]

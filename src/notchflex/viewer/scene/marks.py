@@ -1,24 +1,35 @@
-"""Tendons, and marks for what happens at their contacts and at the notches.
+"""Tendons, and marks of their contacts and of closed notches.
 
-Marks lie outside the tube, beside what they mark: the wall would hide them where it is.
+Marks lie outside the tube, where the wall does not hide them.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.bent import Bent
+from notchflex.plotting.shapes.robot_shape import RobotShape
 from notchflex.results import EquilibriumPath
-from notchflex.viewer.scene.colours import CLOSED, TENDON, UNKNOWN, linear, of_contacts
-from notchflex.viewer.scene.shown import Shown
+from notchflex.viewer.scene.colours import CLOSED, TENDON, UNKNOWN, contact_colours, linear
 
-# All as parts of the outer radius of the tube: thickness of tendons, radius of marks, and how far
-# their centres are from the tube axis.
+# In outer radii of the tube: thickness of tendons, radius of marks, distance of their centres from
+# the tube axis.
 _TENDON, _CONTACT, _LIPS = 0.09, 0.13, 0.2
 _CONTACT_AT, _LIPS_AT = 1.2, 1.55
+
+
+@dataclass
+class Shown:
+    """What is visible in the scene."""
+
+    tendons: bool = True
+    contacts: bool = True
+    frames: bool = True
+    loads: bool = True
+    see_through: bool = False
 
 
 class Marks:
@@ -26,12 +37,12 @@ class Marks:
 
     Args:
         scene: The scene.
-        root: The node on which they hang.
-        rest: The robot as nothing loads it.
+        root: Name of the parent node.
+        rest: The shape of the robot at rest.
     """
 
-    def __init__(self, scene: Any, root: str, rest: Bent) -> None:
-        """Send them."""
+    def __init__(self, scene: Any, root: str, rest: RobotShape) -> None:
+        """Add them."""
         import trimesh
 
         self._outer = outer = rest.robot.tube.outer_radius
@@ -64,17 +75,17 @@ class Marks:
             for number in range(len(rest.flexures))
         ]
 
-    def _beside(self, shape: Bent, tendon: int) -> NDArray[np.float32]:
-        """Places of the marks of the contacts of a tendon (from 0)."""
+    def _beside(self, shape: RobotShape, tendon: int) -> NDArray[np.float32]:
+        """Return the positions of the contact marks of a tendon (from 0)."""
         return shape.contacts(tendon, _CONTACT_AT * self._outer).astype(np.float32)
 
-    def move(self, path: EquilibriumPath, shape: Bent, shown: Shown) -> None:
+    def move(self, path: EquilibriumPath, shape: RobotShape, shown: Shown) -> None:
         """Move them to a new state.
 
         Args:
             path: The state, as a path of one step.
-            shape: The robot in that state.
-            shown: What is shown.
+            shape: The shape of the robot in that state.
+            shown: What is visible.
         """
         for number, (line, balls) in enumerate(zip(self._tendons, self._contacts, strict=True)):
             line.visible, balls.visible = shown.tendons, shown.contacts
@@ -82,7 +93,7 @@ class Marks:
                 line.points = _segments(shape.tendon(number)).astype(np.float32)
             if shown.contacts:
                 balls.batched_positions = self._beside(shape, number)
-                codes = of_contacts(path[0], number)
+                codes = contact_colours(path[0], number)
                 balls.batched_colors = linear(codes)
         for number, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
             ball.visible = bool(closed)
@@ -91,8 +102,5 @@ class Marks:
 
 
 def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points in a row as the straight pieces between them, (pieces, 2, 3)."""
+    """Return the straight pieces between points, (pieces, 2, 3)."""
     return np.stack([points[:-1], points[1:]], axis=1)
-
-
-__all__ = ["Marks"]

@@ -1,7 +1,6 @@
-"""The robot in the browser's space: solids that were sent once and are moved from then on.
+"""The robot in the scene of a browser: solids are sent once and moved from then on.
 
-Everything hangs on one node that is turned as the tube points; below it all is in the frame of the
-base, in mm.
+All nodes are children of one node with the direction of the tube, in the frame of the base [mm].
 """
 
 from __future__ import annotations
@@ -11,30 +10,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.acting import Acting, acting_at
-from notchflex.plotting.shapes.bent import HELD, Bent, bent_at
-from notchflex.plotting.shapes.twist import rotation_of
+from notchflex.plotting.shapes.applied_loads import AppliedLoad, applied_loads
+from notchflex.plotting.shapes.interpolation import rotation_of
+from notchflex.plotting.shapes.robot_shape import HELD, RobotShape, shape_at
 from notchflex.results import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.viewer.controls import POINTING, Controls
 from notchflex.viewer.reach import GRAVITY, Reach, round_up
-from notchflex.viewer.scene.camera import Eye, first_eye, framed, quaternions
-from notchflex.viewer.scene.colours import LOAD, METAL, linear, of_strain
-from notchflex.viewer.scene.marks import Marks
-from notchflex.viewer.scene.shown import Shown
-from notchflex.viewer.scene.skins import PIECES, Skin, at_rest, skins
+from notchflex.viewer.scene.camera import CameraPose, first_eye, framed, quaternions
+from notchflex.viewer.scene.colours import LOAD, METAL, linear, strain_colour
+from notchflex.viewer.scene.marks import Marks, Shown
+from notchflex.viewer.scene.skins import PIECES, FlexureSurface, at_rest, skins
 from notchflex.viewer.scene.solids import body_solids
 
 if TYPE_CHECKING:
     import viser
 
-# As a part of the outer radius of the tube.
+# In outer radii of the tube.
 _FRAME = 2.2
-# As parts of the length of the robot.
+# In lengths of the robot.
 _ARROW, _SHORTEST = 0.35, 0.06
 _SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
 SEE_THROUGH = 0.35
-# Where lamps stand, and how bright they are.
+# Directions of lights, and their intensities.
 _LIGHTS = (((0.6, -1.0, 0.8), 1.6), ((-1.0, -0.3, 0.5), 0.7), ((0.3, 1.0, 0.4), 0.7))
 ROOT = "/robot"
 
@@ -45,8 +43,8 @@ class Scene:
     Args:
         server: The server; what its scene holds under `/robot` is replaced.
         robot: The robot.
-        reach: How far its sliders go, for the length of arrows.
-        shown: What is shown.
+        reach: Ranges of its sliders, for the length of arrows.
+        shown: What is visible.
     """
 
     def __init__(self, server: viser.ViserServer, robot: Robot, reach: Reach, shown: Shown) -> None:
@@ -59,10 +57,10 @@ class Scene:
             self._build()
 
     def _build(self) -> None:
-        """Add every node once."""
+        """Add all nodes."""
         scene, rest = self.server.scene, self.rest
-        # Without the picture of a room around it: a browser without a graphics card needs half a
-        # minute to take that in, and shadows cost it more than all the rest.
+        # No environment map: it takes a browser without a graphics card half a minute. No shadows:
+        # they cost it more than all the rest.
         scene.configure_environment_map(None)
         scene.configure_default_lights(enabled=False)
         scene.add_light_hemisphere(
@@ -78,8 +76,8 @@ class Scene:
             _solid(scene, f"{ROOT}/body_{number}", mesh.vertices, mesh.faces)
             for number, mesh in enumerate(body_solids(rest))
         ]
-        self._skins: list[Skin] = skins(rest)
-        self._skins_of: dict[str, list[Skin]] = {}
+        self._skins: list[FlexureSurface] = skins(rest)
+        self._skins_of: dict[str, list[FlexureSurface]] = {}
         self._flexures = [
             scene.add_mesh_simple(
                 f"{ROOT}/flexure_{number + 1}",
@@ -121,20 +119,20 @@ class Scene:
 
     @property
     def grid_cell(self) -> float:
-        """Width of a cell of the grid on the floor, mm."""
+        """Width of a cell of the grid on the floor [mm]."""
         return self._grid_cell
 
-    def update(self, path: EquilibriumPath, controls: Controls) -> Bent:
+    def update(self, path: EquilibriumPath, controls: Controls) -> RobotShape:
         """Move everything to a new state.
 
         Args:
             path: The state, as a path of one step.
-            controls: What was set.
+            controls: The settings.
 
         Returns:
-            The robot in that state.
+            The shape of the robot in that state.
         """
-        shape = bent_at(path, 0, PIECES)
+        shape = shape_at(path, 0, PIECES)
         held = shape.position[:1] - [0.0, 0.0, HELD * self.robot.tube.outer_radius]
         self._seen = np.concatenate([held, shape.position, shape.tip[None]])
         with self.server.atomic():
@@ -154,8 +152,8 @@ class Scene:
         lowest = {"up": HELD * outer, "sideways": 0.35 * self.length, "down": 1.1 * self.length}
         self._grid.position = (0.0, 0.0, -lowest[pointing])
 
-    def _dress(self, path: EquilibriumPath, shape: Bent) -> None:
-        """Take other triangles for the flexures where other loads ask for more sections of them."""
+    def _dress(self, path: EquilibriumPath, shape: RobotShape) -> None:
+        """Replace the triangles of the flexures if the loads need another number of sections."""
         if len(self._skins[0].across.T) == len(shape.flexures[0].area):
             return
         level = path.chain.level
@@ -165,14 +163,14 @@ class Scene:
         for node, skin, sections in zip(self._flexures, self._skins, shape.flexures, strict=True):
             corners = skin.at(sections).astype(np.float32)
             more = len(corners) > len(node.vertices)
-            # Never a triangle without its corners, not even between two messages.
+            # A triangle must never refer to missing corners, not even between two messages.
             if more:
                 node.vertices = corners
             node.faces = skin.faces.astype(np.uint32)
             if not more:
                 node.vertices = corners
 
-    def _move(self, shape: Bent) -> None:
+    def _move(self, shape: RobotShape) -> None:
         turned = quaternions(shape.rotation)
         for node, place, turn in zip(self._bodies, shape.position, turned, strict=True):
             node.position, node.wxyz = place, turn
@@ -187,12 +185,12 @@ class Scene:
     def _paint(self, path: EquilibriumPath) -> None:
         allowed = self.robot.material.allowed_strain
         for number, strain in enumerate(path.peak_strain[0]):
-            colour = of_strain(None if allowed is None else float(strain) / allowed)
+            colour = strain_colour(None if allowed is None else float(strain) / allowed)
             if colour != self._colours[number]:
                 self._flexures[number].color = self._colours[number] = colour
 
-    def _move_loads(self, path: EquilibriumPath, shape: Bent) -> None:
-        loads = acting_at(path, 0, shape) if self.shown.loads else []
+    def _move_loads(self, path: EquilibriumPath, shape: RobotShape) -> None:
+        loads = applied_loads(path, 0, shape) if self.shown.loads else []
         self._arrows.visible = bool(loads)
         for label in self._labels[len(loads) :]:
             label.visible = False
@@ -204,29 +202,28 @@ class Scene:
         for label, one, (_, end) in zip(self._labels, loads, ends, strict=False):
             label.text, label.position, label.visible = one.label, end, True
 
-    def _arrow(self, one: Acting) -> NDArray[np.float64]:
+    def _arrow(self, one: AppliedLoad) -> NDArray[np.float64]:
         most = max(self.reach.force, GRAVITY * self.reach.mass)
         size = max(one.size / most, _SHORTEST / _ARROW) * _ARROW * self.length
         return size * one.vector / one.size
 
-    def eye(self, pointing: str, side: bool = False, aspect: float = 1.0) -> Eye:
-        """Return where a camera should stand, with room for the robot to bend.
+    def eye(self, pointing: str, side: bool = False, aspect: float = 1.0) -> CameraPose:
+        """Return the default camera, with room for the robot to bend.
 
         Args:
-            pointing: Where the tube points, a key of `POINTING`.
-            side: Look at right angles on the plane in which the robot bends; else a little from
-                above.
+            pointing: Direction of the tube, a key of `POINTING`.
+            side: Look normal to the plane in which the robot bends; else a little from above.
             aspect: Width of the picture by its height.
         """
         turn = rotation_of(np.array(POINTING[pointing]))
         return first_eye(self.robot.notches[0].direction_deg, self.length, turn, side, aspect)
 
-    def picture_eye(self, toward: NDArray[np.float64], fov: float, aspect: float) -> Eye:
-        """Return where a camera must stand to see the robot as it is bent now, and all of it.
+    def picture_eye(self, toward: NDArray[np.float64], fov: float, aspect: float) -> CameraPose:
+        """Return a camera that shows the whole robot in its current state.
 
         Args:
             toward: Direction from the robot to the camera.
-            fov: Angle of view from the lower to the upper edge, rad.
+            fov: Vertical angle of view [rad].
             aspect: Width of the picture by its height.
         """
         outer = 1.3 * self.robot.tube.outer_radius
@@ -235,18 +232,15 @@ class Scene:
         return framed(points @ self._pose.T, toward, aspect, fov, room=1.1)
 
     def remove(self) -> None:
-        """Take everything away again."""
+        """Remove all nodes."""
         self._root.remove()
         self._grid.remove()
 
 
 def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
-    """A solid with its sharp edges sharp and its round faces round."""
+    """Add a solid with sharp edges and smooth round faces."""
     import trimesh
 
     whole = trimesh.Trimesh(vertices, faces, process=False)
     shaded = trimesh.graph.smooth_shade(whole, angle=_SMOOTH)
     return scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
-
-
-__all__ = ["Scene", "Shown"]

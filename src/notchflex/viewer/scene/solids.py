@@ -1,7 +1,7 @@
-"""The rigid pieces of the tube as solids: what the cuts leave between one flexure and the next.
+"""The rigid bodies of the tube as solids.
 
-Cuts go straight through the tube, so a piece is its outline seen from the side, extruded across
-the tube and cut with the wall. What belongs to a flexure across the tube is taken away from it.
+Cuts go straight through the tube, so a body is its outline from the side, extruded across the tube
+and intersected with the wall, without the flexures across the tube.
 """
 
 from __future__ import annotations
@@ -11,21 +11,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.bent import Bent
 from notchflex.plotting.shapes.outline import body_corners
+from notchflex.plotting.shapes.robot_shape import RobotShape
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
 ROUND = 96  # flat sides of the tube
-_BEYOND = 1.0  # mm, by which the tube outreaches what is cut from it
+_BEYOND = 1.0  # extra length of the tube at both ends of a body [mm]
 
 
-class Mesh(NamedTuple):
+class SolidMesh(NamedTuple):
     """A closed surface.
 
     Attributes:
-        vertices: Points, mm, (v, 3).
+        vertices: Points [mm], (v, 3).
         faces: Corners of triangles, counter-clockwise as seen from outside, (f, 3).
     """
 
@@ -33,23 +33,23 @@ class Mesh(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def body_solids(rest: Bent) -> list[Mesh]:
-    """Return the rigid pieces of a robot, base first, each in its own frame (mm).
+def body_solids(rest: RobotShape) -> list[SolidMesh]:
+    """Return the rigid bodies of a robot, base first, each in its own frame [mm].
 
     Args:
-        rest: The robot as it stands when nothing loads it.
+        rest: The shape of the robot without loads.
     """
     return [_body(rest, body) for body in range(len(rest.position))]
 
 
-def _body(rest: Bent, body: int) -> Mesh:
+def _body(rest: RobotShape, body: int) -> SolidMesh:
     notch = rest.robot.notches[max(body - 1, 0)]
     view = float(np.radians(notch.direction_deg))
     corners = np.array(body_corners(rest, body, view))
     solid = _through(corners, view, rest) ^ _tube(rest, corners[:, 1])
     spine = np.asarray(rest.chain.rods.has_closure) > 0.0
     for flexure in (body - 1, body):
-        # A flexure on a spine lies between the pieces; one across the tube reaches into them.
+        # A flexure on a spine lies between the bodies; one across the tube overlaps with them.
         if 0 <= flexure < len(rest.flexures) and not spine[flexure]:
             one = rest.flexures[flexure]
             line = np.concatenate([one.fibre(-one.spine), one.fibre(one.near)[::-1]])
@@ -57,11 +57,11 @@ def _body(rest: Bent, body: int) -> Mesh:
             across = np.array([np.cos(view), np.sin(view), 0.0])
             solid = solid - _through(np.stack([own @ across, own[:, 2]], axis=-1), view, rest)
     mesh = solid.to_mesh64()
-    return Mesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
+    return SolidMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
 
 
-def _tube(rest: Bent, along: NDArray[np.float64]) -> Manifold:
-    """The wall of the tube, longer than what is to be cut from it."""
+def _tube(rest: RobotShape, along: NDArray[np.float64]) -> Manifold:
+    """Return the wall of the tube, longer than the body."""
     from manifold3d import Manifold
 
     low, high = float(along.min()) - _BEYOND, float(along.max()) + _BEYOND
@@ -73,8 +73,8 @@ def _tube(rest: Bent, along: NDArray[np.float64]) -> Manifold:
     return (outer - inner).translate((0.0, 0.0, low))
 
 
-def _through(polygon: NDArray[np.float64], view: float, rest: Bent) -> Manifold:
-    """All that lies behind a polygon (across, along) seen from the side."""
+def _through(polygon: NDArray[np.float64], view: float, rest: RobotShape) -> Manifold:
+    """Return the prism of a polygon (across, along) seen from the side."""
     from manifold3d import CrossSection, FillRule, Manifold
 
     deep = 2.0 * rest.robot.tube.outer_diameter
@@ -84,6 +84,3 @@ def _through(polygon: NDArray[np.float64], view: float, rest: Bent) -> Manifold:
     axes = np.stack([across, along, np.cross(across, along)], axis=1)
     middle = axes @ np.array([0.0, 0.0, -0.5 * deep])
     return prism.transform(np.concatenate([axes, middle[:, None]], axis=1))
-
-
-__all__ = ["ROUND", "Mesh", "body_solids"]

@@ -1,4 +1,4 @@
-"""Where the viewer serves, and whether others can reach it there."""
+"""The address of the viewer, and whether other machines can reach it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ NEEDED = ("viser", "trimesh", "manifold3d", "matplotlib")
 
 
 def check_installed() -> None:
-    """Raise if what the viewer needs is not installed.
+    """Check that what the viewer needs is installed.
 
     Raises:
-        InputError: It is not; the message says how to install it.
+        InputError: Something is missing; the message says how to install it.
     """
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
@@ -28,7 +28,7 @@ def check_installed() -> None:
 
 
 def is_this_machine_only(host: str) -> bool:
-    """Whether only programs of this machine can reach what is served on a host.
+    """Return whether only programs on this machine can reach a host.
 
     Example:
         >>> is_this_machine_only("127.0.0.1"), is_this_machine_only("0.0.0.0")
@@ -43,7 +43,7 @@ def is_this_machine_only(host: str) -> bool:
 
 
 def exposed(host: str) -> str:
-    """Return the sentence that warns of a host; empty where there is nothing to warn of."""
+    """Return a warning if other machines can reach a host; else ""."""
     if is_this_machine_only(host):
         return ""
     return (
@@ -53,10 +53,10 @@ def exposed(host: str) -> str:
 
 
 def check_host(host: str, port: int) -> None:
-    """Raise if nothing can be served on a host.
+    """Check that a host and a port can be served on.
 
     Raises:
-        InputError: The host is no address of this machine, or the port is none.
+        InputError: The host is not an address of this machine, or the port is invalid.
     """
     if not 0 < port < 65536:
         raise InputError.OUT_OF_RANGE(f"a port is a whole number from 1 to 65535; got {port}")
@@ -70,6 +70,3 @@ def check_host(host: str, port: int) -> None:
             f"nothing can be served on {host!r}: {reason}; give an address of this machine, such "
             f"as {HOST}"
         ) from None
-
-
-__all__ = ["HOST", "PORT", "check_host", "check_installed", "exposed", "is_this_machine_only"]

@@ -1,7 +1,7 @@
-"""Which addresses a request may name: the defence against other pages that a browser has open.
+"""Checks the addresses of a request: the defence against other pages in the same browser.
 
 A page of another site can send requests to 127.0.0.1, and after DNS rebinding even under its own
-name. Browsers tell in `Origin` which page asks and in `Host` which name it used, and a page can
+name. Browsers send the page in `Origin` and the name that it used in `Host`, and a page can
 forge neither.
 """
 
@@ -17,13 +17,13 @@ _HTTP = 80  # browsers leave this port out
 
 
 def refusal(host: str, port: int, asked_for: Sequence[str], asked_by: Sequence[str]) -> str | None:
-    """Return why a request is refused, or None where it is welcome.
+    """Return why a request is refused, or None if it is allowed.
 
     Args:
         host: Address that is served on, as the user gave it.
         port: Port that is served on.
         asked_for: Values of the header `Host`.
-        asked_by: Values of the header `Origin`; programs other than browsers send none.
+        asked_by: Values of the header `Origin`; only browsers send it.
 
     Example:
         >>> refusal("127.0.0.1", 8080, ["localhost:8080"], ["http://localhost:8080"]) is None
@@ -47,12 +47,12 @@ def refusal(host: str, port: int, asked_for: Sequence[str], asked_by: Sequence[s
 
 
 def bracketed(host: str) -> str:
-    """Return a host as an address names it: IPv6 in brackets."""
+    """Return a host for an address: IPv6 in brackets."""
     return f"[{host}]" if ":" in host else host
 
 
 def _is_served(host: str, port: int, address: str) -> bool:
-    """Whether an address such as `localhost:8080` is one that is served."""
+    """Return whether an address such as `localhost:8080` is served."""
     parts = _parts(address)
     if parts is None or parts[1] != port:
         return False
@@ -65,7 +65,7 @@ def _is_served(host: str, port: int, address: str) -> bool:
 
 
 def _parts(address: str) -> tuple[str, int] | None:
-    """Return name and port of an address; None where it is none."""
+    """Return name and port of an address; None if it is invalid."""
     try:
         found = urlsplit(f"//{address}")
         port = found.port
@@ -98,6 +98,3 @@ def _own_names() -> set[str]:
 
 def _quoted(values: Sequence[str]) -> str:
     return ", ".join(repr(value) for value in values) or "(missing)"
-
-
-__all__ = ["bracketed", "refusal"]

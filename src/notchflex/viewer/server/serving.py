@@ -1,9 +1,9 @@
-"""A viser server that answers only those who asked for it by its address.
+"""Starts a viser server that checks the address of every request.
 
 viser 1.1 has no setting for this and hands its own `process_request` to `websockets`. Its server
 thread looks `websockets.asyncio.server.serve` up when it starts, so that public function is
-replaced until the server stands; nothing of viser is changed. Were viser to start in another way,
-`serve` would not see the check put in place, and refuses to go on.
+replaced until the server runs; nothing of viser is changed. If viser starts in another way,
+`serve` notices that no check is installed, and refuses to continue.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _starting = Lock()
 
 
 def serve(host: str, port: int) -> viser.ViserServer:
-    """Begin to serve, in silence and without a way round the host.
+    """Begin to serve, without messages and only on the host.
 
     Args:
         host: Address to serve on.
@@ -53,7 +53,7 @@ def serve(host: str, port: int) -> viser.ViserServer:
 
 @contextlib.contextmanager
 def _guarded(host: str) -> Generator[list[int]]:
-    """Let servers that are started inside the `with` check requests; yields their ports."""
+    """Check the requests of servers that start inside the `with`; yield their ports."""
     from websockets.asyncio import server as module
 
     plain = module.serve
@@ -76,12 +76,9 @@ def _guarded(host: str) -> Generator[list[int]]:
 def _answer(
     host: str, port: int, answer: Callable[[Any, Any], Any] | None, connection: Any, request: Any
 ) -> Any:
-    """Refuse a request, or let it be answered as it would be."""
+    """Refuse a request, or pass it on."""
     headers = request.headers
     reason = refusal(host, port, headers.get_all("Host"), headers.get_all("Origin"))
     if reason is not None:
         return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
     return None if answer is None else answer(connection, request)
-
-
-__all__ = ["serve"]

@@ -1,4 +1,4 @@
-"""External loads in a picture: where they act on the bent robot, and which way."""
+"""External loads in a picture: their points and directions on the bent robot."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 from notchflex.plotting.style import GREY, PURPLE, SKY
 
 if TYPE_CHECKING:
-    from notchflex.plotting.shapes.bent import Bent
+    from notchflex.plotting.shapes.robot_shape import RobotShape
     from notchflex.results import EquilibriumPath
 
 DEAD, FOLLOWING, WEIGHT = "", ", following", ", weight"
 COLOUR = {DEAD: PURPLE, FOLLOWING: SKY, WEIGHT: GREY}
 
 
-class Acting(NamedTuple):
-    """One force or moment, in the frame of the base.
+class AppliedLoad(NamedTuple):
+    """One force or moment in the frame of the base.
 
     Attributes:
         name: "force" or "moment".
         kind: One of `DEAD`, `FOLLOWING`, `WEIGHT`.
-        point: Where it acts, mm.
-        vector: The force (N) or moment (N mm).
+        point: Point of action [mm].
+        vector: The force [N] or moment [N mm].
     """
 
     name: str
@@ -35,30 +35,30 @@ class Acting(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Magnitude, N or N mm."""
+        """Magnitude [N or N mm]."""
         return float(np.linalg.norm(self.vector))
 
     @property
     def label(self) -> str:
-        """What a legend calls it."""
+        """Legend entry."""
         unit = "N" if self.name == "force" else "N mm"
         return f"{self.name} {self.size:.3g} {unit}{self.kind}"
 
 
-def acting_at(path: EquilibriumPath, step: int, shape: Bent) -> list[Acting]:
+def applied_loads(path: EquilibriumPath, step: int, shape: RobotShape) -> list[AppliedLoad]:
     """Return the forces and moments on a robot at one step of a path; a hung mass as its weight.
 
-    Gravity on the robot's own mass acts everywhere and is not among them.
+    Gravity on the robot's own mass is distributed and not included.
 
     Args:
         path: Solved path.
-        step: Which of its steps.
-        shape: The robot there.
+        step: Index of the step.
+        shape: The shape of the robot at this step.
     """
     return [one for one in _every(path, step, shape) if one.size > 0.0]
 
 
-def _every(path: EquilibriumPath, step: int, shape: Bent) -> Iterator[Acting]:
+def _every(path: EquilibriumPath, step: int, shape: RobotShape) -> Iterator[AppliedLoad]:
     load = path.load.external[step]
     world = path.body_rotation[step, 0]
 
@@ -68,25 +68,25 @@ def _every(path: EquilibriumPath, step: int, shape: Bent) -> Iterator[Acting]:
 
     kind = FOLLOWING if load.following else DEAD
     point = shape.on_body(-1, np.array([0.0, 0.0, shape.body_length[-1]]) + load.tip_point)
-    yield Acting("force", kind, point, carried(load.tip_force, -1, load.following))
-    yield Acting("moment", kind, shape.tip, carried(load.tip_moment, -1, load.following))
+    yield AppliedLoad("force", kind, point, carried(load.tip_force, -1, load.following))
+    yield AppliedLoad("moment", kind, shape.tip, carried(load.tip_moment, -1, load.following))
     weight = np.asarray(load.weight(load.tip_mass), float)
-    yield Acting("force", WEIGHT, point, weight @ world)
+    yield AppliedLoad("force", WEIGHT, point, weight @ world)
     for one in load.body_forces:
         kind = FOLLOWING if one.following else DEAD
         point = shape.on_body(one.body, one.point)
-        yield Acting("force", kind, point, carried(one.force, one.body, one.following))
-        yield Acting("moment", kind, point, carried(one.moment, one.body, one.following))
+        yield AppliedLoad("force", kind, point, carried(one.force, one.body, one.following))
+        yield AppliedLoad("moment", kind, point, carried(one.moment, one.body, one.following))
 
 
-def out_of_plane(path: EquilibriumPath, step: int, shape: Bent, view: float) -> float:
-    """Return the largest part of a load that a view does not show: of a force, or of a moment.
+def out_of_plane(path: EquilibriumPath, step: int, shape: RobotShape, view: float) -> float:
+    """Return the largest fraction of a load that a view does not show.
 
-    A force shows where it lies in the plane of the view, a moment where it stands on it.
+    A view shows the part of a force in its plane, and the part of a moment normal to it.
     """
     normal = np.array([-np.sin(view), np.cos(view), 0.0])
     hidden = [0.0]
-    for one in acting_at(path, step, shape):
+    for one in applied_loads(path, step, shape):
         beside = float(abs(one.vector @ normal)) / one.size
         hidden.append(beside if one.name == "force" else np.sqrt(max(0.0, 1.0 - beside**2)))
     return max(hidden)

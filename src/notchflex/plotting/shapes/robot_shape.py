@@ -1,7 +1,7 @@
-"""A robot in one state as points in space: its rigid bodies, its flexures along their length.
+"""The shape of a robot in one state: points of its rigid bodies and flexures in space.
 
-All is taken from the chain: where the walls of the bodies begin and end on every side from the
-openings of the notches, the flexures from their rods. A new notch shape needs nothing here.
+All of it follows from the chain: the walls of the bodies from the openings of the notches, the
+flexures from their rods. A new kind of notch needs no code here.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.shapes.twist import between
+from notchflex.plotting.shapes.interpolation import interpolate_poses
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:
@@ -24,22 +24,22 @@ if TYPE_CHECKING:
 Points = NDArray[np.float64]
 Walls = list[tuple[float, float] | None]
 
-FLEXURE_POINTS = 20  # a notch bends by less than a right angle; 2 degrees a piece look round
+FLEXURE_POINTS = 20  # a notch bends by less than a right angle; 2 degrees look smooth
 UP = np.array([0.0, 0.0, 1.0])
-HELD = 0.8  # length of held tube drawn below the base, in outer radii
+HELD = 0.8  # length of clamped tube drawn below the base, in outer radii
 
 
 @dataclass(frozen=True)
-class Sections:
-    """One flexure from its start to its end, k sections (mm, in the frame of the base).
+class FlexureShape:
+    """One flexure from its start to its end: k sections [mm] in the frame of the base.
 
     Attributes:
         rotation: Axes of each section as columns: across in the plane of bending, across out of
             it, along; (k, 3, 3).
         position: Its neutral axis, (k, 3).
-        spine: How far it reaches against its first axis, (k,).
-        near: How far it reaches along it, (k,).
-        area: Its area, (k,), mm².
+        spine: Distance of its edge against the first axis, (k,).
+        near: Distance of its edge along the first axis, (k,).
+        area: Its area [mm²], (k,).
     """
 
     rotation: Points
@@ -50,17 +50,13 @@ class Sections:
 
     def fibre(self, across: Any, out: Any = 0.0) -> Points:
         """Return the line at (across, out) from the neutral axis, (k, 3)."""
-        across, out = np.broadcast_to(across, len(self.area)), np.broadcast_to(out, len(self.area))
-        return (
-            self.position
-            + across[:, None] * self.rotation[..., 0]
-            + out[:, None] * self.rotation[..., 1]
-        )
+        offset = np.stack(np.broadcast_arrays(across, out, self.area)[:2], axis=-1)
+        return self.position + np.einsum("kij,kj->ki", self.rotation[..., :2], offset)
 
 
 @dataclass(frozen=True)
-class Bent:
-    """A robot of n notches in one state, in the frame of its base (mm).
+class RobotShape:
+    """A robot of n notches in one state [mm], in the frame of its base.
 
     Attributes:
         robot: The robot.
@@ -74,7 +70,7 @@ class Bent:
     chain: Chain
     rotation: Points
     position: Points
-    flexures: list[Sections]
+    flexures: list[FlexureShape]
 
     @cached_property
     def body_length(self) -> Points:
@@ -87,33 +83,31 @@ class Bent:
         return self.on_body(-1, [0.0, 0.0, self.body_length[-1]])
 
     def on_body(self, body: int, points: Any) -> Points:
-        """Carry points (..., 3) of a body's frame to that of the base."""
+        """Transform points (..., 3) from the frame of a body to that of the base."""
         return self.position[body] + np.asarray(points, float) @ self.rotation[body].T
 
     def walls(self, side_deg: float) -> Walls:
-        """Return from where to where each body has wall on a side [mm in its frame], or None."""
+        """Return the ends of the wall of each body on a side [mm in its frame]; None if no wall."""
         return _walls(self.robot, tuple(self.body_length.tolist()), side_deg)
 
     def tendon(self, number: int) -> Points:
-        """Return the line of a tendon (from 0) through its true points, from below the base."""
+        """Return the line of a tendon (from 0) from below the base."""
         return np.concatenate([points for points, _ in self._along(number)])
 
     def contacts(self, number: int, radius: float | None = None) -> Points:
-        """Return the points of a tendon (from 0) where it rubs, base to tip, (contacts, 3).
+        """Return the friction contacts of a tendon (from 0), base to tip, (contacts, 3).
 
-        Those are the edges of the bodies that it runs through, but for the one behind which it is
-        fixed.
+        They are the edges of the bodies that it passes, except those of the body that it ends in.
 
         Args:
             number: The tendon.
-            radius: Distance [mm] from the tube axis to which the points are moved outward; None
-                leaves them on the tendon.
+            radius: Distance [mm] of the points from the tube axis; None for that of the tendon.
         """
         edges = [points for points, on_body in self._along(number, radius) if on_body]
         return np.concatenate(edges)[1:-2]  # neither the foot, nor both edges of the last body
 
     def _along(self, number: int, radius: float | None = None) -> Iterator[tuple[Points, bool]]:
-        """Pieces of a tendon, and whether each lies on a body or crosses a notch."""
+        """Yield the pieces of a tendon, and whether each lies on a body or crosses a notch."""
         from notchflex.mechanics.tendon.wall_arc import WallArc
 
         group = next(group for group in self.chain.groups if number in group.numbers)
@@ -137,11 +131,11 @@ class Bent:
                 yield self.on_body(body, [place + at * UP for at in ends]), True
 
     def lips(self, notch: int, radius: float | None = None) -> Points:
-        """Return the point between the lips of a notch (from 0), where it closes.
+        """Return the point midway between the edges of a notch (from 0) that meet when it closes.
 
         Args:
             notch: The notch.
-            radius: Distance [mm] of the point from the tube axis; None is that of the lips.
+            radius: Distance [mm] of the point from the tube axis; None for the outer radius.
         """
         outer = self.robot.tube.outer_radius if radius is None else radius
         found: list[tuple[float, Points]] = []
@@ -164,7 +158,7 @@ class Bent:
 
 @lru_cache(maxsize=256)
 def _walls(robot: Robot, body_length: tuple[float, ...], side_deg: float) -> Walls:
-    # Not at the head of the file: importing the pictures alone needs no solver.
+    # Imported late: the pictures alone need no solver.
     from notchflex._jax import constant
     from notchflex.mechanics.tendon.openings import passage
 
@@ -178,22 +172,22 @@ def _walls(robot: Robot, body_length: tuple[float, ...], side_deg: float) -> Wal
 
 @lru_cache(maxsize=1)
 def _node_poses() -> Any:
-    """Compiled once for a shape of the arrays, not for every picture."""
+    """Return the compiled function; it is compiled once for each shape of the arrays."""
     from notchflex._jax import jax
     from notchflex.mechanics.flexure.rod_kinematics import node_poses
 
     return jax.jit(jax.vmap(node_poses))
 
 
-def bent(
+def shape_from_modes(
     robot: Robot,
     chain: Chain,
     modes: Any,
     body_position: Points,
     body_rotation: Points,
     pieces: int = FLEXURE_POINTS,
-) -> Bent:
-    """Return a robot in one state, seen from its base: a turned base gives the same.
+) -> RobotShape:
+    """Return the shape of a robot in one state; it does not depend on the pose of the base.
 
     Args:
         robot: The robot, n notches.
@@ -201,8 +195,8 @@ def bent(
         modes: Amplitudes of the strain modes of each flexure.
         body_position: Proximal face centre of each body [mm], (n + 1, 3).
         body_rotation: Rotation of each body, (n + 1, 3, 3).
-        pieces: Straight pieces that each flexure is drawn with, at least; the nodes of its rod may
-            ask for more.
+        pieces: Minimum number of straight pieces of each flexure; the nodes of its rod may need
+            more.
     """
     from notchflex._jax import jax
 
@@ -218,16 +212,16 @@ def bent(
     end = position[1:] - np.einsum("nij,njk,nk->ni", rotation[1:], last, rods.end_offset)
     along = position[:-1, None] + places @ np.swapaxes(rotation[:-1], -1, -2)
     line = np.concatenate([along, end[:, None]], axis=1)
-    flexures: dict[int, Sections] = {}
+    flexures: dict[int, FlexureShape] = {}
     counts = (rods.length > 0.0).sum(axis=1)
-    for count in np.unique(counts):  # flexures with equally many nodes are filled up at once
+    for count in np.unique(counts):  # flexures with the same number of nodes together
         own = np.flatnonzero(counts == count)
         there = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in own])
         kept = np.concatenate([np.zeros((len(own), 1), int), there + 1], axis=1)
         kept = np.concatenate([kept, np.full((len(own), 1), axes.shape[1] - 1)], axis=1)
         parts = -(-pieces // (int(count) + 1))
         row = own[:, None]
-        turned, points = between(axes[row, kept], line[row, kept], parts)
+        turned, points = interpolate_poses(axes[row, kept], line[row, kept], parts)
         at_node = np.arange(points.shape[1]) / parts - 1.0
         section = rods.section
         for j, nodes_there, frames, places_there in zip(own, there, turned, points, strict=True):
@@ -235,32 +229,32 @@ def bent(
                 np.interp(at_node, np.arange(count), values[j, nodes_there])
                 for values in (section.edge_spine, section.edge_near, section.area)
             )
-            flexures[int(j)] = Sections(frames, places_there, spine, near, area)
-    return Bent(robot, chain, rotation, position, [flexures[j] for j in range(len(counts))])
+            flexures[int(j)] = FlexureShape(frames, places_there, spine, near, area)
+    return RobotShape(robot, chain, rotation, position, [flexures[j] for j in range(len(counts))])
 
 
-def bent_at(path: EquilibriumPath, step: int, pieces: int = FLEXURE_POINTS) -> Bent:
-    """Return the robot of a path at one of its steps; for `pieces` see `bent`."""
+def shape_at(path: EquilibriumPath, step: int, pieces: int = FLEXURE_POINTS) -> RobotShape:
+    """Return the shape of a robot at one step of a path; for `pieces` see `shape_from_modes`."""
     modes, own = path.run.solved.point.unknowns.modes[step], path.chain
     chain = _of_space(path.robot, own.level, own.refinement)
     places, turns = path.body_position[step], path.body_rotation[step]
-    return bent(path.robot, chain, modes, places, turns, pieces)
+    return shape_from_modes(path.robot, chain, modes, places, turns, pieces)
 
 
 @lru_cache(maxsize=16)
 def _of_space(robot: Robot, level: str, refinement: int) -> Chain:
-    """The robot's chain with its flexures in space, whose modes are those of the flat one."""
+    """Return the chain of a robot with its flexures in space, with the modes of the flat one."""
     from notchflex.mechanics.chain import assemble
 
     return assemble(robot, level, refinement=refinement, flat=False)
 
 
-def bent_by_angles(
+def shape_from_angles(
     robot: Robot, notch_angle: Points, pieces: int = FLEXURE_POINTS, level: str = "tendons"
-) -> Bent:
-    """Return a robot whose notches have given angles [rad], (n,), as measured ones have.
+) -> RobotShape:
+    """Return the shape of a robot whose notches have given angles [rad], (n,).
 
-    For `pieces` see `bent`; `level` is that of the chain, which decides on the nodes of its rods.
+    For `pieces` see `shape_from_modes`; `level` is that of the chain, with the nodes of its rods.
     """
     from notchflex.analysis import bodies_from_angles
     from notchflex.mechanics.contact import free_angle
@@ -269,4 +263,4 @@ def bent_by_angles(
     modes = np.zeros(np.shape(chain.stiffness))
     modes[:, 0] = notch_angle - free_angle(chain.rods)
     position, rotation = bodies_from_angles(robot, notch_angle[None])
-    return bent(robot, chain, modes, position[0], rotation[0], pieces)
+    return shape_from_modes(robot, chain, modes, position[0], rotation[0], pieces)

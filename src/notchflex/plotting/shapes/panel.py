@@ -1,0 +1,221 @@
+"""The panel of a robot to scale at several loads: from the side, or in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.plotting.branches import by_stroke, driven_by_stroke
+from notchflex.plotting.shapes.applied_loads import (
+    COLOUR,
+    AppliedLoad,
+    applied_loads,
+    out_of_plane,
+)
+from notchflex.plotting.shapes.faces import body_faces, flexure_faces, shaded
+from notchflex.plotting.shapes.outline import bending_plane, outline, project
+from notchflex.plotting.shapes.robot_shape import RobotShape, shape_at
+from notchflex.plotting.sheet import (
+    BESIDE,
+    FINE,
+    Area,
+    Arrow,
+    Colour,
+    Faces,
+    Line,
+    Mark,
+    Note,
+    Panel,
+    dots,
+)
+from notchflex.plotting.style import GREY, ORANGE, VERMILLION, rgb, sequence_colours
+
+if TYPE_CHECKING:
+    from notchflex.results import EquilibriumPath
+
+MOST_SHAPES = 5
+"""More shapes than this hide each other."""
+
+ARROW, SHORTEST = 0.18, 0.25
+"""Longest arrow in lengths of the robot, and shortest arrow in lengths of the longest."""
+
+_NOTHING = 1e-6
+"""A tension [N] or stroke [mm] less than this is written as 0."""
+
+
+def representative_steps(
+    path: EquilibriumPath, most: int = MOST_SHAPES, among: Sequence[int] | None = None
+) -> list[int]:
+    """Return the steps to draw: an even selection of the shapes of the robot.
+
+    Args:
+        path: Solved path.
+        most: Maximum number of steps.
+        among: The steps to choose from; all if None.
+
+    Returns:
+        Indices of converged steps, from the straightest to the most bent; of equal shapes the
+        first.
+    """
+    good = np.flatnonzero(np.asarray(path.converged) & np.isfinite(path.total_angle))
+    if among is not None:
+        good = np.array([step for step in among if step in good], int)
+    if not len(good):
+        return []
+    bend = np.abs(path.notch_angle[good]).sum(axis=1)
+    chosen: list[int] = []
+    for target in np.linspace(bend.min(), bend.max(), most):
+        step = int(good[np.argmin(np.abs(bend - target))])
+        near = any(np.ptp([path.total_angle[step], path.total_angle[c]]) < 1e-6 for c in chosen)
+        if step not in chosen and not (near and np.ptp(bend) < 1e-6):
+            chosen.append(step)
+    return chosen
+
+
+def plane_of(path: EquilibriumPath) -> float | None:
+    """Return the direction across the base [rad] of the plane that holds a path, if one does."""
+    view = bending_plane(path.robot)
+    if view is None:
+        return None
+    steps = representative_steps(path)
+    leaves = [out_of_plane(path, step, shape_at(path, step), view) for step in steps]
+    return None if max(leaves, default=0.0) > 1e-6 else view
+
+
+def shape_panel(
+    path: EquilibriumPath,
+    steps: Sequence[int],
+    view: float | None,
+    *,
+    title: str = "",
+    colours: Sequence[Colour] | None = None,
+    legend: str = BESIDE,
+) -> Panel:
+    """Return a robot at several steps of a path, to scale, with its loads.
+
+    Args:
+        path: Solved path.
+        steps: Indices of the steps.
+        view: Direction across the base that is drawn to the right [rad]; None to draw in space.
+        title: Title of the panel.
+        colours: A colour for each step; from dark to light if None.
+        legend: Position of the legend.
+    """
+    if not steps:
+        view = view or 0.0
+    items: list[Mark] = []
+    closed: list[NDArray[np.float64]] = []
+    loads: list[AppliedLoad] = []
+    colours = sequence_colours(len(steps)) if colours is None else colours
+    for order, (step, colour) in enumerate(zip(steps, colours, strict=True)):
+        shape, label = shape_at(path, step), load_label(path, step)
+        if view is None:
+            items += _in_space(shape, colour, label, first=not order)
+        else:
+            items += _from_the_side(shape, view, colour, label, order)
+        closed += [shape.lips(int(notch)) for notch in np.flatnonzero(path.closed[step])]
+        loads += applied_loads(path, step, shape)
+    top, extent = 3 * len(steps) + 5, _extent(path)
+    if closed:
+        points = np.array(closed) if view is None else project(closed, view)
+        name = "closed notch"
+        items.append(dots(points, VERMILLION, 3.5, name=name, group=name, layer=top))
+    items += _load_arrows(loads, view, ARROW * extent, top + 1)
+    if not steps:
+        items.append(Note("no step was solved"))
+    legend = legend if steps else ""
+    if view is None:
+        labels = "x [mm]", "y [mm]", "z, along the base [mm]"
+        return Panel(items, *labels, title=title, legend=legend)
+    labels = f"across the base, {_across_name(view)} [mm]", "along the base, z [mm]"
+    return Panel(items, *labels, title=title, legend=legend, equal=True, scale="shape")
+
+
+def load_label(path: EquilibriumPath, step: int) -> str:
+    """Return the name of a step in a legend: its load, and its total angle.
+
+    The strokes where strokes are prescribed, and the tensions otherwise.
+    """
+    angle = round(float(np.degrees(path.total_angle[step])), 1) + 0.0  # no minus before a zero
+    drawn = driven_by_stroke(path) or [
+        tendon for tendon in range(path.tension.shape[1]) if by_stroke(path, tendon)
+    ]
+    values, unit = (path.stroke[step, drawn], "mm") if drawn else (path.tension[step], "N")
+    numbers = (f"{0.0 if abs(one) < _NOTHING else one:.3g}" for one in values)
+    return f"{', '.join(numbers)} {unit}, {angle:.1f}°"
+
+
+def scaled_arrow(one: AppliedLoad, largest: float, longest: float) -> NDArray[np.float64]:
+    """Return the arrow of a load [mm]: `longest` for the largest load, never too short to see."""
+    return longest * max(one.size / largest, SHORTEST) * one.vector / one.size
+
+
+def _across_name(view: float) -> str:
+    degrees = round(float(np.degrees(view)), 6) % 360
+    return {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
+
+
+def _extent(path: EquilibriumPath) -> float:
+    """Return the approximate length of a robot [mm]."""
+    steps = np.diff(path.body_position[0], axis=0)
+    return float(np.linalg.norm(steps, axis=1).sum() + path.robot.tube.outer_diameter)
+
+
+def _from_the_side(
+    shape: RobotShape, view: float, colour: Colour, label: str, order: int
+) -> Iterator[Mark]:
+    drawn, level = outline(shape, view), 3 * order
+    if not order:  # the clamp does not move: it is drawn once
+        yield Area([drawn.held], GREY, GREY, 0.5, layer=1)
+    # Pale and nearly opaque, so that lines of shapes behind others can be seen.
+    pale = tuple(1.0 - 0.3 * (1.0 - part) for part in rgb(colour))
+    look: dict[str, Any] = {"group": label}
+    polygons = [*drawn.flexures, *drawn.bodies]
+    yield Area(polygons, pale, colour, name=label, layer=2 + level, **look)
+    gap = np.full((1, 2), np.nan)
+    bores = np.concatenate([part for line in drawn.bores for part in (line, gap)])
+    yield Line(bores, colour, FINE, 0.5, layer=3 + level, **look)
+    for line in drawn.tendons:
+        yield Line(line, ORANGE, width=1.0, layer=4 + level, **look)
+
+
+def _in_space(shape: RobotShape, colour: Colour, label: str, first: bool) -> Iterator[Mark]:
+    base, *bodies = body_faces(shape)
+    if first:  # the base does not move: it is drawn once
+        yield Faces(base, shaded(base, rgb(GREY)), GREY)
+    faces = np.concatenate([*bodies, *flexure_faces(shape)])
+    yield Faces(faces, shaded(faces, colour), colour, label, label)
+    for number in range(len(shape.robot.tendon)):
+        yield Line(shape.tendon(number), ORANGE, width=0.9, group=label, layer=5)
+
+
+def _load_arrows(
+    loads: Sequence[AppliedLoad], view: float | None, longest: float, layer: int
+) -> Iterator[Arrow]:
+    """Yield forces as arrows; moments as arcs from the side, and as thin arrows in space."""
+    named: set[str] = set()
+    largest = {kind: max((one.size for one in loads if one.name == kind), default=0.0)
+               for kind in ("force", "moment")}  # fmt: skip
+    for one in loads:
+        look: dict[str, Any] = {"layer": layer, "name": "" if one.label in named else one.label}
+        named.add(one.label)
+        end = one.point + scaled_arrow(one, largest[one.name], longest)
+        if view is None:
+            if one.name == "moment" and look["name"]:
+                look["name"] += ", about its arrow"
+            width = 1.8 if one.name == "force" else 0.9
+            yield Arrow(one.point, end, COLOUR[one.kind], width=width, **look)
+        elif one.name == "force":
+            yield Arrow(project(one.point, view), project(end, view), COLOUR[one.kind], **look)
+        else:
+            # Seen with z up and the view to the right, a moment about +normal turns z to the right.
+            normal = np.array([-np.sin(view), np.cos(view), 0.0])
+            turn = -1.0 if one.vector @ normal > 0.0 else 1.0
+            start = project(one.point, view)
+            side = 0.4 * longest * turn * np.array([1.0, 0.0])
+            reach = np.array([start - longest, start + longest])
+            look |= {"bend": 0.9, "reach": reach}
+            yield Arrow(start - side, start + side, COLOUR[one.kind], **look)
