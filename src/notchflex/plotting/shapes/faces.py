@@ -36,7 +36,7 @@ def body_faces(shape: RobotShape) -> Iterator[Quads]:
 def flexure_faces(shape: RobotShape) -> Iterator[Quads]:
     """Yield every flexure: the wall at its spine, or a band with its thickness and area."""
     outer = shape.robot.tube.outer_radius
-    closes = np.asarray(shape.chain.rods.lip_closes) > 0.0
+    closes = np.asarray(shape.chain.rods.has_closure) > 0.0
     for one, spine in zip(shape.flexures, closes, strict=True):
         lines = _spine(one, outer) if spine else _band(one)
         along = np.stack([one.fibre(across, out) for across, out in lines], axis=1)
