@@ -12,11 +12,15 @@ contact waits for the one before.
 
 from __future__ import annotations
 
+from typing import Any
+
 from jaxtyping import Array, Float
 
-from notchflex._jax import jnp
+from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.friction.registry import LEAST_RATIO
 from notchflex.solver.element import Memory
+from notchflex.solver.residual import holds
 
 # Tensions below this (N) count as slack, so that logarithms stay finite.
 _SLACK = 1e-100
@@ -43,6 +47,13 @@ def played(
     for group, remembered, limits in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
         numbers = jnp.array(group.numbers)
         old, new = (jnp.maximum(tension[numbers], _SLACK) for tension in (before, now))
+        none = jnp.zeros_like(group.natural_gap)  # a loss at rest is good enough for a guess
+        losses = chain.friction.constant_loss(none, none)
+        if losses is not None:
+            old, new = (chain.friction.least_taut(one, none, none) for one in (old, new))
+            loss = holds(group) * jnp.stack(losses, axis=-1)
+            guesses.append(_march(old, new, remembered, limits, loss))
+            continue
         change = jnp.broadcast_to(jnp.log(new / old)[None, :, None], remembered.shape)
         rise, fall = (_up_to(jnp.maximum(limits - way * remembered, 0.0)) for way in (1.0, -1.0))
         behind = jnp.maximum(change - rise, 0.0) + jnp.minimum(change + fall, 0.0)
@@ -60,3 +71,36 @@ def _up_to(values: Float[Array, "n t 2"]) -> Float[Array, "n t 2"]:
     """Sums over all edges up to each, base to tip."""
     both = jnp.cumsum(jnp.sum(values, axis=-1), axis=0)
     return jnp.stack([both - values[..., 1], both], axis=-1)
+
+
+def _march(
+    old: Float[Array, " t"],
+    new: Float[Array, " t"],
+    remembered: Float[Array, "n t 2"],
+    limits: Float[Array, "n t 2"],
+    loss: Float[Array, "n t 2"],
+) -> Float[Array, "n t 2"]:
+    """Predict log ratios contact by contact where sliding costs a constant force too.
+
+    Limits then depend on the tension, and no sum over several contacts tells what they hold.
+    """
+
+    def step(tensions: tuple[Array, Array], contact: tuple[Array, ...]) -> Any:
+        old, new = tensions
+        ratio, limit, force = contact
+        part = force / jnp.maximum(old, LEAST_RATIO * jnp.maximum(force, _SLACK))
+        pulled = limit + jnp.log(jnp.maximum(1.0 - part, LEAST_RATIO))
+        let_go = jnp.log(jnp.maximum(jnp.exp(limit) - part, 1.0))
+        bound = jnp.maximum(jnp.where(ratio < 0.0, let_go, pulled), 0.0)  # without the loss
+        behind = old * jnp.exp(-ratio)
+        lowest = jnp.maximum(new - force, LEAST_RATIO * new) * jnp.exp(-bound)
+        onward = jnp.clip(behind, lowest, new * jnp.exp(bound) + force)
+        guess = jnp.log(new / onward)
+        stuck = (1.0 - 1e-13) * ratio
+        return (behind, onward), jnp.where(new == old, stuck, guess)
+
+    edges = tuple(
+        jnp.moveaxis(values, 2, 1).reshape(-1, len(old)) for values in (remembered, limits, loss)
+    )
+    guesses = jax.lax.scan(step, (old, new), edges)[1]
+    return jnp.moveaxis(guesses.reshape(-1, 2, len(old)), 1, 2)

@@ -18,6 +18,7 @@ Only the geometry of a span, an opening or a rod is differentiated by JAX, on it
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple, cast
 
 from jaxtyping import Array, Float
@@ -236,16 +237,22 @@ def _friction(
 ) -> Float[Array, "n 2t z"]:
     """Rows of the memory law of both edges."""
     group, span, own = chain.groups[k], at.spans[k], unknowns.log_ratio[k]
-    exit_turning, entry_turning = span.crossing.exit_turning, span.crossing.entry_turning
-    none, one = jnp.zeros_like(exit_turning), jnp.ones_like(exit_turning)
-    slopes = [
-        jax.jvp(chain.friction.bounds, (exit_turning, entry_turning), way)[1]
-        for way in ((one, none), (none, one))
-    ]
+    crossing, ahead = span.crossing, span.gap_tension / span.tension_ratio[..., 0]
+    turning, tension = (crossing.exit_turning, crossing.entry_turning), (ahead, span.gap_tension)
+    none, one = jnp.zeros_like(ahead), jnp.ones_like(ahead)
+
+    def slope(turns: tuple[Array, Array], pulls: tuple[Array, Array]) -> Array:
+        """Change of the limits with turning angles and tensions, where contacts can slide."""
+        limits = partial(chain.friction.limits, log_ratio=own)
+        return holds(group) * jax.jvp(limits, (*turning, tension), (*turns, pulls))[1]
+
     # Edges, then the turning angles that they depend on.
-    slope = jnp.stack([jnp.stack(by_one, axis=-1) for by_one in slopes], axis=-1)
-    limit = jnp.einsum("ntes,nstz->ntez", holds(group)[..., None] * slope, strand.turning)
-    limit = unit.spread(limit)
+    by_turning = jnp.stack([slope(way, (none, none)) for way in ((one, none), (none, one))], -1)
+    limit = unit.spread(jnp.einsum("ntes,nstz->ntez", by_turning, strand.turning))
+    if chain.friction.constant_loss(*turning) is not None:
+        before = jnp.broadcast_to(unit.tension[k][None], strand.gap_tension.shape)
+        rows = jnp.stack([before, strand.gap_tension], axis=2)
+        limit = limit + slope((none, none), (one, one))[..., None] * rows
     height = heights(chain)[:, None, None, None]
     stuck = -RATE * (strand.at_edges / height - strand.log_ratio[None] / STICTION)
     value, bound = driven(chain, own, span.slid, memory, k), span.bound

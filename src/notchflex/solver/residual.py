@@ -35,7 +35,7 @@ class Spans(NamedTuple):
         released_length_behind: As `released_length`, this gap included.
         stretch_behind: As `stretch`, this gap and the body included.
         slid: Tendon slid over both edges toward the base, by the memory's stiffness.
-        bound: Largest log ratio at both edges.
+        bound: Largest log ratio at both edges, in the direction of the present one.
     """
 
     crossing: Crossing
@@ -238,10 +238,12 @@ def _spans(
     group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
-    at_base = base_tension[jnp.array(group.numbers)][None]
+    turning = crossing.exit_turning, crossing.entry_turning
+    at_base = chain.friction.least_taut(base_tension[jnp.array(group.numbers)], *turning)[None]
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
-    gap_tension = runs * tension_ratio[..., 0] * _from_base_side(beyond_both, at_base[0])
+    handed_on = _from_base_side(beyond_both, at_base[0])
+    gap_tension = runs * tension_ratio[..., 0] * handed_on
     body_tension = tension_ratio[..., 1] * gap_tension
     shortening = runs * (group.natural_gap - crossing.length)
     in_body = body_tension * group.body_length
@@ -251,7 +253,7 @@ def _spans(
     stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None]
     at_exit = behind[0] + behind[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
-    bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
+    limits = chain.friction.limits(*turning, (handed_on, gap_tension), log_ratio)
     return Spans(
         crossing=crossing,
         tension_ratio=tension_ratio,
@@ -262,7 +264,7 @@ def _spans(
         released_length_behind=behind[0],
         stretch_behind=behind[1],
         slid=jnp.stack([at_exit, at_entry], axis=-1),
-        bound=holds(group) * jnp.stack(bounds, axis=-1),
+        bound=holds(group) * limits,
     )
 
 

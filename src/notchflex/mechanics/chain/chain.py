@@ -158,7 +158,7 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    chord = getattr(robot.friction, "turning", None) == "chord"
+    chord = robot.friction.turns_with_chord
     shaped = _shaped(robot.tube, robot.notches, robot.tendon, level, refinement, chord)
     rods, laid, body_length = shaped.rods, shaped.laid, shaped.body_length
     body_mass, body_centre = body_masses(robot, rods)

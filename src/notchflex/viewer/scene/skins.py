@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.plotting.shapes.bent import Bent, Sections, bent_by_angles
-from notchflex.robot import ArcNotch, Robot
+from notchflex.robot import Robot
 
 PIECES = 12  # straight pieces that a bent flexure is drawn with, at least
 ROUND = 12  # flat pieces of a spine, as seen along the tube
@@ -75,9 +75,8 @@ def _spine(rest: Bent, notch: int) -> Skin:
     description = rest.robot.notches[notch]
     axis = outer - one.spine  # from the neutral axis to the axis of the tube
     # Where the cut meets the outer surface; radial edges go on from there to the axis.
-    arc = isinstance(description, ArcNotch)
-    cut = outer - description.depth if arc else float(one.near[0] - axis[0])
-    radial = arc and description.cut == "on-axis"
+    depth, radial = description.spine_cut or (outer - float(one.near[0] - axis[0]), False)
+    cut = outer - depth
     half_outer = float(np.arccos(np.clip(-cut / outer, -1.0, 1.0)))
     half_inner = half_outer if radial else float(np.arccos(np.clip(-cut / inner, -1.0, 1.0)))
     part = np.linspace(-1.0, 1.0, ROUND + 1)
