@@ -1,8 +1,7 @@
 """The law of a material that softens."""
 
 from notchflex._jax import constant
-from notchflex.mechanics.material import section_law as law
-from notchflex.mechanics.material.registry import section_law
+from notchflex.mechanics.material import law
 from notchflex.robot.materials.softening import Softening
 
 
@@ -27,7 +26,7 @@ class SofteningLaw(law.SectionLaw):
         return 0.5 * linear @ strain - linear[1] * strain[1] * part / 12.0
 
 
-@section_law.register
+@law.section_law.register
 def _(material: Softening) -> SofteningLaw:
     modulus = constant(material.elastic_modulus)
     shear = modulus / (2.0 * (1.0 + material.poisson_ratio))
