@@ -18,7 +18,7 @@ from notchflex._jax import constant, jax
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import FibreSection
-from notchflex.mechanics.motion import Motion, rotation_about
+from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import Section
 
 STRAIGHT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -140,7 +140,9 @@ def build_rod(
     points = axis.quadrature
     nodes = len(points.at_nodes[0])
     strain = np.tile(STRAIGHT, (len(points.every), 1)) if axis.strain is None else axis.strain
-    turned = rotation_about(constant([0.0, 0.0, np.radians(direction_deg)]))
+    # Written out: opposite directions then mirror each other to the last bit.
+    cosine, sine = np.cos(np.radians(direction_deg)), np.sin(np.radians(direction_deg))
+    turned = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     curve, curve_end, beside = None, shifted(), strain
     if axis.curve is not None:
         curve, curve_end = (Motion(*(part[at] for part in axis.curve)) for at in (slice(-1), -1))
