@@ -102,8 +102,8 @@ def test_a_new_wrist_is_warned_of_its_strain(monkeypatch, tmp_path, capsys):
 @pytest.mark.parametrize("word", ["<", "back"])
 def test_a_person_goes_back(monkeypatch, tmp_path, capsys, word):
     asked = person(
-        monkeypatch, word, "mine", "1.62", "1.4", word, word, "1.8", "1.5", "", "off", "2", "1.2",
-        *[""] * 20,
+        monkeypatch, word, "mine", "1.62", "1.4", word, word, "1.8", "1.5", "", "", "off", "2",
+        "1.2", *[""] * 20,
     )  # fmt: skip
     options = {"--height": "1", "--uncut-length": "1"}
     assert run(["new", "w", *(part for pair in options.items() for part in pair)]) == 0
@@ -122,7 +122,9 @@ def test_a_person_goes_back(monkeypatch, tmp_path, capsys, word):
 
 def test_prompts_are_broken_at_words(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "50")
-    asked = person(monkeypatch, "", "1.62", "1.4", "", "on-axis", "3", "1.3", "1", "1", *[""] * 10)
+    asked = person(
+        monkeypatch, "", "1.62", "1.4", "", "", "on-axis", "3", "1.3", "1", "1", *[""] * 11
+    )
     assert run(["new", "w"]) == 0
     shown = [*capsys.readouterr().out.splitlines()[:-1], *asked]
     assert max(map(len, shown)) <= 50
@@ -150,8 +152,8 @@ def test_answers_come_line_by_line_from_a_pipe(monkeypatch, tmp_path):
 
 def test_a_person_is_asked_again_and_told_why(monkeypatch, tmp_path, capsys):
     tube = ["", "1,62", "1.62", "1.7", "1.40", ""]
-    notches = ["x", "on-axis", "0", "2", "9", "1.4", "0.8", "1.2", "", ""]
-    rest = ["", "", "linear", "60000", "0", "0.01"]
+    notches = ["", "x", "on-axis", "0", "2", "9", "1.4", "0.8", "1.2", "", ""]
+    rest = ["", "", "linear", "60000", "", "0", "0.01"]
     asked = person(monkeypatch, *tube, *notches, *rest)
     assert run(["new", "asked"]) == 0
     robot = load_robot(tmp_path / "asked.toml")
@@ -216,3 +218,69 @@ def test_readings():
     for bad in ("", "1,2", "1/0", "True", "(", "2**3"):
         with pytest.raises(InputError):
             reading(bad)
+
+
+TUBE = ["--outer-diameter", "5.99", "--inner-diameter", "4"]
+LINK = [
+    "--kind", "u-link", "--notches", "5", "--set", "notch.slot_radius=0.275", "--set",
+    "notch.strip_thickness=0.7", "--set", "notch.strip_length=2", "--set",
+    "notch.proximal_slot=away", "--tendon-radius", "2.5", "--material", "linear",
+    "--elastic-modulus", "60000",
+]  # fmt: skip
+
+
+def test_a_row_of_links_by_options(monkeypatch):
+    pipe(monkeypatch)
+    friction = ["--friction-kind", "corner", "--friction", "0.3", "--set", "friction.turning=slope"]
+    assert run(["new", "w", "--yes", *TUBE, *LINK, *friction]) == 0
+    robot = load_robot("w.toml")
+    assert [notch.kind for notch in robot.notch] == ["u-link"]
+    assert robot.notch[0].repeat == 5
+    assert robot.tendon[0].path == "straight"
+    assert (robot.friction.kind, robot.friction.coefficient) == ("corner", 0.3)
+
+
+def test_links_that_differ_keep_their_slots_in_turn(monkeypatch):
+    pipe(monkeypatch)
+    unlike = [
+        "notch.strip_thickness=0.7,0.7,0.7,0.8,0.8" if "thickness" in one else one for one in LINK
+    ]
+    assert run(["new", "w", "--yes", *TUBE, *unlike]) == 0
+    robot = load_robot("w.toml")
+    assert [notch.repeat for notch in robot.notch] == [3, 2]
+    assert [one.proximal_slot for one in robot.notches] == [
+        "away",
+        "toward",
+        "away",
+        "toward",
+        "away",
+    ]
+
+
+def test_a_person_is_asked_for_every_key_of_a_strip(monkeypatch):
+    answers = ["", "10", "6", "", "strip", "7", "3.5", "1.5", "6.9", "", "", "", "0", "", ""]
+    rest = ["4", "", "linear", "1000", "frictionless", ""]
+    asked = person(monkeypatch, *answers, *rest)
+    assert run(["new", "w"]) == 0, asked
+    robot = load_robot("w.toml")
+    assert (robot.notch[0].kind, robot.notch[0].strip_length) == ("strip", None)
+    assert robot.friction.kind == "frictionless"
+
+
+def test_capstan_and_linear_take_further_keys(monkeypatch):
+    pipe(monkeypatch)
+    arc = ["--cut", "on-axis", "--notches", "1", "--depth", "4", "--height", "1"]
+    further = ["--set", "friction.constant_loss=0.05", "--set", "material.density=6450"]
+    linear = ["--material", "linear", "--elastic-modulus", "60000"]
+    assert run(["new", "w", "--yes", *TUBE, *arc, "--uncut-length", "1", *linear, *further]) == 0
+    robot = load_robot("w.toml")
+    assert (robot.friction.constant_loss, robot.material.density) == (0.05, 6450.0)
+
+
+@pytest.mark.parametrize(
+    "wrong", ["notch.slot_radius", "tube.x=1", "notch.cut=on-axis", "friction.nonsense=1"]
+)
+def test_a_set_that_nothing_asks_for_writes_nothing(monkeypatch, tmp_path, wrong):
+    pipe(monkeypatch)
+    assert run(["new", "w", "--yes", *TUBE, *LINK, "--set", wrong]) == 2
+    assert list(tmp_path.iterdir()) == []

@@ -14,7 +14,6 @@ from notchflex.mechanics.chain import Chain, assemble
 from notchflex.mechanics.contact import closing_travel, free_angle
 from notchflex.mechanics.flexure import relative_pose
 from notchflex.mechanics.motion import Motion
-from notchflex.mechanics.tendon.wall_arc import WallArc
 from notchflex.robot import Robot
 from notchflex.solver.body_poses import body_poses
 from notchflex.solver.programs.prepare import prepare
@@ -135,17 +134,14 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
     if not np.isfinite(drawn).all():
         raise InputError.NOT_FINITE("a stroke is not finite; give strokes in mm")
     chain = assemble(robot, flat=False)
-    first = next(
-        (g for g in chain.groups if isinstance(g, WallArc) and 0 in g.numbers),
-        None,
-    )
-    if first is None:
+    first = next(group for group in chain.groups if 0 in group.numbers)
+    if first.fibre is None:
         raise InputError.UNSUPPORTED(
             'the kinematic model needs a first tendon with path = "wall-arc"; '
             f"the first tendon of {robot.name} has another"
         )
     column = first.numbers.index(0)
-    arm = np.asarray(first.across[:, column, 0])
+    arm = np.asarray(first.fibre[:, column, 0])
     if not (np.asarray(first.present[:, column]) * arm > 0.0).all():
         raise InputError.UNSUPPORTED(
             "the kinematic model needs a first tendon that crosses every notch on the side to "

@@ -60,9 +60,13 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load the writing of robot files, and what it needs to keep comments, on first use."""
-    if name not in {"robot_text", "save_robot"}:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from notchflex.robot import writing
+    """Load the writing of robot files on first use, and find kinds of parts that are not listed."""
+    if name in {"robot_text", "save_robot"}:
+        from notchflex.robot import writing
 
-    return getattr(writing, name)
+        return getattr(writing, name)
+    for base in (Notch, Material, Friction) if name[:1].isupper() else ():
+        for kind in kinds_of(base).values():
+            if kind.__name__ == name:
+                return kind
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

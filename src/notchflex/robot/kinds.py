@@ -67,6 +67,15 @@ class Notch:
         del tendon
         yield from ()
 
+    @property
+    def spine_cut(self) -> tuple[float, bool] | None:
+        """Depth [mm] of the one cut that leaves the spine, and whether its edges are radial.
+
+        None where the notch has no spine, or one of another shape; pictures then make do with the
+        sections of its rod.
+        """
+        return None
+
     def expanded(self) -> tuple["Notch", ...]:
         """Return the notches that this one stands for: `repeat` of them, each with `repeat` 1."""
         return (dataclasses.replace(self, repeat=1),) * self.repeat
@@ -134,6 +143,11 @@ class Friction:
     """
 
     kind: str
+
+    @property
+    def turns_with_chord(self) -> bool:
+        """Whether a tendon turns with the chord of a strip, not with the body behind it."""
+        return False
 
 
 _FOLDERS = {Notch: "notches", Material: "materials", Friction: "friction"}

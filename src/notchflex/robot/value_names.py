@@ -108,7 +108,7 @@ def parse_assignment(text: str) -> tuple[str, object]:
         raise InputError.BAD_SYNTAX(
             f"`{text}` sets nothing; {_EXAMPLES.replace('depth', 'depth=1.3', 1)}."
         )
-    return path, _value(value)
+    return path, parse_value(value)
 
 
 def number_at(robot: Robot, path: str) -> float:
@@ -182,7 +182,8 @@ def described_at(robot: Robot, path: str) -> Described:
     )
 
 
-def _value(text: str) -> object:
+def parse_value(text: str) -> object:
+    """Read a value as a robot file holds it: a number, true or false, or else text."""
     for read in (int, float, lambda one: tomllib.loads(f"x = {one}")["x"]):
         try:
             return read(text)

@@ -10,7 +10,6 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.contact import closing_travel
 from notchflex.mechanics.flexure import fibre_stretch, of_rod
-from notchflex.mechanics.tendon.wall_arc import WallArc
 from notchflex.solver.residual import BaseReaction
 
 
@@ -33,8 +32,8 @@ def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
     if not np.isfinite(travel).all():
         return closing
     for group in chain.groups:
-        if isinstance(group, WallArc):
-            weights = of_rod(chain.rods, fibre_stretch(constant(group.across)))
+        if group.fibre is not None:
+            weights = of_rod(chain.rods, fibre_stretch(constant(group.fibre)))
             slope = np.einsum("ntc,nic,ni->nt", weights, rods.basis[..., 0], rods.length)
             loss = np.asarray(group.present) * -slope * travel[:, None]
             closing[list(group.numbers)] = np.where(loss < 0.0, np.inf, loss).sum(axis=0)

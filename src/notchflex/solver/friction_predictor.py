@@ -12,13 +12,17 @@ are found at once.
 
 from __future__ import annotations
 
+from typing import Any
+
 from jaxtyping import Array, Float
 
-from notchflex._jax import jnp
+from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.friction.registry import LEAST_RATIO
 from notchflex.solver.block_elimination import Iterate
 from notchflex.solver.element import Memory
+from notchflex.solver.residual import slip_mask
 
 LARGEST_LOG_RATIO = 1.0
 """A step may change a log ratio by so much; beyond, the linear model says nothing of use."""
@@ -47,6 +51,13 @@ def predict_log_ratios(
         old, new = (
             jnp.maximum(tension[numbers], _SLACK) for tension in (last_tension, base_tension)
         )
+        none = jnp.zeros_like(group.natural_gap)  # a loss at rest is good enough for a prediction
+        losses = chain.friction.constant_loss(none, none)
+        if losses is not None:
+            old, new = (chain.friction.least_taut(one, none, none) for one in (old, new))
+            loss = slip_mask(group) * jnp.stack(losses, axis=-1)
+            predicted.append(_march(old, new, old_ratio, bound, loss))
+            continue
         change = jnp.broadcast_to(jnp.log(new / old)[None, :, None], old_ratio.shape)
         rise, fall = (_cumulate(jnp.maximum(bound - side * old_ratio, 0.0)) for side in (1.0, -1.0))
         behind = jnp.maximum(change - rise, 0.0) + jnp.minimum(change + fall, 0.0)
@@ -117,3 +128,36 @@ def predict_contacts(
     return Iterate(
         step.unknowns._replace(log_ratio=tuple(logs)), (tension - point.base_tension) / part
     )
+
+
+def _march(
+    old: Float[Array, " t"],
+    new: Float[Array, " t"],
+    remembered: Float[Array, "n t 2"],
+    limits: Float[Array, "n t 2"],
+    loss: Float[Array, "n t 2"],
+) -> Float[Array, "n t 2"]:
+    """Predict log ratios contact by contact where sliding costs a constant force too.
+
+    Limits then depend on the tension, and no sum over several contacts tells what they hold.
+    """
+
+    def step(tensions: tuple[Array, Array], contact: tuple[Array, ...]) -> Any:
+        old, new = tensions
+        ratio, limit, force = contact
+        part = force / jnp.maximum(old, LEAST_RATIO * jnp.maximum(force, _SLACK))
+        pulled = limit + jnp.log(jnp.maximum(1.0 - part, LEAST_RATIO))
+        let_go = jnp.log(jnp.maximum(jnp.exp(limit) - part, 1.0))
+        bound = jnp.maximum(jnp.where(ratio < 0.0, let_go, pulled), 0.0)  # without the loss
+        behind = old * jnp.exp(-ratio)
+        lowest = jnp.maximum(new - force, LEAST_RATIO * new) * jnp.exp(-bound)
+        onward = jnp.clip(behind, lowest, new * jnp.exp(bound) + force)
+        guess = jnp.log(new / onward)
+        stuck = (1.0 - 1e-13) * ratio
+        return (behind, onward), jnp.where(new == old, stuck, guess)
+
+    edges = tuple(
+        jnp.moveaxis(values, 2, 1).reshape(-1, len(old)) for values in (remembered, limits, loss)
+    )
+    guesses = jax.lax.scan(step, (old, new), edges)[1]
+    return jnp.moveaxis(guesses.reshape(-1, 2, len(old)), 1, 2)

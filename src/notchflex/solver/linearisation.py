@@ -17,6 +17,7 @@ JAX differentiates only the geometry of a span, a contact or a rod, each on its 
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple, cast
 
 from jaxtyping import Array, Float
@@ -287,19 +288,25 @@ def _by_turn(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
 def _friction_rows(here: _Linearisation, k: int) -> Float[Array, "n 2t z"]:
     """Rows of the friction law of both edges, of the k-th group."""
     chain, span, tendon = here.chain, here.at.spans[k], here.tendons[k]
-    exit_turning, entry_turning = span.crossing.exit_turning, span.crossing.entry_turning
-    none, one = jnp.zeros_like(exit_turning), jnp.ones_like(exit_turning)
-    slopes = [
-        jax.jvp(chain.friction.bounds, (exit_turning, entry_turning), direction)[1]
-        for direction in ((one, none), (none, one))
-    ]
+    log_ratio, group = here.unknowns.log_ratio[k], here.chain.groups[k]
+    crossing, ahead = span.crossing, span.gap_tension / span.tension_ratio[..., 0]
+    turning, tension = (crossing.exit_turning, crossing.entry_turning), (ahead, span.gap_tension)
+    none, one = jnp.zeros_like(ahead), jnp.ones_like(ahead)
+
+    def slope(turns: tuple[Array, Array], pulls: tuple[Array, Array]) -> Array:
+        """Change of the limits with turning angles and tensions, where contacts can slide."""
+        limits = partial(chain.friction.limits, log_ratio=log_ratio)
+        return slip_mask(group) * jax.jvp(limits, (*turning, tension), (*turns, pulls))[1]
+
     # Edges, then the turning angles that they depend on.
-    slope = jnp.stack([jnp.stack(by_one, axis=-1) for by_one in slopes], axis=-1)
-    slope = slip_mask(chain.groups[k])[..., None] * slope
-    limit = here.unit.spread(jnp.einsum("ntes,nstz->ntez", slope, tendon.turning))
+    by_turning = jnp.stack([slope(way, (none, none)) for way in ((one, none), (none, one))], -1)
+    limit = here.unit.spread(jnp.einsum("ntes,nstz->ntez", by_turning, tendon.turning))
+    if chain.friction.constant_loss(*turning) is not None:
+        before = jnp.broadcast_to(here.unit.tension[k][None], tendon.gap_tension.shape)
+        rows = jnp.stack([before, tendon.gap_tension], axis=2)
+        limit = limit + slope((none, none), (one, one))[..., None] * rows
     height = notch_heights(chain)[:, None, None, None]
     stuck = -RATE * (tendon.at_edges / height - tendon.log_ratio[None] / STICTION)
-    log_ratio = here.unknowns.log_ratio[k]
     value, bound = trial_log_ratio(chain, log_ratio, span.slid, here.memory, k), span.bound
     upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
     slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)

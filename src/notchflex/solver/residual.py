@@ -37,7 +37,7 @@ class TendonSpans(NamedTuple):
         released_length: As `released_beyond`, with this gap.
         tension_length: As `tension_length_beyond`, with this gap and the distal body.
         slid: Tendon slid over both edges toward the base, with the stiffness of the friction law.
-        bound: Largest log ratio at both edges.
+        bound: Largest log ratio at both edges, in the direction of the present one.
     """
 
     crossing: Crossing
@@ -250,10 +250,12 @@ def _spans(
     group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
-    at_base = _of_group(base_tension, group)[None]
+    turning = crossing.exit_turning, crossing.entry_turning
+    at_base = chain.friction.least_taut(_of_group(base_tension, group), *turning)[None]
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
-    gap_tension = runs * tension_ratio[..., 0] * _shift_from_base(beyond_both, at_base[0])
+    transmitted = _shift_from_base(beyond_both, at_base[0])
+    gap_tension = runs * tension_ratio[..., 0] * transmitted
     body_tension = tension_ratio[..., 1] * gap_tension
     shortening = runs * (group.natural_gap - crossing.length)
     in_body = body_tension * group.body_length
@@ -263,7 +265,7 @@ def _spans(
     stiffness = _of_group(chain.memory_stiffness, group)[None]
     at_exit = summed[0] + summed[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
-    bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
+    limits = chain.friction.limits(*turning, (transmitted, gap_tension), log_ratio)
     return TendonSpans(
         crossing=crossing,
         tension_ratio=tension_ratio,
@@ -274,7 +276,7 @@ def _spans(
         released_length=summed[0],
         tension_length=summed[1],
         slid=jnp.stack([at_exit, at_entry], axis=-1),
-        bound=slip_mask(group) * jnp.stack(bounds, axis=-1),
+        bound=slip_mask(group) * limits,
     )
 
 

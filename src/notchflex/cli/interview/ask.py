@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from notchflex.errors import InputError
+from notchflex.robot.value_names import parse_value
 
 BACK = ("<", "back")
 """What a person types to be asked the previous question again."""
@@ -57,10 +58,21 @@ class Interview:
         self.given = given
         self.accept_defaults = accept_defaults
         self.defaulted: set[str] = set()
+        self.used: set[str] = set()
         self.person = sys.stdin is not None and sys.stdin.isatty()
         # What was typed so far, and how much of it has been asked for since the last way back.
         self._typed: list[str] = []
         self._asked = 0
+
+    def set_values(self, section: str) -> dict[str, Any]:
+        """Return what `--set` gave for a section, but for what a question asks; numbers as such."""
+        start = f"--set {section}."
+        self.used |= {option for option in self.given if option.startswith(start)}
+        return {
+            option.removeprefix(start): parse_value(said)
+            for option, said in self.given.items()
+            if option.startswith(start) and said is not None
+        }
 
     def conduct(self, questions: Callable[[Interview], Result]) -> Result:
         """Return what the answers make; a person may go back from question to question.
@@ -93,6 +105,7 @@ class Interview:
         """
         said = self.given.get(question.option)
         if said is not None:
+            self.used.add(question.option)
             return self._read(question, said)
         if question.default is not None and self.accept_defaults:
             return self._default(question)

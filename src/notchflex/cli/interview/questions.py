@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from notchflex.cli.interview.ask import Interview, Question
+from notchflex.cli.interview.kinds import ask_kind, ask_part, ask_row
 from notchflex.cli.interview.readings import choice, reading, readings, whole
 from notchflex.errors import InputError
 from notchflex.robot import ArcNotch, Capstan, Linear, Robot, Superelastic, Tendon, Tube
+from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.robot import MOST_NOTCHES
 
 ALLOWED_STRAIN = "0.08"
@@ -28,23 +31,16 @@ def interviewed(interview: Interview, name: str) -> Robot:
     title = ask(Question("--title", "Title", _title, default=name))
     tube = _ask_tube(interview)
     notches = _ask_notches(interview, tube)
-    tendons = _ask_tendons(interview, tube)
+    tendons = _ask_tendons(interview, tube, notches)
     material = _ask_material(interview)
-    coefficient = ask(
-        Question(
-            "--friction",
-            "Friction coefficient between tendon and tube",
-            lambda text: reading(text, at_least=0),
-            default="0.13",
-        )
-    )
+    friction = _ask_friction(interview)
     return Robot(
         name=title,
         tube=tube,
         notch=notches,
         tendon=tendons,
         material=_with_allowed_strain(interview, material),
-        friction=Capstan(coefficient),
+        friction=friction,
     )
 
 
@@ -75,7 +71,25 @@ def _ask_tube(interview: Interview) -> Tube:
     return Tube(outer_diameter=outer, inner_diameter=inner, base_length=base)
 
 
-def _ask_notches(interview: Interview, tube: Tube) -> tuple[ArcNotch, ...]:
+def _ask_friction(interview: Interview) -> Friction:
+    kind = ask_kind(interview, "--friction-kind", "Kind of friction", Friction, "capstan")
+    if kind is not Capstan:
+        return ask_part(interview, "friction", kind)
+    coefficient = interview.ask(
+        Question(
+            "--friction",
+            "Friction coefficient between tendon and tube",
+            lambda text: reading(text, at_least=0),
+            default="0.13",
+        )
+    )
+    return Capstan(coefficient, **interview.set_values("friction"))
+
+
+def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
+    kind = ask_kind(interview, "--kind", "Kind of notch", Notch, "arc")
+    if kind is not ArcNotch:
+        return ask_row(interview, kind)
     cut = interview.ask(
         Question(
             "--cut",
@@ -147,7 +161,9 @@ def _ask_notches(interview: Interview, tube: Tube) -> tuple[ArcNotch, ...]:
     )
 
 
-def _ask_tendons(interview: Interview, tube: Tube) -> tuple[Tendon, ...]:
+def _ask_tendons(
+    interview: Interview, tube: Tube, notches: tuple[Notch, ...]
+) -> tuple[Tendon, ...]:
     radii = interview.ask(
         Question(
             "--tendon-radius",
@@ -167,22 +183,32 @@ def _ask_tendons(interview: Interview, tube: Tube) -> tuple[Tendon, ...]:
             default="0" if len(radii) == 1 else None,
         )
     )
-    return tuple(
-        Tendon(radius=radius, direction_deg=direction)
+    further = interview.set_values("tendon")
+    tendons = [
+        Tendon(radius=radius, direction_deg=direction, **further)
         for radius, direction in zip(radii, directions, strict=True)
-    )
+    ]
+    # Over a strip or a link there is no arc of the wall: such a tendon runs straight.
+    no_arc = any("path" in dict(one.tendon_problems(tendons[0])) for one in notches)
+    if no_arc and "path" not in further:
+        tendons = [dataclasses.replace(tendon, path="straight") for tendon in tendons]
+    return tuple(tendons)
 
 
-def _ask_material(interview: Interview) -> Linear | Superelastic:
+def _ask_material(interview: Interview) -> Material:
     ask = interview.ask
+    kinds = tuple(dict.fromkeys(("superelastic", "linear", *kinds_of(Material))))
     kind = ask(
         Question(
             "--material",
-            "Material, superelastic or linear",
-            lambda text: choice(text, ("superelastic", "linear")),
+            f"Material, {' or '.join(kinds)}",
+            lambda text: choice(text, kinds),
             default="superelastic",
         )
     )
+    if kind not in ("superelastic", "linear"):
+        return ask_part(interview, "material", kinds_of(Material)[kind])
+    further: dict[str, Any] = interview.set_values("material")
     modulus = ask(
         Question(
             "--elastic-modulus",
@@ -193,7 +219,8 @@ def _ask_material(interview: Interview) -> Linear | Superelastic:
         )
     )
     if kind == "linear":
-        return Linear(elastic_modulus=modulus)
+        return Linear(elastic_modulus=modulus, **further)
+    values: dict[str, Any] = {"density": NITINOL_DENSITY, **further}
     return Superelastic(
         elastic_modulus=modulus,
         superelastic_modulus=ask(
@@ -212,13 +239,11 @@ def _ask_material(interview: Interview) -> Linear | Superelastic:
                 default="0.028",
             )
         ),
-        density=NITINOL_DENSITY,
+        **values,
     )
 
 
-def _with_allowed_strain(
-    interview: Interview, material: Linear | Superelastic
-) -> Linear | Superelastic:
+def _with_allowed_strain(interview: Interview, material: Material) -> Material:
     """Ask last for the strain to warn of: what was piped before this was asked still fits."""
     superelastic = isinstance(material, Superelastic)
     allowed = interview.ask(

@@ -23,6 +23,8 @@ MATERIAL = Group("Material and friction", sort_key=4)
 
 Answer = str | None
 
+_SECTIONS = ("notch", "tendon", "material", "friction")
+
 
 def _option(group: Group, text: str) -> Parameter:
     return Parameter(group=group, help=text, allow_leading_hyphen=True)
@@ -37,6 +39,9 @@ def new(
     inner_diameter: Annotated[Answer, _option(TUBE, "Inner diameter [mm].")] = None,
     base_length: Annotated[
         Answer, _option(TUBE, "Uncut length between the held end and the first notch [mm].")
+    ] = None,
+    kind: Annotated[
+        Answer, _option(NOTCHES, "Kind of notch: `arc`, or another that `notchflex schema` lists.")
     ] = None,
     cut: Annotated[
         Answer, _option(NOTCHES, "`on-axis` (laser, radial edges) or `off-axis` (saw, straight).")
@@ -61,7 +66,9 @@ def new(
     tendon_direction: Annotated[
         Answer, _option(TENDONS, "Side on which each tendon runs [deg]; 0 is x.")
     ] = None,
-    material: Annotated[Answer, _option(MATERIAL, "`superelastic` or `linear`.")] = None,
+    material: Annotated[
+        Answer, _option(MATERIAL, "`superelastic`, `linear`, or another kind of material.")
+    ] = None,
     elastic_modulus: Annotated[Answer, _option(MATERIAL, "Elastic modulus [MPa].")] = None,
     superelastic_modulus: Annotated[
         Answer, _option(MATERIAL, "Modulus of the superelastic branch [MPa].")
@@ -75,6 +82,17 @@ def new(
     allowed_strain: Annotated[
         Answer,
         _option(MATERIAL, "Strain beyond which a simulation warns; `none` for no warning."),
+    ] = None,
+    friction_kind: Annotated[
+        Answer, _option(MATERIAL, "Kind of friction: `capstan`, or another.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        Parameter(
+            name="--set",
+            negative=(),
+            help="Any other key of a part: `notch.slot_radius=0.275`, `friction.wrap=geometric`.",
+        ),
     ] = None,
     yes: Annotated[
         bool, Parameter(name=("--yes", "-y"), negative=(), help="Take all defaults unasked.")
@@ -93,8 +111,24 @@ def new(
             f"{path} is already there; choose another name, or remove it first."
         )
     check_output(str(path), "NAME")
+    further = [text.partition("=") for text in set_ or ()]
+    for key, equals, value in further:
+        section, dot, _ = key.partition(".")
+        if not (equals and dot and value) or section not in (
+            "notch",
+            "tendon",
+            "material",
+            "friction",
+        ):
+            raise InputError.BAD_SYNTAX(
+                f"--set {key}{equals}{value}: write it like notch.slot_radius=0.275, with one of "
+                f"{', '.join(_SECTIONS)}."
+            )
     interview = Interview(
         {
+            **{f"--set {key.strip()}": value.strip() for key, _, value in further},
+            "--kind": kind,
+            "--friction-kind": friction_kind,
             "--title": title,
             "--outer-diameter": outer_diameter,
             "--inner-diameter": inner_diameter,
@@ -118,6 +152,13 @@ def new(
         accept_defaults=yes,
     )
     robot = interview.conduct(lambda interview: interviewed(interview, path.stem))
+    idle = [
+        one for one in interview.given if one.startswith("--set ") and one not in interview.used
+    ]
+    if idle:
+        raise InputError.UNKNOWN_NAME(
+            f"{idle[0]}: no part of this robot asks for it, or another option does."
+        )
     text = commented(robot_text(robot), interview.defaulted)
     if path.exists():
         raise InputError.FILE_UNWRITABLE(

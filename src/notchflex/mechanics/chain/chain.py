@@ -242,7 +242,7 @@ class Shaped(NamedTuple):
 
 def shape_of(robot: Robot, level: str, refinement: int) -> Shaped:
     """What of a robot's chain follows from its shape alone."""
-    chord = getattr(robot.friction, "turning", None) == "chord"
+    chord = robot.friction.turns_with_chord
     return _shaped(robot.tube, robot.notches, robot.tendon, level, refinement, chord)
 
 

@@ -45,6 +45,17 @@ class ContactGroup(Pytree, ABC):
     has_contact: Float[Array, "*n l"]
     back: Int[Array, "*n l"]
 
+    def fibre(self, rods: Rod) -> Float[Array, "*n 2"] | None:
+        """Locate the fibre along which the contact force acts, mm from the neutral axis.
+
+        Args:
+            rods: All flexures.
+
+        Returns:
+            Its place in the section; None where the force acts on bodies.
+        """
+        del rods
+
     @abstractmethod
     def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
         """Lips at one flexure (of a group without its leading axis).

@@ -6,7 +6,7 @@ On the concentric arc of Pacheco 2021 the gap is h - (r_o + ybar) theta.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from notchflex._jax import constant
 from notchflex.mechanics.contact.pairs import ContactGroup, GapResponse
@@ -25,6 +25,10 @@ class SpineContact(ContactGroup):
     """One pair of lips at every notch that has a spine."""
 
     acts_on_bodies = False
+
+    def fibre(self, rods: Rod) -> Float[Array, "*n 2"]:
+        """Locate the fibre between the lips, mm from the neutral axis."""
+        return rods.closure
 
     def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
         """Length of the fibre between the lips."""

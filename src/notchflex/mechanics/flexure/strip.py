@@ -13,15 +13,18 @@ this strip is too stiff against sideways forces, though not against sideways mom
 from __future__ import annotations
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
-from numpy.typing import ArrayLike
 
-from notchflex._jax import constant, jax
+from notchflex._jax import constant
+from notchflex.mechanics.flexure.notch_rod import (
+    NeutralAxis,
+    about_neutral_axis,
+    build_rod,
+    legendre_modes,
+)
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.material import FibreSection
-from notchflex.mechanics.motion import Motion, rotation_about
+from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.robot import StripNotch, Tube
 
@@ -60,58 +63,26 @@ def strip_rod(
         (5, 5, 10)
     """
     length = notch.strip_length_in(tube)
-    places = RodQuadrature((0.0, length), (nodes,), (nodes,))
-    basis = _modes(2.0 * places.every / length - 1.0, bending_modes, more_sideways) / length
-    along = Motion(
-        constant(np.tile(np.eye(3), (len(places.every), 1, 1))),
-        constant(places.every[:, None] * np.array([0.0, 0.0, 1.0])),
+    points = RodQuadrature((0.0, length), (nodes,), (nodes,))
+    modes = legendre_modes(points, bending_modes, _SIDEWAYS + more_sideways, _TWIST + more_sideways)
+    along = np.append(points.every, length)
+    axis = NeutralAxis(
+        points,
+        start=Motion(constant(_LYING), constant([-0.5 * length, 0.0, notch.height])),
+        end=Motion(constant(_LYING.T), constant([0.0, 0.0, -0.5 * length])),
+        curve=Motion(
+            constant(np.tile(np.eye(3), (len(along), 1, 1))),
+            constant(along[:, None] * np.array([0.0, 0.0, 1.0])),
+        ),
     )
-    turned = rotation_about(constant([0.0, 0.0, np.radians(notch.direction_deg)]))
-    return Rod(
-        start_rotation=constant(turned @ _LYING),
-        start_offset=constant(turned @ np.array([-0.5 * length, 0.0, notch.height])),
-        curve_rotation=constant(np.eye(3)),
-        curve_offset=constant([0.0, 0.0, length]),
-        end_rotation=constant((turned @ _LYING).T),
-        end_offset=constant([0.0, 0.0, -0.5 * length]),
-        **places.fields(along, basis),
-        reference_strain=constant(np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (nodes, 1))),
-        section=_section(notch, tube, nodes),
-        closure=constant(np.zeros(2)),
-        has_closure=constant(0.0),
-        linear_kinematics=constant(float(notch.deflection == "small")),
-        chord=constant(1.0),
-        padding_mask=constant(np.zeros(basis.shape[-1])),
-        levels=(bending_modes, bending_modes, basis.shape[-1]),
-    )
-
-
-def _modes(place: np.ndarray, bending_modes: int, more_sideways: int) -> np.ndarray:
-    """Strain per mode times the length, at places from -1 to 1: (nodes, 6, modes)."""
-    sideways, twist = _SIDEWAYS + more_sideways, _TWIST + more_sideways
-    modes = np.zeros((len(place), 6, bending_modes + sideways + twist))
-    first = 0
-    for component, count in ((1, bending_modes), (0, sideways), (2, twist)):
-        modes[:, component, first : first + count] = legvander(place, count - 1)
-        first += count
-    return modes
-
-
-def _section(notch: StripNotch, tube: Tube, nodes: int) -> FibreSection:
-    """Both walls, their middles where the wall of the tube has its own; alike at all nodes."""
+    # Both walls, their middles where the wall of the tube has its own.
     middle = 0.5 * (tube.outer_radius + tube.inner_radius)
     walls = two_walls(0.5 * notch.wall_width_in(tube), notch.strip_thickness, middle)
-    torsion = clamped_torsion_constant(walls, middle, notch.strip_length_in(tube))
-
-    def at_all(value: ArrayLike) -> jax.Array:
-        return constant(np.full(nodes, value))
-
-    return FibreSection(
-        area=at_all(walls.area),
-        second_moment_weak=at_all(walls.second_moment_weak),
-        second_moment_strong=at_all(walls.second_moment_strong),
-        torsion_constant=at_all(torsion),
-        shear_centre=at_all(walls.shear_centre),
-        edge_spine=at_all(walls.edge_spine),
-        edge_near=at_all(walls.edge_near),
+    return build_rod(
+        axis,
+        about_neutral_axis(walls, clamped_torsion_constant(walls, middle, length)),
+        modes,
+        direction_deg=notch.direction_deg,
+        linear_kinematics=notch.deflection == "small",
+        has_chord=True,
     )

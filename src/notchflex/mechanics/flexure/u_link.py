@@ -10,7 +10,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex._jax import constant, jax
+from notchflex._jax import constant
+from notchflex.mechanics.flexure.notch_rod import (
+    STRAIGHT,
+    NeutralAxis,
+    StrainModes,
+    about_neutral_axis,
+    build_rod,
+    shifted,
+)
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
@@ -73,9 +81,8 @@ def u_link_rod(
     middle = np.array([0.0, 0.0, 2.0 * notch.slot_radius + 0.5 * notch.strip_thickness])
     every = _poses(course, middle, hand)
     poses, start, end = (Motion(*(part[at] for part in every)) for at in (slice(-2), -2, -1))
-    count = sum(counts)
-    free = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (count, 1))
-    free[:, 1] = hand * course.curvature[:count]
+    free = np.tile(STRAIGHT, (len(place), 1))
+    free[:, 1] = hand * course.curvature[:-2]
     basis = wrench_modes(
         poses,
         2.0 * place / link.length - 1.0,
@@ -86,29 +93,13 @@ def u_link_rod(
         force_modes,
         poisson_ratio,
     )
-    whole = _between(start, end)
-    turned = rotation_about(constant([0.0, 0.0, np.radians(notch.direction_deg)]))
+    onward = Motion(*(constant(np.delete(part, -2, axis=0)) for part in every))
     # The distal body's frame: level with the strip's lower edge, on the tube axis.
-    distal = Motion(constant(np.eye(3)), constant([0.0, 0.0, 2.0 * notch.slot_radius]))
-    last = _between(end, distal)
+    distal = _between(end, shifted(z=2.0 * notch.slot_radius))
+    axis = NeutralAxis(places, start, distal, _between(start, onward), free)
     in_plane = moment_modes + 2 * force_modes
-    return Rod(
-        start_rotation=constant(turned @ start.rotation),
-        start_offset=constant(turned @ start.translation),
-        curve_rotation=constant(whole.rotation),
-        curve_offset=constant(whole.translation),
-        end_rotation=constant(last.rotation @ turned.T),
-        end_offset=constant(last.translation),
-        **places.fields(_between(start, poses), basis),
-        reference_strain=constant(free),
-        section=jax.tree.map(lambda leaf: leaf[:count], section),
-        closure=constant(np.zeros(2)),
-        has_closure=constant(0.0),
-        linear_kinematics=constant(0.0),
-        chord=constant(0.0),
-        padding_mask=constant(np.zeros(basis.shape[-1])),
-        levels=(in_plane, in_plane, basis.shape[-1]),
-    )
+    modes = StrainModes(basis, (in_plane, in_plane, basis.shape[-1]))
+    return build_rod(axis, section, modes, direction_deg=notch.direction_deg)
 
 
 def _poses(course: Course, middle: np.ndarray, hand: float) -> Motion:
@@ -130,14 +121,5 @@ def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> Fi
     inner = np.sqrt(np.maximum(tube.inner_radius**2 - course.along**2, 0.0))
     middle = 0.5 * (outer + inner)
     walls = two_walls(outer - inner, course.thickness, middle)
-    return FibreSection(
-        area=walls.area,
-        second_moment_weak=walls.second_moment_weak,
-        second_moment_strong=walls.second_moment_strong,
-        torsion_constant=constant(
-            clamped_torsion_constant(walls, middle, link.length, poisson_ratio)
-        ),
-        shear_centre=walls.shear_centre,
-        edge_spine=walls.edge_spine,
-        edge_near=walls.edge_near,
-    )
+    torsion = clamped_torsion_constant(walls, middle, link.length, poisson_ratio)
+    return about_neutral_axis(walls, torsion)

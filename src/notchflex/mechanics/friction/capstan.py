@@ -1,4 +1,4 @@
-"""Capstan friction: the tension falls by exp(-coefficient * turning) at a sliding contact."""
+"""Capstan friction: the tension falls by exp(-coefficient * turning) and a constant loss."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ class CapstanLaw(FrictionLaw):
         moved_to_exit: Part of the entry edge's turning that counts at the exit edge: 0 where
             each edge keeps its own, 1 where the whole turning of a notch lies ahead of it
             (Pacheco 2021, eq. 10, whose product includes the notch itself).
+        loss: Tension that sliding over an edge costs whatever the turning, N; None for none.
     """
 
     coefficient: Float[Array, ""]
     moved_to_exit: Float[Array, ""]
+    loss: Float[Array, ""] | None
 
     def bounds(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
@@ -32,10 +34,19 @@ class CapstanLaw(FrictionLaw):
             self.coefficient * (entry_turning - moved),
         )
 
+    def constant_loss(
+        self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
+    ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]] | None:
+        """State the same loss at every edge."""
+        if self.loss is None:
+            return None
+        return self.loss + 0.0 * exit_turning, self.loss + 0.0 * entry_turning
+
 
 @friction_law.register
 def _(friction: Capstan) -> CapstanLaw:
     return CapstanLaw(
         coefficient=constant(friction.coefficient),
         moved_to_exit=constant(1.0 if friction.wrap == "whole-before" else 0.0),
+        loss=None if friction.constant_loss is None else constant(friction.constant_loss),
     )

@@ -1,8 +1,7 @@
 """Materials: how a cross-section answers strain."""
 
 from notchflex._packages import import_all
-from notchflex.mechanics.material.registry import section_law
-from notchflex.mechanics.material.section_law import FibreSection, Response, SectionLaw
+from notchflex.mechanics.material.law import FibreSection, Response, SectionLaw, section_law
 
 import_all(__name__, __path__)
 

@@ -7,13 +7,13 @@ from typing import Any
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant
-from notchflex.mechanics.material.registry import section_law
-from notchflex.mechanics.material.section_law import (
+from notchflex.mechanics.material.law import (
     FibreSection,
     Response,
     SectionLaw,
     elastic_resultants,
     elastic_stiffness,
+    section_law,
 )
 from notchflex.robot import Linear
 

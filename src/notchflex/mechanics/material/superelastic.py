@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jnp
-from notchflex.mechanics.material.registry import section_law
-from notchflex.mechanics.material.section_law import (
+from notchflex.mechanics.material.law import (
     FibreSection,
     Response,
     SectionLaw,
     elastic_resultants,
     elastic_stiffness,
+    section_law,
 )
 from notchflex.robot import Superelastic
 

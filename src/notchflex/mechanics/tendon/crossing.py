@@ -73,6 +73,14 @@ class TendonGroup(Pytree, ABC):
         """1 where the tendon has a span that ends at the distal body."""
         return self.visits
 
+    @property
+    def fibre(self) -> Float[Array, "*n t 2"] | None:
+        """Where the tendon crosses a rod's section, mm from its neutral axis.
+
+        None for a tendon that does not run along the rod, as a fibre of it.
+        """
+        return None
+
     @abstractmethod
     def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
         """Cross one gap (of a group without its leading axis).

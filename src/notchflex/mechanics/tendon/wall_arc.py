@@ -27,6 +27,11 @@ class WallArc(TendonGroup):
     across: Float[Array, "*n t 2"]
 
     @property
+    def fibre(self) -> Float[Array, "*n t 2"]:
+        """Where the tendon crosses the rod's section, mm from its neutral axis."""
+        return self.across
+
+    @property
     def runs(self) -> Float[Array, "*n t"]:
         """Over every notch up to its end."""
         return self.present

@@ -108,8 +108,6 @@ class RobotShape:
 
     def _along(self, number: int, radius: float | None = None) -> Iterator[tuple[Points, bool]]:
         """Yield the pieces of a tendon, and whether each lies on a body or crosses a notch."""
-        from notchflex.mechanics.tendon.wall_arc import WallArc
-
         group = next(group for group in self.chain.groups if number in group.numbers)
         column = group.numbers.index(number)
         present, visits = (
@@ -123,8 +121,8 @@ class RobotShape:
         for body in range(len(self.position)):
             if body and not present[body - 1]:
                 break
-            if body and isinstance(group, WallArc):
-                across = np.asarray(group.across)[body - 1, column]
+            if body and group.fibre is not None:
+                across = np.asarray(group.fibre)[body - 1, column]
                 yield self.flexures[body - 1].fibre(*across), False
             ends = walls[body]
             if ends is not None and (body == 0 or visits[body - 1]):

@@ -42,3 +42,8 @@ class Corner(Friction):
     ] = "slope"
     _: KW_ONLY
     kind: Literal["corner"] = "corner"
+
+    @property
+    def turns_with_chord(self) -> bool:
+        """Whether a tendon turns with the chord of a strip."""
+        return self.turning == "chord"

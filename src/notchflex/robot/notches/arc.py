@@ -49,6 +49,11 @@ class ArcNotch(Notch):
     _: KW_ONLY
     kind: Literal["arc"] = "arc"
 
+    @property
+    def spine_cut(self) -> tuple[float, bool]:
+        """Depth of the cut [mm], and whether its edges are radial."""
+        return self.depth, self.cut == "on-axis"
+
     def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
         """Find a cut that goes through the tube, and a precurvature beyond any closing angle."""
         if self.depth >= tube.outer_diameter:

@@ -11,11 +11,9 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.contact.spine import SpineContact
 from notchflex.mechanics.flexure import Rod, fibre_stretch, of_rod
 from notchflex.mechanics.flexure.rod_kinematics import node_poses, relative_pose, rod_end
 from notchflex.mechanics.motion import Motion
-from notchflex.mechanics.tendon.wall_arc import WallArc
 from notchflex.solver.element import Unknowns
 from notchflex.solver.residual import Evaluation
 
@@ -77,11 +75,12 @@ def _along_wall(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array
     """What tendons and lips that act along the wall ask of every section."""
     acting = jnp.zeros((chain.flexures, chain.rods.basis.shape[-2]))
     for group, span in zip(chain.groups, at.spans, strict=True):
-        if isinstance(group, WallArc):
-            weights = of_rod(chain.rods, fibre_stretch(group.across))
+        if group.fibre is not None:
+            weights = of_rod(chain.rods, fibre_stretch(group.fibre))
             acting = acting - jnp.einsum("nt,ntc->nc", span.gap_tension, weights)
     for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True):
-        if isinstance(group, SpineContact):
-            lip = of_rod(chain.rods, fibre_stretch(chain.rods.closure))
-            acting = acting + (force * group.has_contact) * lip
+        fibre = group.fibre(chain.rods)
+        if fibre is not None:
+            weights = of_rod(chain.rods, fibre_stretch(fibre))
+            acting = acting + (force * group.has_contact) * weights
     return jnp.broadcast_to(acting[:, None], at.flexure.resultants.shape)

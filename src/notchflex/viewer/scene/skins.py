@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.plotting.shapes.robot_shape import FlexureShape, RobotShape, shape_from_angles
-from notchflex.robot import ArcNotch, Robot
+from notchflex.robot import Robot
 
 PIECES = 12  # straight pieces of a bent flexure, at least
 ROUND = 12  # flat pieces of a spine, as seen along the tube
@@ -69,9 +69,8 @@ def _spine(rest: RobotShape, notch: int) -> FlexureSurface:
     description = rest.robot.notches[notch]
     axis = outer - one.spine  # from the neutral axis to the axis of the tube
     # Where the cut meets the outer surface; radial edges continue to the axis.
-    arc = isinstance(description, ArcNotch)
-    cut = outer - description.depth if arc else float(one.near[0] - axis[0])
-    radial = arc and description.cut == "on-axis"
+    depth, radial = description.spine_cut or (outer - float(one.near[0] - axis[0]), False)
+    cut = outer - depth
     half_outer = float(np.arccos(np.clip(-cut / outer, -1.0, 1.0)))
     half_inner = half_outer if radial else float(np.arccos(np.clip(-cut / inner, -1.0, 1.0)))
     part = np.linspace(-1.0, 1.0, ROUND + 1)

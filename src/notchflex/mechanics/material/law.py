@@ -1,5 +1,8 @@
 """The law of a cross-section: strains and memory in, resultants out.
 
+A law lives in a file of its own in this folder and registers itself for its description by
+`section_law.register`; the package imports every file of the folder, so no list is kept.
+
 Every material answers the same question for one cross-section of a flexure, so the chain never
 asks which material it is. Memory is there for materials whose answer depends on the past; the
 two laws of today have none and hand it back untouched.
@@ -8,6 +11,7 @@ two laws of today have none and hand it back untouched.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import singledispatch
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -127,3 +131,22 @@ def elastic_stiffness(
     every = jax.tree.map(lambda leaf: leaf[..., None], section)
     by_strain = elastic_resultants(elastic_modulus, shear_modulus, every, constant(np.eye(6)))
     return by_strain.swapaxes(-1, -2)
+
+
+@singledispatch
+def section_law(material: Any) -> SectionLaw:
+    """Section law of a material of a robot file.
+
+    Args:
+        material: A material description, such as `notchflex.Linear(60000.0)`.
+
+    Returns:
+        The law, its constants as arrays (MPa).
+
+    Raises:
+        TypeError: There is no law for this kind of description.
+    """
+    raise TypeError(
+        f"no section law is registered for a material of type {type(material).__name__}; "
+        "add one to notchflex/mechanics/material with @section_law.register"
+    )

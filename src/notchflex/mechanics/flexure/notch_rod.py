@@ -1,0 +1,171 @@
+"""The rod of a notch from four things: neutral axis, section, strain modes, closure.
+
+A new notch describes these in the frame of a notch of direction 0: x toward the side to which it
+bends, z along the tube, the origin on the tube axis at the proximal face. `build_rod` turns them
+to the notch's direction and fills the arrays of a `Rod`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+from numpy.polynomial.legendre import legvander
+from numpy.typing import ArrayLike
+
+from notchflex._jax import constant, jax
+from notchflex.mechanics.flexure.quadrature import RodQuadrature
+from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.material import FibreSection
+from notchflex.mechanics.motion import Motion
+from notchflex.mechanics.section import Section
+
+STRAIGHT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+"""Strains of a straight, unloaded rod: a stretch of 1 along z."""
+
+
+class NeutralAxis(NamedTuple):
+    """Neutral axis of a notch, along which its rod is integrated (mm).
+
+    Attributes:
+        quadrature: Points along it.
+        start: Pose of the first section; its z is along the rod, its x points to the cut side.
+        end: Pose of the distal body, in the frame of the last section.
+        curve: Poses along the free axis in the frame of its start, at `quadrature.every` and last
+            at its end: only motion beside it is then integrated. None integrates all motion.
+        strain: Strains of the free rod at `quadrature.every`, (points, 6); None is straight.
+    """
+
+    quadrature: RodQuadrature
+    start: Motion
+    end: Motion
+    curve: Motion | None = None
+    strain: Float[np.ndarray, "every 6"] | None = None
+
+
+class StrainModes(NamedTuple):
+    """Strain modes of a rod.
+
+    Attributes:
+        basis: Strains (about x, y, z; along x, y, z) at `quadrature.every` per unit of each mode.
+        levels: How many modes, from the first, serve tendons alone, loads in the plane of bending
+            (about y), and loads in space (all).
+    """
+
+    basis: Float[np.ndarray, "every 6 modes"]
+    levels: tuple[int, int, int]
+
+
+def shifted(x: float = 0.0, z: float = 0.0) -> Motion:
+    """Make the pose of a frame that is displaced along x and z, mm, and not turned."""
+    return Motion(constant(np.eye(3)), constant([x, 0.0, z]))
+
+
+def legendre_modes(
+    quadrature: RodQuadrature,
+    bending: int,
+    sideways: int,
+    twist: int,
+    *,
+    tendon_modes: int | None = None,
+    shear_centre: float = 0.0,
+) -> StrainModes:
+    """Make modes of curvature and twist that are Legendre polynomials of arc length.
+
+    Args:
+        quadrature: Points along the rod.
+        bending: Polynomials of the curvature about y, in the plane of bending.
+        sideways: Those of the curvature about x.
+        twist: Those of the twist, about the shear centre.
+        tendon_modes: Bending modes that tendons alone need; all where not given.
+        shear_centre: Distance of the shear centre from the neutral axis, mm.
+
+    Returns:
+        The modes; a unit of the first bends the rod by 1 rad.
+    """
+    length = quadrature.ends[-1]
+    modes = np.zeros((len(quadrature.every), 6, bending + sideways + twist))
+    first = 0
+    for component, count in ((1, bending), (0, sideways), (2, twist)):
+        polynomials = legvander(2.0 * quadrature.every / length - 1.0, count - 1)
+        modes[:, component, first : first + count] = polynomials
+        first += count
+    # Twist about the shear centre shears the neutral axis, which lies off it, sideways.
+    modes[:, 4, bending + sideways :] = shear_centre * modes[:, 2, bending + sideways :]
+    fewest = bending if tendon_modes is None else tendon_modes
+    return StrainModes(modes / length, (fewest, bending, modes.shape[-1]))
+
+
+def about_neutral_axis(section: Section, torsion_constant: ArrayLike | None = None) -> FibreSection:
+    """Refer a section to its neutral axis; another torsion constant may replace its own, mm^4."""
+    torsion = section.torsion_constant if torsion_constant is None else torsion_constant
+    return FibreSection(
+        area=section.area,
+        second_moment_weak=section.second_moment_weak,
+        second_moment_strong=section.second_moment_strong,
+        torsion_constant=constant(torsion),
+        shear_centre=section.shear_centre - section.centroid,
+        edge_spine=section.edge_spine,
+        edge_near=section.edge_near,
+    )
+
+
+def build_rod(
+    axis: NeutralAxis,
+    section: FibreSection,
+    modes: StrainModes,
+    closure: float | None = None,
+    *,
+    direction_deg: float = 0.0,
+    linear_kinematics: bool = False,
+    has_chord: bool = False,
+) -> Rod:
+    """Build the rod of a notch.
+
+    Args:
+        axis: Its neutral axis.
+        section: Its section: one for the whole rod, or one per point of `quadrature.every`.
+        modes: Its strain modes.
+        closure: Distance across the section, from the neutral axis toward the cut, of the fibre
+            that has no length left when the notch is closed, mm. None where the notch has no solid
+            spine: then the edges of its openings (`Notch.openings`) meet.
+        direction_deg: Side toward which the notch bends, deg.
+        linear_kinematics: Whether displacements are proportional to the strains.
+        has_chord: Whether the angle of the chord from start to end is an output (Liu 2022).
+
+    Returns:
+        The rod.
+    """
+    points = axis.quadrature
+    nodes = len(points.at_nodes[0])
+    strain = np.tile(STRAIGHT, (len(points.every), 1)) if axis.strain is None else axis.strain
+    # Written out: opposite directions then mirror each other to the last bit.
+    cosine, sine = np.cos(np.radians(direction_deg)), np.sin(np.radians(direction_deg))
+    turned = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    curve, curve_end, beside = None, shifted(), strain
+    if axis.curve is not None:
+        curve, curve_end = (Motion(*(part[at] for part in axis.curve)) for at in (slice(-1), -1))
+        beside = None
+
+    def at_nodes(values: Array) -> Array:
+        each = np.asarray(values)
+        return constant(np.full(nodes, each) if each.ndim == 0 else each[:nodes])
+
+    return Rod(
+        start_rotation=constant(turned @ axis.start.rotation),
+        start_offset=constant(turned @ axis.start.translation),
+        curve_rotation=constant(curve_end.rotation),
+        curve_offset=constant(curve_end.translation),
+        end_rotation=constant(axis.end.rotation @ turned.T),
+        end_offset=constant(axis.end.translation),
+        **points.fields(curve, modes.basis, beside),
+        reference_strain=constant(strain[:nodes]),
+        section=jax.tree.map(at_nodes, section),
+        closure=constant([closure or 0.0, 0.0]),
+        has_closure=constant(float(closure is not None)),
+        linear_kinematics=constant(float(linear_kinematics)),
+        chord=constant(float(has_chord)),
+        padding_mask=constant(np.zeros(modes.basis.shape[-1])),
+        levels=modes.levels,
+    )

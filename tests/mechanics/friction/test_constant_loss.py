@@ -1,0 +1,93 @@
+"""Capstan friction with a constant loss: balance at every contact, memory, and finite slopes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex._jax import constant, jax, jnp
+from notchflex.mechanics.friction import friction_law
+
+LOSS, MU = 0.05, 0.13
+PULLS = (0.03, 0.1, 0.3, 1.0, 0.9, 0.2, 0.01, 0.0, 0.6)
+
+
+@pytest.fixture(scope="module")
+def path() -> nf.EquilibriumPath:
+    robot = nf.load_robot("pacheco2021-a").replace(friction=nf.Capstan(MU, constant_loss=LOSS))
+    return nf.simulate(robot, [nf.Load(tension=pull) for pull in PULLS])
+
+
+def sides(path: nf.EquilibriumPath, step: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Tension before and behind every contact, N, and e^b there."""
+    tension = path.span_tension[step, 0]
+    turning = np.repeat(0.5 * np.abs(path.notch_angle[step]), 2)[: len(tension) - 1]
+    return tension[:-1], tension[1:], np.exp(MU * turning)
+
+
+def test_every_contact_stays_between_the_two_limits_of_sliding(path: nf.EquilibriumPath) -> None:
+    assert path.converged.all(), path.reason
+    slid = set()
+    for step in range(len(PULLS)):
+        before, behind, ratio = sides(path, step)
+        # Pulling: T = e^b T' + F; letting go: T' = e^b T + F.
+        over = np.stack([before - ratio * behind - LOSS, behind - ratio * before - LOSS])
+        assert over.max() < 1e-8
+        at_limit = np.abs(over) < 1e-8
+        state = path.contact_state[step, 0][: len(before)]
+        assert at_limit[0][state > 0].all()
+        assert at_limit[1][state < 0].all()
+        slid |= set(state.tolist())
+    assert slid == {-1, 0, 1}
+
+
+def test_pull_below_the_loss_moves_nothing(path: nf.EquilibriumPath) -> None:
+    free = np.radians([notch.precurvature_deg for notch in path.robot.notches])
+    assert np.abs(path.notch_angle[0] - free).max() < 1e-8
+    assert path.span_tension[0, 0, 1:].max() < 1e-8
+
+
+def test_tension_stays_locked_in_when_the_base_is_let_go(path: nf.EquilibriumPath) -> None:
+    before, behind, ratio = sides(path, PULLS.index(0.0))
+    assert before[0] < 1e-8
+    np.testing.assert_allclose(behind[0], LOSS, atol=1e-8)
+    np.testing.assert_allclose(behind[1], ratio[1] * LOSS + LOSS, atol=1e-8)
+
+
+def test_without_turning_a_pull_loses_the_same_at_every_contact() -> None:
+    law = friction_law(nf.Capstan(0.0, constant_loss=LOSS))
+    tension, none = jnp.array([1.0, 0.5, 0.2]), jnp.zeros(3)
+    limits = law.limits(none, none, (tension, tension), jnp.ones((3, 2)))
+    np.testing.assert_allclose(
+        tension[:, None] * jnp.exp(-limits), np.stack([tension - LOSS] * 2, -1), rtol=1e-14
+    )
+
+
+def test_no_loss_is_the_plain_law() -> None:
+    turning = jnp.array([0.1, 0.4])
+    plain, zero = (friction_law(nf.Capstan(MU, constant_loss=loss)) for loss in (None, 0.0))
+    tension = jnp.array([0.0, 1.0])
+    for sign in (-1.0, 1.0):
+        expected, found = (
+            law.limits(turning, turning, (tension, tension), sign * jnp.ones((2, 2)))
+            for law in (plain, zero)
+        )
+        np.testing.assert_allclose(found, expected, atol=1e-15)  # rounding of exp and log
+
+
+@pytest.mark.parametrize("tension", [0.0, 1e-12, 0.5 * LOSS, LOSS, 2.0 * LOSS, 1e6])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_slopes_are_finite_at_every_tension(tension: float, sign: float) -> None:
+    law = friction_law(nf.Capstan(MU, constant_loss=LOSS))
+    turning, way = jnp.array([0.2]), jnp.full((1, 2), sign)
+
+    def total(law: object, tension: jax.Array, turning: jax.Array) -> jax.Array:
+        return law.limits(turning, turning, (tension, tension), way).sum()  # pyright: ignore
+
+    slopes = jax.grad(total, argnums=(0, 1, 2))(law, constant([tension]), turning)
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(slopes))
+    if tension == 2.0 * LOSS:
+        step = 1e-7
+        high, low = (total(law, jnp.array([tension + by]), turning) for by in (step, -step))
+        np.testing.assert_allclose(slopes[1][0], (high - low) / (2 * step), rtol=1e-6)

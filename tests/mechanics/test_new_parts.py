@@ -1,0 +1,88 @@
+"""A notch, a material and a friction law as an engineer adds them, against a closed form.
+
+The files in `new_parts/` are copied into a copy of the package; no list in it is edited.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import notchflex
+
+PARTS = Path(__file__).parent / "new_parts"
+TUBE, HEIGHT, THICK, WIDTH, OFFSET, RADIUS = (3.0, 2.4), 1.5, 0.2, 1.0, 1.3, 1.2
+MODULUS, LIMIT, LOSS, PULL = 40_000.0, 0.03, 0.4, 2.0
+
+SCRIPT = f"""
+import json
+import notchflex as nf
+robot = nf.Robot(
+    name="new parts",
+    tube=nf.Tube{TUBE},
+    notch=(nf.FlatNotch({HEIGHT}, {THICK}, {WIDTH}, {OFFSET}, uncut_length=1.0, repeat=2),),
+    tendon=(nf.Tendon({RADIUS}),),
+    material=nf.Softening({MODULUS}, {LIMIT}),
+    friction=nf.Sheath({LOSS}),
+)
+from notchflex.robot import robot_from_text, robot_text
+assert robot_from_text(robot_text(robot)) == robot
+state = nf.solve(robot, nf.Load(tension={PULL}))
+print(json.dumps([state.converged, *state.notch_angle.tolist(), sorted(nf.json_schema()["$defs"])]))
+"""
+
+
+def angle(tension: float) -> float:
+    """Angle of a notch under a tension in its gap, rad."""
+    second_moment, edge = WIDTH * THICK**3 / 12.0, 0.5 * THICK
+
+    def missing(theta: float) -> float:
+        strain = theta / HEIGHT * edge
+        moment = MODULUS * second_moment * theta / HEIGHT * (1.0 - (strain / LIMIT) ** 2 / 3.0)
+        return moment - tension * (RADIUS + OFFSET)
+
+    return float(brentq(missing, 0.0, LIMIT / edge * HEIGHT, xtol=1e-14))
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the sources with the new files, and one line that makes them public."""
+    copy = tmp_path_factory.mktemp("copy")
+    for name in ("notchflex", "lanewise"):
+        source = Path(notchflex.__file__).parents[1] / name
+        shutil.copytree(source, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PARTS, copy / "notchflex", dirs_exist_ok=True)
+    init = copy / "notchflex" / "__init__.py"
+    line = '            "ArcNotch",\n'
+    text = init.read_text(encoding="utf-8")
+    assert line in text
+    init.write_text(text.replace(line, line + '"FlatNotch", "Sheath", "Softening",\n', 1), "utf-8")
+    return copy
+
+
+def test_new_parts_solve_as_their_closed_form(package: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(package), "NOTCHFLEX_OPTIMISATION": "0"}
+    run = subprocess.run(
+        [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    converged, *angles, kinds = json.loads(run.stdout.splitlines()[-1])
+    assert converged
+    # The tendon loses the same at the first edge, and at both edges beyond it.
+    np.testing.assert_allclose(angles, [angle(PULL - LOSS), angle(PULL - 3.0 * LOSS)], rtol=1e-9)
+    assert {"FlatNotch", "Sheath", "Softening"} <= set(kinds)
+
+
+def test_new_parts_are_short() -> None:
+    files = list(PARTS.rglob("*.py"))
+    code = [line for file in files for line in file.read_text("utf-8").splitlines() if line.strip()]
+    assert len(files) == 6
+    assert len(code) <= 110
