@@ -12,11 +12,6 @@ PATH = nf.pull(0.5, 1.6, steps=2).then(nf.pull(0.8, 0.8, steps=1)).loaded(tip_fo
 
 
 @pytest.fixture(scope="module")
-def wrist() -> nf.Robot:
-    return nf.load_robot("pacheco2021-a")
-
-
-@pytest.fixture(scope="module")
 def found(wrist) -> nf.TipResponse:
     return nf.tip_response(wrist, PATH)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,7 +12,6 @@ import pytest
 import notchflex as nf
 import notchflex.fit as fitting
 from fitted import NAMES, OBSERVED, ROBOT, fitted, measured
-from notchflex.cli import run
 from notchflex.cli.arguments.calibrate_words import parse_fit, parse_pairs, robots_of
 from notchflex.cli.tables import calibrate_tables
 from notchflex.fit import Fold, LeftOut, Posterior
@@ -20,14 +20,8 @@ FIT = ("--fit", ",".join(NAMES), "--starts", "1")
 
 
 @pytest.fixture
-def call(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-
-    def runner(*arguments):
-        code = run(["calibrate", *arguments])
-        return (code, *capsys.readouterr())
-
-    return runner
+def call(call):
+    return partial(call, "calibrate")
 
 
 @pytest.fixture

@@ -7,18 +7,6 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.cli import run
-
-
-@pytest.fixture
-def call(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-
-    def runner(*arguments):
-        code = run(list(arguments))
-        return (code, *capsys.readouterr())
-
-    return runner
 
 
 @pytest.fixture

@@ -10,21 +10,9 @@ import sys
 import pytest
 
 import notchflex as nf
-from notchflex.cli import run
 
 PULL = ("simulate", "pacheco2021-a", "--tension", "0:3:4")
 BESIDE = (*PULL, "--beside", "slick: friction.coefficient=0", "--beside", "Y: york2015")
-
-
-@pytest.fixture
-def call(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-
-    def runner(*arguments):
-        code = run(list(arguments))
-        return (code, *capsys.readouterr())
-
-    return runner
 
 
 def on_a_terminal(*arguments, **variables):

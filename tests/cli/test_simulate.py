@@ -7,21 +7,8 @@ import math
 import pytest
 
 import notchflex as nf
-from notchflex.cli import run
 
 LOOP = ["simulate", "pacheco2021-a", "--tension", "0:3:7,3:0:7"]
-
-
-@pytest.fixture
-def call(tmp_path, monkeypatch, capsys):
-    """Run the command in an empty folder; return exit code, standard output and error."""
-    monkeypatch.chdir(tmp_path)
-
-    def runner(*arguments):
-        code = run(list(arguments))
-        return (code, *capsys.readouterr())
-
-    return runner
 
 
 def test_json_alone_on_standard_output(call):

@@ -11,11 +11,6 @@ import notchflex as nf
 from notchflex.solver.programs import run as run_module
 
 
-@pytest.fixture
-def wrist() -> nf.Robot:
-    return nf.load_robot("pacheco2021-a")
-
-
 def test_failure_is_data_with_the_last_good_state(wrist: nf.Robot) -> None:
     load = nf.stroke_path(3.0, 4.2, steps=3)
     path = nf.simulate(wrist, load)
