@@ -111,6 +111,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "tendon_work": tension[:, None] ** 2,
         "converged": good,
         "reason": np.where(good, "", "every notch closed"),
+        "reason_code": np.where(good, "", "NOTCHES_CLOSED"),
         "residual": np.full(count, 1e-12),
         "iterations": np.full(count, 4),
         "stable": np.ones(count, bool),

@@ -23,7 +23,7 @@ NAMES = [
     "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
     "Differentiable", "differentiable", "TipResponse", "tip_response",
     "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus", "Kink",
-    "ConvergenceError", "Settings",
+    "ConvergenceError", "ErrorCode", "Failure", "Settings",
     "BodyForce", "save_path", "read_path", "read_table",
     "StripNotch", "ULink", "Corner",
     "Elastica", "elastica", "modulus_from_single_notch",

@@ -83,7 +83,8 @@ def check_lips(robot: Table, path: Any, step: int) -> Iterator[Finding]:
     gap, force, closed = path.gap[step], path.contact_force[step], path.closed[step]
     size = robot["tube"]["outer_diameter"]
     yield from above("lips overlap", step, float(-gap.min()) / size, 1e-8)
-    load = max(np.abs(np.nan_to_num(path.span_tension[step])).max(), 1e-12)
+    # without any load contact forces are rounding of what would close a notch
+    load = max(np.abs(np.nan_to_num(path.span_tension[step])).max(), 1e-6 * tension_scale(robot))
     load = max(load, np.abs(force).max(), np.abs(path.base_force[step]).max())
     yield from above("lips pull", step, float(-force.min()) / load, 1e-9)
     both = np.minimum(gap / size, force / load).max()

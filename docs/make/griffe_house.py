@@ -12,6 +12,8 @@ from typing import Any
 
 import griffe
 
+from notchflex.results.quantities.registry import QUANTITIES
+
 _DATACLASS = griffe.ExprName("dataclasses.dataclass", None)
 
 
@@ -42,7 +44,10 @@ class House(griffe.Extension):
                 decorator.value = _DATACLASS
 
     def on_attribute_instance(self, *, attr: griffe.Attribute, **_: Any) -> None:
-        """Show `float` for `Annotated[Float, quantity("mm", ...)]`."""
+        """Show `float` for `Annotated[Float, quantity("mm", ...)]`; quantities with their text."""
+        if attr.parent is not None and attr.parent.name == "_Quantities" and attr.docstring:
+            attr.docstring.value += f"\n\n{QUANTITIES[attr.name].text}"
+            attr.value = None
         annotation = attr.annotation
         if isinstance(annotation, griffe.ExprSubscript) and str(annotation.left) == "Annotated":
             inner = annotation.slice

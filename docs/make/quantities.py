@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from notchflex.results.quantities.registry import describe
+from notchflex.results.quantities.registry import QUANTITIES
 
 PAGE = "../units_and_frames.md"  # from the folder of page.py
 
@@ -17,14 +17,8 @@ def tables() -> dict[str, str]:
     """Return the table of all quantities by the name of its mark."""
     head = ("Python", "unit in files", "JSON key", "CSV column", "meaning")
     rows = [
-        (
-            _code(one["name"]),
-            one["unit"],
-            _code(one["key"]),
-            _code(one["column"]),
-            one["description"],
-        )
-        for one in describe()
+        (_code(one.name), one.unit, _code(one.key), _code(one.column), one.description)
+        for one in QUANTITIES.values()
     ]
     text = "\n".join(f"| {' | '.join(row)} |" for row in [head, ("---",) * len(head), *rows])
     return {"quantities": f"\n\n{text.replace('|  |', '| |')}\n\n"}

@@ -9,7 +9,10 @@ __version__ = "0.1.0"
 
 # Public name -> where it is exported. `__init__.pyi` lists the same names for type checkers.
 _HOME = {
-    **dict.fromkeys(("InputError", "RobotFileError"), "notchflex.errors"),
+    **dict.fromkeys(
+        ("ConvergenceError", "ErrorCode", "Failure", "InputError", "RobotFileError"),
+        "notchflex.errors",
+    ),
     **dict.fromkeys(
         (
             "ArcNotch",
@@ -60,7 +63,6 @@ _HOME = {
     "Settings": "notchflex.solver.newton",
     **dict.fromkeys(
         (
-            "ConvergenceError",
             "Equilibrium",
             "EquilibriumPath",
             "State",

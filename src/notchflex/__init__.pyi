@@ -19,6 +19,9 @@ from notchflex.analysis import tip_from_angles as tip_from_angles
 from notchflex.analysis import tip_response as tip_response
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
+from notchflex.errors import ConvergenceError as ConvergenceError
+from notchflex.errors import ErrorCode as ErrorCode
+from notchflex.errors import Failure as Failure
 from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.fit import Calibration as Calibration
@@ -51,7 +54,6 @@ from notchflex.mechanics.flexure import modulus_from_single_notch as modulus_fro
 from notchflex.mechanics.section import Section as Section
 from notchflex.mechanics.section import annular_sector as annular_sector
 from notchflex.mechanics.section import annular_segment as annular_segment
-from notchflex.results import ConvergenceError as ConvergenceError
 from notchflex.results import Equilibrium as Equilibrium
 from notchflex.results import EquilibriumPath as EquilibriumPath
 from notchflex.results import State as State

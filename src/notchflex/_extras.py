@@ -22,7 +22,9 @@ def need(module: str, extra: str, what: str) -> None:
         >>> need("numpy", "plot", "--plot")
     """
     if importlib.util.find_spec(module) is None:
-        raise InputError(f"{what} needs {module}, which is not installed: {install_command(extra)}")
+        raise InputError.MISSING_PACKAGE(
+            f"{what} needs {module}, which is not installed: {install_command(extra)}"
+        )
 
 
 def install_command(extra: str) -> str:

@@ -1,19 +1,20 @@
 """Typed properties: those of the table of quantities, with the shapes that they promise."""
 
 import importlib.util
-import re
+import inspect
+import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
-import jaxtyping
 import numpy as np
 import pytest
 
 import notchflex as nf
 from notchflex.results.quantities import properties as quantity_properties
-from notchflex.results.quantities.path_formulas import FORMULAS
 from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.solver.derived.quantities import Quantities, Shape
 
 ROOT = Path(__file__).parents[2]
 
@@ -52,48 +53,89 @@ def test_unknown_names_are_refused(path):
         _ = path[0].settings
 
 
-def test_type_checkers_know_the_shapes():
-    properties = vars(quantity_properties.EquilibriumQuantities)
-    assert properties["tip_position"].fget.__annotations__["return"] == "Float[np.ndarray, ' 3']"
-    assert properties["total_angle"].fget.__annotations__["return"] == "float"
-    path_properties = vars(quantity_properties.PathQuantities)
-    assert path_properties["reason"].fget.__annotations__["return"] == "list[str]"
+def test_results_cannot_be_set(path):
+    with pytest.raises(AttributeError, match="total_angle is a result"):
+        path[0].total_angle = 0.0
+
+
+def test_help_has_unit_shape_and_text():
+    text = inspect.getdoc(nf.Equilibrium.tip_position)
+    assert text.startswith("Tip position, mm, shape (3).\n\nPosition of the tip")
+    assert "NaN beyond the end of a tendon." in nf.EquilibriumPath.span_tension.__doc__
+
+
+def test_type_checkers_know_the_kinds():
+    kinds = {"total_angle": "Number", "tip_position": "Table", "reason": "Text", "stable": "Flag"}
+    for name, kind in kinds.items():
+        assert type(getattr(nf.EquilibriumPath, name)).__name__ == kind
 
 
 @pytest.mark.parametrize("name", QUANTITIES)
-def test_values_are_what_the_types_say(path, name):
-    sizes = {"s": 3, "t": 1, "n": 5, "bodies": 6, "3": 3, "spans": 10, "contacts": 9}
-    for thing, leading in ((path, ("s",)), (path[1], ())):
-        value = getattr(thing, name)
-        mixin = type(thing).__mro__[1]
-        annotation = vars(mixin)[name].fget.__annotations__["return"]
-        names = {one: getattr(jaxtyping, one) for one in ("Float", "Bool", "Int")}
-        wanted = eval(annotation, {**names, "np": np})
-        quantity = QUANTITIES[name]
-        if annotation == "list[str]":
-            assert len(value) == 3
-            assert all(type(one) is str for one in value)
-            continue
-        assert isinstance(value, wanted)
-        shape = tuple(sizes[one] for one in (*leading, *quantity.shape))
-        assert np.shape(value) == shape
-        if not leading and not shape:
-            assert type(value) is quantity.kind
+def test_values_are_what_the_registry_says(path, name):
+    sizes = {"t": 1, "n": 5, "bodies": 6, "3": 3, "spans": 10, "contacts": 9}
+    quantity = QUANTITIES[name]
+    shape = tuple(sizes[one] for one in quantity.shape)
+    if quantity.kind is str:
+        assert [type(one) for one in getattr(path, name)] == [str] * 3
+        assert type(getattr(path[1], name)) is str
+        return
+    values, value = getattr(path, name), getattr(path[1], name)
+    assert values.shape == (3, *shape)
+    assert values.dtype.kind == {float: "f", bool: "b", int: "i"}[quantity.kind]
+    assert np.shape(value) == shape
+    if not shape:
+        assert type(value) is quantity.kind
 
 
-@pytest.mark.parametrize("fields", [Shape, Quantities])
-def test_what_the_solver_reports_is_in_the_table_with_its_shape(fields):
-    for name, annotation in fields.__annotations__.items():
-        if name in ("friction_holds", "bend_possible"):  # parts of `converged`
-            continue
-        text = getattr(annotation, "__forward_arg__", str(annotation))
-        kind, sizes = re.fullmatch(r"(\w+)\[Array, ['\"]\*s ?([^'\"]*)['\"]\]", text).groups()
-        assert tuple(sizes.split()) == QUANTITIES[name].shape, name
-        assert kind == {float: "Float", int: "Int", bool: "Bool"}[QUANTITIES[name].kind], name
+TIP_HEIGHT = """@Quantity(
+    "state", "tip height", "h", "mm", key="tip_height_mm", column="tip_height_mm"
+)
+def tip_height(state: SolvedState) -> Array:
+    \"\"\"Height of the tip above the base.\"\"\"
+    return state.quantity("tip_position")[2]
 
 
-def test_formulas_are_of_known_quantities():
-    assert set(FORMULAS) <= {*QUANTITIES, "front"}
+"""
+CHECK = """
+import notchflex as nf
+wrist, load = nf.load_robot("pacheco2021-a"), nf.pull(0.0, 1.0, steps=3)
+path = nf.simulate(wrist, load)
+height = path.tip_position[:, 2]
+assert (path.tip_height == height).all() and type(path[1].tip_height) is float
+assert path[1].to_dict()["tip_height_mm"] == height[1]
+assert path.to_dataframe()["tip_height_mm"][2] == height[2]
+assert path.to_xarray()["tip_height"].attrs["units"] == "mm"
+nf.save_path(path, "path.parquet")
+assert (nf.read_path("path.parquet").tip_height == height).all()
+found = nf.solve_batch(wrist, load, outputs=["tip_height", "tip_position"])
+assert (found["tip_height"] == found["tip_position"][:, 2]).all()
+import jax
+bend = nf.differentiable(wrist, load, ["tension"], outputs=["tip_height", "tip_position"])
+slopes = jax.jacobian(bend)(bend.start)
+by_tension = slopes["tip_height"]["tension"]
+assert (by_tension == slopes["tip_position"]["tension"][:, 2]).all() and by_tension[2, 2, 0] < 0.0
+"""
+
+
+def test_a_new_quantity_is_one_registration(tmp_path):
+    """In a copy of the package, with nothing but the formula added and the script run."""
+    shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "docs" / "make", tmp_path / "docs" / "make")
+    file = tmp_path / "src" / "notchflex" / "solver" / "derived" / "quantities.py"
+    text = file.read_text(encoding="utf-8")
+    assert text.count("def _reported(") == 1
+    file.write_text(text.replace("def _reported(", TIP_HEIGHT + "def _reported("), encoding="utf-8")
+    environment = dict(os.environ, PYTHONPATH=str(tmp_path / "src"))
+    for arguments in (["docs/make/quantity_properties.py"], ["-c", CHECK]):
+        done = subprocess.run(
+            [sys.executable, *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+            env=environment,
+        )
+        assert done.returncode == 0, done.stderr
 
 
 def test_a_state_as_plain_values(path, tmp_path):

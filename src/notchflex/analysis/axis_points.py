@@ -69,7 +69,7 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
     tip = float(start[-1] + length[-1])
     wrong = at[~((at >= -_BEYOND * tip) & (at <= (1.0 + _BEYOND) * tip))]
     if len(wrong):
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"there is no point on the axis {wrong[0]:g} mm from the base: {robot.name} is "
             f"{tip:.6g} mm long; give 0 to {tip:.6g} mm"
         )

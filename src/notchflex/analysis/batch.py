@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from lanewise import WIDTH
+from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.batch_rows import followed_row
 from notchflex.analysis.outputs import DEFAULT_OUTPUTS, known_outputs
@@ -28,7 +29,6 @@ from notchflex.loads.load_path import joined_paths
 from notchflex.loads.validation import shown, whole
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
-from notchflex.solver.derived.quantities import BY_BODY, BY_FLEXURE
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import Prepared, lengthened
 from notchflex.solver.programs.pytree_layout import Form
@@ -163,12 +163,12 @@ def simulate_batch(
     try:
         given = [loads] if isinstance(loads, LoadPath) else list(loads)
     except TypeError:
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             f"simulate_batch needs a notchflex.LoadPath, or some in order; got {shown(loads)}"
         ) from None
     paths = [load_path(one, tendons) for one in given]
     if not paths or len({len(path) for path in paths}) > 1:
-        raise InputError("a batch needs one path or more, all of equally many steps")
+        raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
     joined = paths[0] if len(paths) == 1 else joined_paths(paths)
     rows = len(paths)
     return Batch(_simulate(every, joined, rows, outputs, settings, refinement, cores, progress))
@@ -180,7 +180,9 @@ def _robots(robots: Any) -> list[Robot]:
     except TypeError:
         every = []
     if not every or not all(isinstance(robot, Robot) for robot in every):
-        raise InputError(f"a batch needs a notchflex.Robot, or some of them; got {shown(robots)}")
+        raise InputError.WRONG_TYPE(
+            f"a batch needs a notchflex.Robot, or some of them; got {shown(robots)}"
+        )
     return every
 
 
@@ -198,10 +200,10 @@ def _simulate(
     asked = known_outputs(outputs)
     threads = number_of_cores() if cores is None else whole(cores, "cores")
     if threads < 1:
-        raise InputError(f"cores must be 1 or more, or None for all; got {threads}")
+        raise InputError.OUT_OF_RANGE(f"cores must be 1 or more, or None for all; got {threads}")
     count = max(len(robots), paths)
     if len(robots) not in (1, count) or paths not in (1, count):
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             "a batch needs as many robots as loads, or one of either; "
             f"got {len(robots)} robots and {paths} loads"
         )
@@ -233,11 +235,11 @@ def _put(
     shape = tuple(np.maximum(found[name].shape[1:], values.shape[1:]))
     if shape != found[name].shape[1:]:
         wider = [(0, 0), *((0, b - a) for a, b in zip(found[name].shape[1:], shape, strict=True))]
-        found[name] = np.pad(found[name], wider, constant_values=np.nan)
+        found[name] = np.pad(found[name], wider, constant_values=_empty(values))
     first, last = int(rows[0]), int(rows[-1]) + 1
     own = rows if last - first > len(rows) else slice(first, last)
     if shape != values.shape[1:]:
-        found[name][own] = np.nan
+        found[name][own] = _empty(values)
     found[name][(own, *(slice(size) for size in values.shape[1:]))] = values
 
 
@@ -286,12 +288,18 @@ class _Table:
 
 
 def _of_own(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
-    """Values by flexure or body with NaN where a robot has none, rows and steps as leading axes."""
-    own = flexures + (name in BY_BODY)
-    if name in (*BY_FLEXURE, *BY_BODY) and (own < values.shape[2]).any():
+    """Values by flexure or body, empty where a robot has none, rows and steps as leading axes."""
+    along = REGISTERED[name].per[:1]
+    own = flexures + (along == ("body",))
+    if along in (("notch",), ("body",)) and (own < values.shape[2]).any():
         beyond = np.arange(values.shape[2]) >= own[:, None]
-        values[np.broadcast_to(beyond[:, None], values.shape[:3])] = np.nan
+        values[np.broadcast_to(beyond[:, None], values.shape[:3])] = _empty(values)
     return values
+
+
+def _empty(values: np.ndarray) -> float:
+    """What stands where a robot has no number: NaN, or 0 in whole numbers and flags."""
+    return np.nan if values.dtype.kind == "f" else 0
 
 
 def _tables(

@@ -46,12 +46,12 @@ def bodies_from_angles(
     """
     angles = np.atleast_2d(np.asarray(notch_angle, float))
     if angles.ndim != 2 or angles.shape[1] != robot.number_of_notches:
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"{robot.name} has {robot.number_of_notches} notches; got angles of shape "
             f"{np.shape(notch_angle)}, give one column per notch"
         )
     if not np.isfinite(angles).all():
-        raise InputError("a notch angle is not finite; give angles in rad")
+        raise InputError.NOT_FINITE("a notch angle is not finite; give angles in rad")
     position, rotation = _bodies(prepared(robot, flat=False).chain, angles)
     return np.asarray(position), np.asarray(rotation)
 
@@ -135,21 +135,21 @@ def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
     """
     drawn = np.atleast_1d(np.asarray(stroke, float))
     if not np.isfinite(drawn).all():
-        raise InputError("a stroke is not finite; give strokes in mm")
+        raise InputError.NOT_FINITE("a stroke is not finite; give strokes in mm")
     chain = assemble(robot, flat=False)
     first = next(
         (g for g in chain.groups if isinstance(g, WallArc) and 0 in g.numbers),
         None,
     )
     if first is None:
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             'the kinematic model needs a first tendon with path = "wall-arc"; '
             f"the first tendon of {robot.name} has another"
         )
     column = first.numbers.index(0)
     arm = np.asarray(first.across[:, column, 0])
     if not (np.asarray(first.present[:, column]) * arm > 0.0).all():
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             "the kinematic model needs a first tendon that crosses every notch on the side to "
             f"which it bends; that of {robot.name} does not"
         )

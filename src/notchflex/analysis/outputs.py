@@ -8,25 +8,18 @@ from typing import Any
 from jaxtyping import Array
 
 from notchflex._jax import jax, jnp
+from notchflex._quantity import REGISTERED
 from notchflex.errors import InputError
 from notchflex.loads.validation import shown
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import Advance, Solved
-from notchflex.solver.derived.quantities import Quantities, Shape, believable, quantities, shape
+from notchflex.solver.derived.quantities import believable
+from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import Settings
 
+_OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
 DEFAULT_OUTPUTS = ("total_angle", "tip_position", "tip_rotation", "converged")
-OUTPUTS = (
-    *DEFAULT_OUTPUTS,
-    "residual",
-    "iterations",
-    *(
-        name
-        for name in Shape._fields
-        if name not in (*DEFAULT_OUTPUTS, "friction_holds", "bend_possible")
-    ),
-    *Quantities._fields,
-)
+OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *_OF_STATE]),)
 """What can be asked of a batch or of a function that can be differentiated."""
 
 
@@ -40,7 +33,7 @@ def known_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     wrong = [name for name in names if name not in OUTPUTS]
     if wrong or not names:
         said = f"there is no output {shown(wrong[0])}" if wrong else "no output is asked"
-        raise InputError(f"{said}; there are {', '.join(OUTPUTS)}")
+        raise InputError.UNKNOWN_NAME(f"{said}; there are {', '.join(OUTPUTS)}")
     return names
 
 
@@ -86,21 +79,16 @@ def followed(
 
 def _told(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
     """What is asked of a state, and whether it may be believed."""
-    own = shape(chain, solved)
-    holds = believable(own.friction_holds, own.moment_error, own.bend_possible)
-    return _named(chain, solved, own, outputs) | {"_holds": holds}
+    state = SolvedState(chain, solved)
+    told = {name: state.quantity(name) for name in outputs if name in _OF_STATE}
+    return told | {"_holds": believable(state.quantity)}
 
 
 def reported(chain: Chain, solved: Solved, outputs: tuple[str, ...]) -> dict[str, Array]:
     """Return quantities of a solved state by name, in the frame of the base."""
-    return _named(chain, solved, shape(chain, solved), outputs)
-
-
-def _named(chain: Chain, solved: Solved, own: Shape, outputs: tuple[str, ...]) -> dict[str, Array]:
-    known = {**own._asdict(), "tip_rotation": own.body_rotation[-1]}
-    if any(name in Quantities._fields for name in outputs):
-        known |= quantities(chain, solved)._asdict()
-    return {name: known[name] for name in outputs if name in known}
+    told = _told(chain, solved, outputs)
+    del told["_holds"]
+    return told
 
 
 __all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "followed", "known_outputs", "reported"]

@@ -9,6 +9,7 @@ from notchflex.loads import Load, LoadPath
 from notchflex.loads.applied import follows, is_planar, is_unloaded
 from notchflex.loads.command import command
 from notchflex.loads.conversion import load_path
+from notchflex.loads.validation import robot_given
 from notchflex.mechanics.chain import tendons_in_plane
 from notchflex.mechanics.flexure import LEVELS, MOST_REFINEMENT
 from notchflex.results.equilibrium import Equilibrium
@@ -51,7 +52,7 @@ def simulate(
         >>> bool(path.total_angle[3] == path.total_angle[2] > path.total_angle[1])
         True
     """
-    load = load_path(loads, robot.number_of_tendons)
+    load = load_path(loads, robot_given(robot).number_of_tendons)
     if from_state is not None:
         check_robot(from_state, robot)
     ready = prepared_for(robot, load, from_state, refinement)
@@ -121,7 +122,7 @@ def solve_each(
         >>> path.converged.tolist()
         [True, True, True]
     """
-    load = load_path(loads, robot.number_of_tendons)
+    load = load_path(loads, robot_given(robot).number_of_tendons)
     ready = prepared_for(robot, load, refinement=refinement)
     commands = command(load, robot, ready.chain)
     came = run(ready, commands, None, settings or DEFAULT, each_from_start=True)
@@ -133,7 +134,7 @@ def solve_each(
 def check_refinement(refinement: int) -> None:
     """Raise if there is no such refinement."""
     if not isinstance(refinement, int) or not 0 <= refinement <= MOST_REFINEMENT:  # pyright: ignore
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"refinement is a whole number from 0 to {MOST_REFINEMENT}; got {refinement!r}"
         )
 
@@ -147,7 +148,7 @@ def prepared_for(
     """The robot with modes enough for all loads of a path, and for the state before it."""
     check_refinement(refinement)
     if from_state is not None and from_state.refinement != refinement:
-        raise InputError(
+        raise InputError.CONFLICT(
             f"the state was computed with refinement {from_state.refinement}, not {refinement}; "
             "go on with the same"
         )

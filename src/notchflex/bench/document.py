@@ -34,7 +34,9 @@ def measured(only: str | None = None, told: Callable[[str], None] | None = None)
     wanted = {one.name for one in every if only is None or only.lower() in one.name.lower()}
     if not wanted:
         names = "; ".join(one.name for one in every)
-        raise InputError(f"nothing that is timed has `{only}` in its name; there are: {names}")
+        raise InputError.UNKNOWN_NAME(
+            f"nothing that is timed has `{only}` in its name; there are: {names}"
+        )
     wanted |= {case.of for case in CASES if case.name in wanted}
     clock = Clock()
     rows: dict[str, Row] = {}

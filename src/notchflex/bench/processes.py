@@ -73,7 +73,9 @@ def _second_command() -> float:
         done = subprocess.run(command, env=environment, capture_output=True, text=True)
         taken = time.perf_counter() - started
     if done.returncode:
-        raise InputError(f"`notchflex simulate pacheco2021-a` failed: {done.stderr.strip()}")
+        raise InputError.PROCESS_FAILED(
+            f"`notchflex simulate pacheco2021-a` failed: {done.stderr.strip()}"
+        )
     return taken
 
 
@@ -88,7 +90,7 @@ def _python(code: str) -> float:
         command = [sys.executable, "-c", code]
         done = subprocess.run(command, env=environment, capture_output=True, text=True)
     if done.returncode:
-        raise InputError(f"a measuring process failed: {done.stderr.strip()[-500:]}")
+        raise InputError.PROCESS_FAILED(f"a measuring process failed: {done.stderr.strip()[-500:]}")
     return float(done.stdout)
 
 

@@ -47,12 +47,12 @@ def check_files(outputs: Outputs, inputs: Sequence[FilePath], *, steps: int, sev
             kinds = PAPER + BROWSER + (() if several else MOVING)
             check_picture(target, option, inputs=inputs, kinds=kinds)
             if steps < 2 and _moves(target):
-                raise InputError(
+                raise InputError.FILE_FORMAT(
                     f"--plot {target}: one step does not move; write a .png, .svg or .pdf."
                 )
             continue
         if option in ("--nc", "--parquet") and target == STANDARD_OUTPUT:
-            raise InputError(f"{option} - : this is no text; name a file.")
+            raise InputError.FILE_FORMAT(f"{option} - : this is no text; name a file.")
         check_output(target, option, inputs=inputs)
         if option == "--nc":
             from notchflex.results.files.io import need_netcdf

@@ -216,7 +216,7 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
     """
     robot = comparison.robot
     if robot.number_of_tendons != 1:
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"the kinematic model shares the stroke of one tendon; {robot.name} has "
             f"{robot.number_of_tendons}."
         )
@@ -243,13 +243,13 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
 
 def _check(robot: Robot, measurements: Measurements) -> None:
     if not isinstance(measurements, Measurements):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             "compare needs Measurements; read_measurements reads them from a CSV, and "
             f"simulate_measurements makes them; got {type(measurements).__name__}"
         )
     notches = measurements.observed.get("notch_angle")
     if notches is not None and notches.shape[1] != robot.number_of_notches:
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"{measurements.source} has angles of {notches.shape[1]} notches, but {robot.name} has "
             f"{robot.number_of_notches}; choose the robot that was measured"
         )

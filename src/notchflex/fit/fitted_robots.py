@@ -50,14 +50,16 @@ def write_fitted(
     targets = dict(zip(found.given, files, strict=True))
     for label, target in targets.items():
         if target.exists() and _text(target) == source_of(found.given[label]):
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"{target}: this would replace the file that {label} was read from; choose "
                 "another folder."
             )
     try:
         Path(folder).mkdir(exist_ok=True)
     except OSError as problem:
-        raise InputError(f"the folder {folder} cannot be made: {problem.strerror}.") from None
+        raise InputError.FILE_UNWRITABLE(
+            f"the folder {folder} cannot be made: {problem.strerror}."
+        ) from None
     for label, target in targets.items():
         robot = found.robots[label]
         write_text(target, robot_text(robot, source_of(robot), fitted_notes(found, label)))

@@ -216,13 +216,13 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
     last = robot.number_of_notches
     for force in external.body_forces:
         if force.body > last:
-            raise InputError(
+            raise InputError.OUT_OF_RANGE(
                 f"there is no body {force.body}; {robot.name} has the bodies 0 (the base) to "
                 f"{last}, one after each notch"
             )
     given = external.gravity is not None and any(external.gravity)
     if given and robot.material.density is None and external.tip_mass == 0.0:
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"gravity has nothing to act on: the density of {robot.name} is not known and no mass "
             "hangs at its tip; give material.density (kg/m3) or a tip_mass (g)"
         )

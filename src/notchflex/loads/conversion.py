@@ -38,7 +38,7 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
         for load in every
     }
     if len(turns) > 1:
-        raise InputError("base_rotation must be the same for all loads of a path")
+        raise InputError.CONFLICT("base_rotation must be the same for all loads of a path")
     tension = [_entries(load.tension, tendons, "tension") for load in every]
     stroke = [_entries(load.stroke, tendons, "stroke") for load in every]
     given = np.array(tension), np.array(stroke), np.array(turns.pop())
@@ -54,14 +54,16 @@ def _several(loads: Any) -> list[Load]:
     try:
         every = list(loads)
     except TypeError:
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             f"loads must be a notchflex.Load, a LoadPath or Loads in order; got {shown(loads)}"
         ) from None
     if not every:
-        raise InputError("there are no loads; give at least one")
+        raise InputError.NO_DATA("there are no loads; give at least one")
     for load in every:
         if not isinstance(load, Load):
-            raise InputError(f"a load must be a notchflex.Load; got {type(load).__name__}")
+            raise InputError.WRONG_TYPE(
+                f"a load must be a notchflex.Load; got {type(load).__name__}"
+            )
     return every
 
 
@@ -74,7 +76,7 @@ def _entries(value: Any, tendons: int, what: str) -> list[float]:
     several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     given: list[Any] = list(value) if several else [value]
     if len(given) > tendons:
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"{what} has {len(given)} entries, but the robot has {tendons} tendons; "
             f"give at most {tendons}"
         )
@@ -84,7 +86,7 @@ def _entries(value: Any, tendons: int, what: str) -> list[float]:
             continue
         entries[i] = number(entry, what, _FORM)
         if not isfinite(entries[i]):
-            raise InputError(f"{what} must be finite; got {shown(entry)}")
+            raise InputError.NOT_FINITE(f"{what} must be finite; got {shown(entry)}")
     return entries
 
 

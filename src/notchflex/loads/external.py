@@ -49,7 +49,7 @@ class BodyForce:
         """Check the numbers."""
         body = whole(self.body, "the body of a BodyForce")
         if body < 0:
-            raise InputError(f"bodies are counted from 0, the base; got {body}")
+            raise InputError.OUT_OF_RANGE(f"bodies are counted from 0, the base; got {body}")
         object.__setattr__(self, "body", body)
         for what, form in (("force", "N"), ("moment", "N mm"), ("point", "mm, from the body")):
             taken = vector(getattr(self, what), f"the {what} of a BodyForce", form)
@@ -139,14 +139,14 @@ class ExternalLoad:
 def _mass(value: Any) -> float:
     mass = number(value, "tip_mass", "a number of grams")
     if not 0.0 <= mass < float("inf"):
-        raise InputError(f"tip_mass must be finite and 0 g or more; got {mass:g}")
+        raise InputError.NOT_FINITE(f"tip_mass must be finite and 0 g or more; got {mass:g}")
     return mass
 
 
 def _body_forces(value: Any) -> tuple[BodyForce, ...]:
     several = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     if not several or not all(isinstance(one, BodyForce) for one in value):
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             f"body_forces must be a list of notchflex.BodyForce(body, force); got {shown(value)}"
         )
     return tuple(value)

@@ -41,7 +41,7 @@ class LoadPath(Displayed):
         stroke = np.atleast_2d(table(self.stroke, "stroke"))
         base_rotation = np.array(vector(self.base_rotation, *BASE_TURN))
         if tension.shape != stroke.shape or tension.ndim != 2:
-            raise InputError(
+            raise InputError.WRONG_SHAPE(
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
                 f"got {tension.shape} and {stroke.shape}"
             )
@@ -52,15 +52,17 @@ class LoadPath(Displayed):
         if tension.size and np.isnan(stroke).all() and 0.0 <= tension.min() < np.inf:
             return  # nothing but tensions that a tendon can have
         if len(tension) == 0:
-            raise InputError("a load path needs at least one step; got none")
+            raise InputError.NO_DATA("a load path needs at least one step; got none")
         if np.isinf(tension).any() or np.isinf(stroke).any():
-            raise InputError("a tension or stroke is infinite; give finite numbers (N, mm)")
+            raise InputError.NOT_FINITE(
+                "a tension or stroke is infinite; give finite numbers (N, mm)"
+            )
         if (tension < 0).any():
-            raise InputError(
+            raise InputError.OUT_OF_RANGE(
                 f"a tendon can only pull: got a tension of {np.nanmin(tension):g} N, give 0 or more"
             )
         if (~np.isnan(tension) & ~np.isnan(stroke)).any():
-            raise InputError(
+            raise InputError.CONFLICT(
                 "tension and stroke are both given for one tendon in one step; give one of them"
             )
 
@@ -154,7 +156,7 @@ class LoadPath(Displayed):
             [[0.0, nan], [1.0, nan], [nan, 1.0]]
         """
         if not isinstance(following, LoadPath):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise InputError(
+            raise InputError.WRONG_TYPE(
                 f"a load path goes on with another notchflex.LoadPath; got {shown(following)}"
             )
         count = max(self.tension.shape[1], following.tension.shape[1])
@@ -226,7 +228,7 @@ class LoadPath(Displayed):
         if given == count:
             return self
         if given > count:
-            raise InputError(
+            raise InputError.WRONG_SHAPE(
                 f"the load commands {given} tendons, but the robot has {count}; "
                 f"give at most {count}"
             )
@@ -245,7 +247,7 @@ def joined_paths(paths: Sequence[LoadPath]) -> LoadPath:
         InputError: Their bases are turned differently.
     """
     if any((path.base_rotation != paths[0].base_rotation).any() for path in paths):
-        raise InputError("base_rotation must be the same for all paths of a batch")
+        raise InputError.CONFLICT("base_rotation must be the same for all paths of a batch")
     return LoadPath(
         np.concatenate([path.tension for path in paths]),
         np.concatenate([path.stroke for path in paths]),
@@ -270,12 +272,12 @@ def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
         if not all(isinstance(one, ExternalLoad) for one in different.values()):
             raise TypeError
     except TypeError:
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             "external of a load path must hold one ExternalLoad per step; "
             f"got {shown(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
         ) from None
     if given and len(given) != steps:
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"external of a load path has {len(given)} entries, but there are {steps} steps; "
             "give one per step"
         )

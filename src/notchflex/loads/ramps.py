@@ -56,15 +56,15 @@ def stroke_path(start: float, stop: float, steps: int = 31, *, tendon: int = 1) 
 def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> LoadPath:
     steps, tendon = whole(steps, "steps"), whole(tendon, "tendon")
     if steps < 1:
-        raise InputError(f"a range needs at least one step; got {steps}")
+        raise InputError.NO_DATA(f"a range needs at least one step; got {steps}")
     if tendon < 1:
-        raise InputError(f"tendons are counted from 1; got {tendon}")
+        raise InputError.OUT_OF_RANGE(f"tendons are counted from 1; got {tendon}")
     first, last = number(start, f"the first {what}"), number(stop, f"the last {what}")
     commanded = np.full((steps, tendon), np.nan)
     with np.errstate(over="ignore", invalid="ignore"):
         commanded[:, tendon - 1] = np.linspace(first, last, steps)
     if not np.isfinite(commanded[:, tendon - 1]).all():
-        raise InputError(f"a {what} range needs finite ends; got {first:g} and {last:g}")
+        raise InputError.NOT_FINITE(f"a {what} range needs finite ends; got {first:g} and {last:g}")
     nothing = np.full_like(commanded, np.nan)
     return LoadPath(commanded, nothing) if what == "tension" else LoadPath(nothing, commanded)
 

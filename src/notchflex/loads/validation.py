@@ -26,7 +26,7 @@ def number(value: Any, what: str, form: str = "a number") -> float:
             raise TypeError
         return float(value)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} must be {form}; got {shown(value)}") from None
+        raise InputError.WRONG_TYPE(f"{what} must be {form}; got {shown(value)}") from None
 
 
 def whole(value: Any, what: str) -> int:
@@ -40,7 +40,7 @@ def whole(value: Any, what: str) -> int:
             raise TypeError
         return operator.index(value)
     except TypeError:
-        raise InputError(f"{what} must be a whole number; got {shown(value)}") from None
+        raise InputError.WRONG_TYPE(f"{what} must be a whole number; got {shown(value)}") from None
 
 
 def truth(value: Any, what: str) -> bool:
@@ -51,7 +51,7 @@ def truth(value: Any, what: str) -> bool:
     """
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise InputError(f"{what} must be True or False; got {shown(value)}")
+    raise InputError.WRONG_TYPE(f"{what} must be True or False; got {shown(value)}")
 
 
 def vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
@@ -79,7 +79,9 @@ def vector(value: Any, what: str, form: str) -> tuple[float, float, float]:
         except InputError:
             numbers = []
     if len(numbers) != 3 or not all(isfinite(one) for one in numbers):
-        raise InputError(f"{what} needs three finite numbers ({form}); got {shown(value)}")
+        raise InputError.NOT_FINITE(
+            f"{what} needs three finite numbers ({form}); got {shown(value)}"
+        )
     return numbers[0], numbers[1], numbers[2]
 
 
@@ -100,7 +102,7 @@ def table(value: Any, what: str) -> np.ndarray:
             raise TypeError
         return np.asarray(value, float)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             f"{what} of a load path must be numbers, steps by tendons; got {shown(value)}"
         ) from None
 
@@ -112,7 +114,7 @@ def robot_given(value: Any) -> Robot:
         InputError: It is none.
     """
     if not isinstance(value, Robot):
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             f'a notchflex.Robot is needed, such as load_robot("pacheco2021-a"); got {shown(value)}'
         )
     return value

@@ -69,7 +69,7 @@ def save_animation(
     check_picture(str(target), "the animation", kinds=MOVING)
     steps = frames_of(path)
     if len(steps) < 2:
-        raise InputError(
+        raise InputError.TOO_FEW_DATA(
             f"an animation needs two steps that were solved; this path has {len(steps)}. "
             "Draw a picture instead."
         )

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.plotting.curves import COLOUR, LINE, failures, solved_only
 from notchflex.plotting.drive import LOADING, UNLOADING, branches, drive
@@ -19,7 +20,6 @@ from notchflex.plotting.renderers.with_matplotlib import draw_panel
 from notchflex.plotting.sheet import BESIDE, INSIDE, Item, Line, Panel
 from notchflex.plotting.style import house_style, sequence_colours
 from notchflex.results.files.csv import Entry, entries_of, is_listed
-from notchflex.results.quantities.quantity import Quantity
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 
@@ -65,13 +65,13 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
 
     if isinstance(thing, EquilibriumPath):
         if x is None or y is None:
-            raise InputError(
+            raise InputError.MISSING_VALUE(
                 "a path is drawn on axes as one quantity over another; give both, such as "
                 "plot('stroke', 'tension')"
             )
         panel = quantities_panel(thing, x, y)
     elif x is not None or y is not None:
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             "one quantity is drawn over another for a path; "
             f"got a {type(thing).__name__}, which is drawn by plot(it)"
         )
@@ -80,7 +80,7 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
     elif isinstance(thing, Robot):
         panel = robot_shape(thing)
     else:
-        raise InputError(
+        raise InputError.WRONG_TYPE(
             "axes can be given for a path, a state or a robot; the picture of a "
             f"{type(thing).__name__} has axes of its own: plot(it)"
         )
@@ -89,7 +89,7 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
         projection = "3d" if panel.in_space else None
         axes: Any = ax if figure is None else figure.add_subplot(projection=projection)
         if panel.in_space and axes.name != "3d":
-            raise InputError(
+            raise InputError.UNSUPPORTED(
                 "this robot bends out of one plane; give axes made with projection='3d'"
             )
         draw_panel(axes, panel)
@@ -156,11 +156,13 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
         label = _label(quantity, entry)
         return Series(label, [""], [name], np.asarray(entry.values, float)[:, None])
     if name in QUANTITIES:
-        raise InputError(f"{name} can't be drawn as lines; draw a quantity such as total_angle")
+        raise InputError.UNSUPPORTED(
+            f"{name} can't be drawn as lines; draw a quantity such as total_angle"
+        )
     choice = [*(one.name for one in known), *headers, STEP]
     near = get_close_matches(str(name), choice, 3, 0.5)
     meant = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(choice)}"
-    raise InputError(f"there is no quantity {name!r} to draw; {meant}")
+    raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r} to draw; {meant}")
 
 
 def _label(quantity: Quantity, entry: Entry) -> str:
@@ -188,7 +190,7 @@ def _pairs(x: str, across: Series, upward: Series) -> list[tuple[int, int]]:
         used = np.flatnonzero(np.ptp(across.values, axis=0) > 0.0).tolist()
     if len(used) != 1:
         columns = ", ".join(header for header in across.headers if header) or "tension, stroke"
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"{x} has {count} entries; take one of them for the horizontal axis: {columns}"
         )
     return [(used[0], row) for row in range(upward.values.shape[1])]

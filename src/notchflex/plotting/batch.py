@@ -60,7 +60,7 @@ def batch_picture(
     rows = len(first)
     x = np.arange(1.0, rows + 1.0) if against is None else np.asarray(against, float)
     if x.shape != (rows,):
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"the batch has {rows} rows, and against has the shape {x.shape}; give one value a row."
         )
     good = _last(batch, "converged")
@@ -75,7 +75,7 @@ def batch_picture(
     if tips is not None:
         panels.append(_tips(tips, good))
     if not panels:
-        raise InputError(
+        raise InputError.NO_DATA(
             "the batch holds nothing that can be drawn; ask for outputs such as total_angle, "
             "notch_angle or tip_position."
         )

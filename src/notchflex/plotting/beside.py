@@ -57,7 +57,9 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         ['mu 0.13', 'mu 0']
     """
     if not 2 <= len(paths) <= MOST:
-        raise InputError(f"a picture shows 2 to {MOST} robots beside each other; got {len(paths)}.")
+        raise InputError.OUT_OF_RANGE(
+            f"a picture shows 2 to {MOST} robots beside each other; got {len(paths)}."
+        )
     colours = dict(zip(paths, MODEL_COLOURS, strict=False))
     cells: list[Cell] = []
     for column, (label, path) in enumerate(paths.items()):

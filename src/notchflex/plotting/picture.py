@@ -76,7 +76,7 @@ def _picture(result: Any) -> Picture:
         return calibration_picture(result)
     if isinstance(result, FrictionRig):
         return friction_picture(result)
-    raise InputError(
+    raise InputError.WRONG_TYPE(
         "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, a "
         f"Comparison, a Calibration, a FrictionRig or a dict of paths; got {type(result).__name__}."
     )

@@ -6,14 +6,14 @@ What computes, reads or writes is loaded on first use: `notchflex --help` passes
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from notchflex.results.quantities.quantity import Quantity
-from notchflex.results.quantities.registry import QUANTITIES
+from notchflex._quantity import Quantity
 
 if TYPE_CHECKING:
-    from notchflex.results.equilibrium import ConvergenceError, Equilibrium
+    from notchflex.results.equilibrium import Equilibrium
     from notchflex.results.files.io import read_path, save_path
     from notchflex.results.files.table import read_table
     from notchflex.results.path import EquilibriumPath
+    from notchflex.results.quantities.registry import QUANTITIES
     from notchflex.results.recorded import BEFORE, TOLD, Recorded
     from notchflex.results.state import SavedState, State
 
@@ -21,7 +21,6 @@ __all__ = [
     "BEFORE",
     "QUANTITIES",
     "TOLD",
-    "ConvergenceError",
     "Equilibrium",
     "EquilibriumPath",
     "Quantity",
@@ -34,12 +33,13 @@ __all__ = [
 ]
 
 _HOME = {
-    **dict.fromkeys(("ConvergenceError", "Equilibrium"), "equilibrium"),
+    "Equilibrium": "equilibrium",
     "EquilibriumPath": "path",
     **dict.fromkeys(("BEFORE", "TOLD", "Recorded"), "recorded"),
     **dict.fromkeys(("SavedState", "State"), "state"),
     **dict.fromkeys(("read_path", "save_path"), "files.io"),
     "read_table": "files.table",
+    "QUANTITIES": "quantities.registry",
 }
 
 

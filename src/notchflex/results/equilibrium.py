@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._summary import Displayed, Summary
+from notchflex.errors import ConvergenceError
 from notchflex.loads import Load
 from notchflex.results.quantities.properties import EquilibriumQuantities
 from notchflex.results.state import State
@@ -19,10 +20,6 @@ if TYPE_CHECKING:  # for the types only: a path hands out its states
 
     from notchflex._plot import Picture
     from notchflex.results.path import EquilibriumPath
-
-
-class ConvergenceError(RuntimeError):
-    """A result was asked to be converged and is not."""
 
 
 class Equilibrium(EquilibriumQuantities, Displayed):
@@ -130,7 +127,7 @@ class Equilibrium(EquilibriumQuantities, Displayed):
             ConvergenceError: It did not; the message says why.
         """
         if not self.converged:
-            raise ConvergenceError(self.reason)
+            raise ConvergenceError(self.reason, self.path.failures[self.step][0])
         return self
 
     def _summary(self) -> Summary:

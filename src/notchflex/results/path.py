@@ -11,15 +11,18 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._jax import constant
+from notchflex._quantity import Quantity
 from notchflex._summary import Displayed, Summary
+from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.applied import out_of_frame
 from notchflex.loads.command import Command, command
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.motion import rotation_about
-from notchflex.results.equilibrium import ConvergenceError, Equilibrium
-from notchflex.results.quantities.path_formulas import FORMULAS
-from notchflex.results.quantities.properties import PathQuantities
+from notchflex.results.equilibrium import Equilibrium
+from notchflex.results.quantities.front import friction_front
+from notchflex.results.quantities.properties import QUANTITIES, PathQuantities
+from notchflex.results.reason import why_not
 from notchflex.results.recorded import Recorded
 from notchflex.results.state import State
 from notchflex.robot import Robot
@@ -88,12 +91,23 @@ class EquilibriumPath(PathQuantities, Displayed):
         """
         kept = self._kept
         if name not in kept:
-            own = FORMULAS.get(name)
-            kept[name] = self.solver_quantity(name) if own is None else own(self)
+            own = QUANTITIES.get(name)
+            if own is None:
+                known = ", ".join(QUANTITIES)
+                raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {known}")
+            computed = own.source in ("path", "derived")
+            kept[name] = own.formula(self) if computed else self._in_world(own)
         return kept[name]
 
+    def _in_world(self, quantity: Quantity) -> np.ndarray:
+        """Vectors and rotations of the solver are in the frame of the base."""
+        turn, values = self.base_to_world, self.solver_quantity(quantity.name)
+        if turn is None or not quantity.in_world:
+            return values
+        return turn @ values if "row" in quantity.per else values @ turn.T
+
     def solver_quantity(self, name: str) -> np.ndarray:
-        """Return what the solver reports of every step, by its name in `Shape` or `Quantities`.
+        """Return what the solver reports of every step, by its name.
 
         Steps that were not tried repeat the last one that was: the solver leaves their rows empty.
         """
@@ -115,7 +129,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         turn = self.load.base_rotation
         return np.asarray(rotation_about(constant(turn))) if any(turn.tolist()) else None
 
-    @property
+    @cached_property
     def front(self) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
         """How far the friction has reversed along every tendon, m and eta, (s, t) each.
 
@@ -124,7 +138,12 @@ class EquilibriumPath(PathQuantities, Displayed):
         base; m is one more than there are when all have turned (eta is then NaN). A tendon that
         is pulled for the first time has m = 1 and eta = 1.
         """
-        return self.quantity("front")
+        return friction_front(self.contact_log_ratio, self.contact_bound)
+
+    @cached_property
+    def failures(self) -> list[tuple[Failure | None, str]]:
+        """What stopped the solver at every step, and the sentence that says so; None and ""."""
+        return [why_not(self, step) for step in range(len(self))]
 
     @cached_property
     def commands(self) -> Command:
@@ -231,7 +250,8 @@ class EquilibriumPath(PathQuantities, Displayed):
         """
         if not self.converged.all():
             step = int(np.argmin(self.converged))
-            raise ConvergenceError(f"step {step + 1} of {len(self)}: {self.reason[step]}")
+            failure, text = self.failures[step]
+            raise ConvergenceError(f"step {step + 1} of {len(self)}: {text}", failure)
         return self
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Int
 
 from notchflex._jax import constant, jax
+from notchflex.errors import Failure
 from notchflex.solver.actuation import drawn_when_closed
 from notchflex.solver.programs.prepare import Prepared
 from notchflex.solver.programs.run import run
@@ -25,60 +26,36 @@ _NEARLY_CLOSED = 1e-3
 _STIFFNESSES, _GROWS = (1e2, 1e3, 1e4), 3.0
 
 
-def why_not(path: EquilibriumPath, step: int) -> str:
-    """Why a step did not converge; empty where it did."""
+def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
+    """What stopped the solver at a step, and the sentence that says so; None and "" if nothing."""
     if path.converged[step]:
-        return ""
+        return None, ""
     if not path.run.tried[step]:
-        failed = int(np.argmin(path.converged))
-        return f"not tried, because step {failed + 1} of the path did not converge"
-    if path.run.converged[step] and not path.run.quantity("bend_possible")[step]:
-        return (
-            "a notch is bent by more than half a turn, so sharply that a fibre would have no "
-            "length left, or too far about several axes at once; take smaller loads"
-        )
-    if path.run.converged[step] and path.run.quantity("friction_holds")[step]:
-        return (
-            "the strain modes miss the moment of the loads by "
-            f"{100 * path.moment_error[step]:.0f} % of the largest: the robot is bent beyond "
-            "what this model is for; take smaller loads, or a refinement of 1, 2 or 3"
-        )
-    if path.run.converged[step]:
-        return (
-            "a tendon turns so sharply at an edge that its friction would hold any pull "
-            "(coefficient * tan(turning / 2) is 1 or more), where the friction law says nothing"
-        )
+        return _said(Failure.NOT_TRIED, failed=int(np.argmin(path.converged)) + 1)
+    if path.run.converged[step]:  # but beyond the limits of the model
+        if not path.run.quantity("bend_possible")[step]:
+            return _said(Failure.BENT_TOO_FAR)
+        if path.run.quantity("friction_holds")[step]:
+            return _said(Failure.TOO_FEW_MODES, percent=100 * path.moment_error[step])
+        return _said(Failure.FRICTION_LOCKS)
     tension = ", ".join(f"{value:.4g}" for value in path.tension[step])
     drawn = ", ".join(f"{value:.4g}" for value in path.stroke[step])
-    last = f"the last good state has tension {tension} N and stroke {drawn} mm"
+    last = f"; the last good state has tension {tension} N and stroke {drawn} mm"
     opening = np.asarray(path.chain.rods.length).sum(axis=-1)
     all_closed = (path.gap[step] < _NEARLY_CLOSED * opening).all()
     if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
-        return (
-            "every notch closed: the robot can't shorten the tendon further, so this stroke "
-            f"fixes no tension; {last}; command a smaller stroke, or a tension, or give the "
-            "tendon a finite axial_stiffness"
-        )
-    held = _drawn_by_stretch_alone(path, step)
+        return _said(Failure.NOTCHES_CLOSED, last)
+    held = [str(tendon + 1) for tendon in _drawn_by_stretch_alone(path, step)]
     if len(held) == 1:
-        return (
-            f"the robot can't shorten tendon {held[0] + 1} by so much, so this stroke fixes no "
-            f"tension; {last}; command a smaller stroke, or a tension, or give the tendon a "
-            "finite axial_stiffness"
-        )
-    if len(held):
-        numbers = " and ".join(str(number + 1) for number in held)
-        return (
-            f"the strokes of tendons {numbers} contradict each other: no shape lets inextensible "
-            f"tendons be drawn so far at once, so they fix no tension; {last}; command other "
-            "strokes, or a tension, or give the tendons a finite axial_stiffness"
-        )
-    part = 100.0 * float(path.run.reached[step])
-    return (
-        f"no equilibrium found beyond {part:.3g} % of the way from the state before "
-        f"(imbalance {float(path.residual[step]):.2g}); {last}; take smaller steps, or the "
-        "robot has no equilibrium there"
-    )
+        return _said(Failure.STROKE_OUT_OF_REACH, last, tendon=held[0])
+    if held:
+        return _said(Failure.STROKES_CONTRADICT, last, tendons=" and ".join(held))
+    reached, left = 100.0 * float(path.run.reached[step]), float(path.residual[step])
+    return _said(Failure.NO_EQUILIBRIUM, last, percent=reached, residual=left)
+
+
+def _said(failure: Failure, last: str = "", **values: object) -> tuple[Failure, str]:
+    return failure, f"{failure.text.format(**values)}{last}; {failure.remedy}"
 
 
 def _past_closing(path: EquilibriumPath, step: int) -> bool:

@@ -10,9 +10,9 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex.loads.command import Command
 from notchflex.solver.continuation import Solved
-from notchflex.solver.derived.quantities import Quantities, Shape
+from notchflex.solver.derived.quantities import STATE, Shape
 
-TOLD = (*Shape._fields, *Quantities._fields)
+TOLD = (*Shape._fields, *STATE)
 """Everything that a run tells of each state, by name."""
 
 BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
@@ -46,7 +46,7 @@ class Recorded:
     reached: Float[np.ndarray, " s"]
 
     def quantity(self, name: str) -> np.ndarray:
-        """What is reported of each state, by its name in `Shape` or `Quantities`."""
+        """What is reported of each state, by its name in the registry."""
         return self.told[name]
 
     def before(self, name: str) -> np.ndarray:

@@ -71,7 +71,9 @@ class State(Displayed):
             FilePath(path).write_text(text, encoding="utf-8")
         except (OSError, ValueError) as error:  # ValueError: a null character in the name
             reason = getattr(error, "strerror", None) or error
-            raise InputError(f"the state cannot be written to {path}: {reason}") from None
+            raise InputError.FILE_UNWRITABLE(
+                f"the state cannot be written to {path}: {reason}"
+            ) from None
 
     def _summary(self) -> Summary:
         from notchflex.results.summary import state_summary
@@ -104,18 +106,22 @@ class State(Displayed):
             InputError: The file is missing, is no state or is damaged.
         """
         if not str(path).strip():
-            raise InputError("the name of the state file is empty; give that of a saved state")
+            raise InputError.MISSING_VALUE(
+                "the name of the state file is empty; give that of a saved state"
+            )
         try:
             content = json.loads(FilePath(path).read_text(encoding="utf-8"))
         except FileNotFoundError:
-            raise InputError(f"there is no state file {path}") from None
+            raise InputError.FILE_NOT_FOUND(f"there is no state file {path}") from None
         except (OSError, ValueError, RecursionError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise InputError(
+            raise InputError.FILE_UNREADABLE(
                 f"{path} cannot be read as a state: {reason}; give a file written by --save-state"
             ) from None
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
-            raise InputError(f"{path} is no notchflex state; give a file written by --save-state")
+            raise InputError.FILE_FORMAT(
+                f"{path} is no notchflex state; give a file written by --save-state"
+            )
         robot, arrays = content.get("robot"), content.get("arrays")
         if not isinstance(robot, str) or not isinstance(arrays, dict):
             raise _damaged(path, "the name of its robot or its numbers are missing")
@@ -178,7 +184,9 @@ class SavedState:
 
 
 def _damaged(source: str | FilePath, what: str) -> InputError:
-    return InputError(f"the state file {source} is damaged: {what}; save the state again")
+    return InputError.FILE_DAMAGED(
+        f"the state file {source} is damaged: {what}; save the state again"
+    )
 
 
 def check_robot(state: State | SavedState, robot: Robot) -> None:
@@ -188,14 +196,14 @@ def check_robot(state: State | SavedState, robot: Robot) -> None:
         InputError: It belongs to another one; the message names the values that differ.
     """
     if state.robot != robot.name:
-        raise InputError(
+        raise InputError.STATE_OF_ANOTHER_ROBOT(
             f"the state belongs to robot {state.robot!r}, this one is {robot.name!r}; "
             "continue from a state of the same robot"
         )
     differs = "" if state.description is None else mismatch(robot, state.description)
     if differs:
         source = f"{state.source} holds" if isinstance(state, SavedState) else "this is"
-        raise InputError(
+        raise InputError.STATE_OF_ANOTHER_ROBOT(
             f"{source} a state of {robot.name!r} with other values: this robot has {differs}. "
             "Continue with the values of the state, or start from rest."
         )
@@ -225,7 +233,7 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solved
             # The modes of every level are the first ones of the next.
             array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
         if array.shape != leaf.shape:
-            raise InputError(
+            raise InputError.STATE_OF_ANOTHER_ROBOT(
                 f"{whose} with other notches or tendons than this robot; "
                 "continue from a state of the same robot"
             )

@@ -28,17 +28,16 @@ def sentences(error: ValidationError, cls: type, repeats: Sequence[int] = ()) ->
         cls: The part class that was validated.
         repeats: `repeat` of every `[[notch]]` table, so that notches are counted as in the robot.
     """
-    said: list[str] = []
-    records = error.errors(include_url=False)
+    records = cast("list[dict[str, Any]]", error.errors(include_url=False))
     wrong = [record["loc"] for record in records]
-    for record in records:
-        loc = record["loc"]
-        if record["type"] == "too_short" and any(loc == one[: len(loc)] != one for one in wrong):
-            continue  # pydantic counts only the good items of a list; what is wrong is said
-        for one in _sentences_of(cast("dict[str, Any]", record), cls, repeats):
-            if one not in said:
-                said.append(one)
-    return said
+    # pydantic counts only the good items of a list as there; what is wrong with others is said
+    counted = (
+        one
+        for one in records
+        if one["type"] != "too_short"
+        or not any(one["loc"] == w[: len(one["loc"])] != w for w in wrong)
+    )
+    return list(dict.fromkeys(said for one in counted for said in _sentences_of(one, cls, repeats)))
 
 
 def unknown_key(name: str, key: str, allowed: Iterable[str]) -> str:
@@ -84,26 +83,24 @@ def fields_of(cls: type) -> Mapping[str, Any]:
 
 def _sentences_of(record: dict[str, Any], cls: type, repeats: Sequence[int]) -> list[str]:
     """Say one record of pydantic; a check across keys may have found several problems."""
-    place = _Place(cls, record["loc"], repeats)
+    place, kind = _Place(cls, record["loc"], repeats), record["type"]
     error = record.get("ctx", {}).get("error")
     if hasattr(error, "found"):
         return [f"`{place.name_of(key)}` {text}{place.note}" for key, text in error.found]
-    if record["type"] in ("unexpected_keyword_argument", "unexpected_positional_argument"):
+    if kind in ("unexpected_keyword_argument", "unexpected_positional_argument"):
         owner = _Place(cls, record["loc"][:-1], repeats)
         allowed = [name for name in fields_of(owner.cls) if name] if owner.cls else []
         return [unknown_key(place.name, str(record["loc"][-1]), allowed)]
-    if record["type"] == "missing":
+    if kind == "missing":
         return [f"`{place.name}` is missing{place.note}; give {place.wanted}."]
-    if record["type"] == "union_tag_not_found":
-        allowed = _quoted(kind_of(one) for one in place.kinds)
-        return [f"`{place.name_of('kind')}` is missing{place.note}; give one of {allowed}."]
-    if record["type"] == "union_tag_invalid":
-        allowed = [kind_of(one) for one in place.kinds]
-        got = record["ctx"]["tag"]
-        return [
-            f'`{place.name_of("kind")}` is "{got}"{place.note}; allowed: {_quoted(allowed)}'
-            f"{nearest(str(got), allowed)}."
-        ]
+    allowed = [kind_of(one) for one in place.kinds]
+    if kind == "union_tag_not_found":
+        wanted = f"give one of {_quoted(allowed)}"
+        return [f"`{place.name_of('kind')}` is missing{place.note}; {wanted}."]
+    if kind == "union_tag_invalid":
+        got = f'`{place.name_of("kind")}` is "{record["ctx"]["tag"]}"{place.note}'
+        near = nearest(str(record["ctx"]["tag"]), allowed)
+        return [f"{got}; allowed: {_quoted(allowed)}{near}."]
     got = _got(record["input"], place.unit)
     return [f"`{place.name}` is {got}{place.note}; {_rule(record, place)}."]
 
@@ -179,36 +176,36 @@ def _quoted(words: Iterable[str]) -> str:
 
 def _rule(record: dict[str, Any], place: _Place) -> str:
     """Say what is allowed instead."""
-    kind, ctx = record["type"], record.get("ctx", {})
-    unit = f" {place.unit}" if place.unit else ""
-    bounds = {
-        "greater_than": ("greater than", "gt"),
-        "greater_than_equal": ("at least", "ge"),
-        "less_than": ("less than", "lt"),
-        "less_than_equal": ("at most", "le"),
-    }
-    if kind == "finite_number":
-        return "it must be a finite number"
-    if kind in bounds and record["input"] != record["input"]:  # only NaN differs from itself
-        return "it must be a number"
-    if kind == "greater_than_equal" and record["input"] <= 0.0 < ctx["ge"] < 1.0:
-        return f"it must be greater than 0{unit}"  # a negative length is no small length
-    if kind in bounds:
-        word, key = bounds[kind]
-        return f"it must be {word} {ctx[key]:g}{unit}"
+    kind, got, unit = record["type"], record["input"], f" {place.unit}" if place.unit else ""
+    if kind in _BOUNDS:
+        limit = record["ctx"][_BOUNDS[kind][1]]
+        if got != got:  # only NaN differs from itself
+            return "it must be a number"
+        if kind == "greater_than_equal" and got <= 0.0 < limit < 1.0:
+            return f"it must be greater than 0{unit}"  # a negative length is no small length
+        return f"it must be {_BOUNDS[kind][0]} {limit:g}{unit}"
     if kind == "number_wanted":
-        return f"it must be a number{f' in {place.unit}' if place.unit else ''}, without quotes"
-    if kind == "whole_number_wanted":
-        return "it must be a whole number"
+        return f"it must be a number{' in' if unit else ''}{unit}, without quotes"
     if kind == "literal_error":
         allowed = typing.get_args(place.field.annotation)
-        return f"allowed: {_quoted(allowed)}{nearest(str(record['input']), allowed)}"
-    if kind == "string_type":
-        return "it must be text in quotes"
-    if kind == "string_too_short":
-        return "it must not be empty"
+        return f"allowed: {_quoted(allowed)}{nearest(str(got), allowed)}"
     if kind == "too_short":
         return f"give at least one {place.wanted.removeprefix('a ')}"
     if kind in ("tuple_type", "list_type"):
         return f"write it as a list, one [[{place.name}]] table for each"
-    return f"it must be a table: [{place.name.partition('[')[0]}] and its keys below"
+    table = f"it must be a table: [{place.name.partition('[')[0]}] and its keys below"
+    return _RULES.get(kind, table)
+
+
+_BOUNDS = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+_RULES = {
+    "finite_number": "it must be a finite number",
+    "whole_number_wanted": "it must be a whole number",
+    "string_type": "it must be text in quotes",
+    "string_too_short": "it must not be empty",
+}

@@ -58,7 +58,9 @@ def _part(cls: type[T], *, kw_only: bool) -> type[T]:
             checked_init(self, *args, **kwargs)
         except ValidationError as error:
             found = sentences(error, made)
-            raise InputError("\n".join(f"{made.__name__}: {one}" for one in found)) from None
+            raise InputError.INVALID_ROBOT(
+                "\n".join(f"{made.__name__}: {one}" for one in found)
+            ) from None
 
     made.__init__ = checked
     return made

@@ -39,7 +39,9 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
         robot = from_table(table)
     except InputError as error:
         lines = str(error).splitlines()
-        raise RobotFileError("\n".join(f"{shown}: {line}" for line in lines)) from None
+        raise RobotFileError.INVALID_ROBOT(
+            "\n".join(f"{shown}: {line}" for line in lines)
+        ) from None
     return remember_source(robot, text)
 
 
@@ -67,12 +69,12 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
     # os.path: False, and no error, for a name that can be no file's
     if is_path or os.path.exists(text):
         if path.suffix == ".toml" and path.stem in names and not path.exists():
-            raise RobotFileError(
+            raise RobotFileError.FILE_NOT_FOUND(
                 f"{path}: there is no such file; the ready robot is called `{path.stem}`, "
                 "without .toml."
             )
         return path
-    raise RobotFileError(
+    raise RobotFileError.UNKNOWN_NAME(
         f"`{text}` is neither a ready robot{nearest(text, names)} nor a robot file. "
         f"Ready robots: {', '.join(names)}."
     )
@@ -83,17 +85,19 @@ def _read_text(path: Path, shown: str) -> str:
         # -sig: some editors begin a file with a byte order mark, which is no TOML
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise RobotFileError(f"{shown}: there is no such file.") from None
+        raise RobotFileError.FILE_NOT_FOUND(f"{shown}: there is no such file.") from None
     except IsADirectoryError:
-        raise RobotFileError(f"{shown} is a folder; give the robot file in it.") from None
+        raise RobotFileError.FILE_UNREADABLE(
+            f"{shown} is a folder; give the robot file in it."
+        ) from None
     except UnicodeDecodeError as error:
-        raise RobotFileError(
+        raise RobotFileError.FILE_UNREADABLE(
             f"{shown} is not UTF-8 text (byte {error.start}); a robot file is a TOML text file, "
             "saved as UTF-8."
         ) from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise RobotFileError(f"{shown} cannot be read: {reason}.") from None
+        raise RobotFileError.FILE_UNREADABLE(f"{shown} cannot be read: {reason}.") from None
 
 
 def _parse(text: str, shown: str) -> dict[str, Any]:
@@ -107,11 +111,15 @@ def _parse(text: str, shown: str) -> dict[str, Any]:
         # "end of document" is the last line that has something on it
         line = line or len(text.rstrip().splitlines())
         at = f", column {column}" if column else ""
-        raise RobotFileError(
+        raise RobotFileError.FILE_UNREADABLE(
             f"{shown}, line {line}{at}: this is not TOML ({what[:1].lower()}{what[1:]}); "
             "write one `key = value` a line, text in quotes."
         ) from None
     except ValueError as error:  # a whole number of thousands of digits
-        raise RobotFileError(f"{shown} holds a number that cannot be read: {error}.") from None
+        raise RobotFileError.FILE_UNREADABLE(
+            f"{shown} holds a number that cannot be read: {error}."
+        ) from None
     except RecursionError:
-        raise RobotFileError(f"{shown} is nested too deeply for a robot file.") from None
+        raise RobotFileError.FILE_UNREADABLE(
+            f"{shown} is nested too deeply for a robot file."
+        ) from None

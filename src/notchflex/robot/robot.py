@@ -257,7 +257,9 @@ def from_table(table: Mapping[str, Any]) -> Robot:
     try:
         return validator.validate_python(dict(table))
     except ValidationError as error:
-        raise InputError("\n".join(sentences(error, Robot, _repeats(table)))) from None
+        raise InputError.INVALID_ROBOT(
+            "\n".join(sentences(error, Robot, _repeats(table)))
+        ) from None
 
 
 def source_of(robot: Robot) -> str | None:

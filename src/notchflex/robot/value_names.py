@@ -79,7 +79,7 @@ def set_values(
     seen: set[tuple[str, int | None, str]] = set()
     for target, value in targets:
         if target[1:] in seen:
-            raise InputError(f"`{target.path}` is set twice; set it once.")
+            raise InputError.CONFLICT(f"`{target.path}` is set twice; set it once.")
         seen.add(target[1:])
         if target.section == "name":
             table["name"] = value
@@ -105,7 +105,9 @@ def parse_assignment(text: str) -> tuple[str, object]:
     """
     path, equals, value = (piece.strip() for piece in text.partition("="))
     if not (path and equals and value):
-        raise InputError(f"`{text}` sets nothing; {_EXAMPLES.replace('depth', 'depth=1.3', 1)}.")
+        raise InputError.BAD_SYNTAX(
+            f"`{text}` sets nothing; {_EXAMPLES.replace('depth', 'depth=1.3', 1)}."
+        )
     return path, _value(value)
 
 
@@ -121,7 +123,7 @@ def number_at(robot: Robot, path: str) -> float:
             several notches have unlike ones.
     """
     if not isinstance(path, str):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError(f"{path!r} is not the name of a value; {_EXAMPLES}.")
+        raise InputError.UNKNOWN_NAME(f"{path!r} is not the name of a value; {_EXAMPLES}.")
     target = _parse(path)
     found: set[object] = set()
     allowed: dict[str, None] = {}
@@ -132,12 +134,16 @@ def number_at(robot: Robot, path: str) -> float:
             found.add(one.get(target.key, keys[target.key].default))
     if not found:
         near = nearest(target.key, allowed)
-        raise InputError(f"`{path}` is not the name of a number of this robot{near}; {_EXAMPLES}.")
+        raise InputError.UNKNOWN_NAME(
+            f"`{path}` is not the name of a number of this robot{near}; {_EXAMPLES}."
+        )
     if len(found) > 1:
-        raise InputError(f"`{path}` has unlike values in this robot; name one, such as [1].")
+        raise InputError.UNSUPPORTED(
+            f"`{path}` has unlike values in this robot; name one, such as [1]."
+        )
     value = found.pop()
     if not isinstance(value, float) or not math.isfinite(value):
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"`{path}` is {value!r} in this robot, and no number that changes smoothly."
         )
     return value
@@ -171,7 +177,9 @@ def described_at(robot: Robot, path: str) -> Described:
                 if hasattr(one, key)
             ]
             return Described(unit, max(lower, default=-math.inf), min(upper, default=math.inf))
-    raise InputError(f"`{path}` is not the name of a number of this robot; {_EXAMPLES}.")
+    raise InputError.UNKNOWN_NAME(
+        f"`{path}` is not the name of a number of this robot; {_EXAMPLES}."
+    )
 
 
 def _value(text: str) -> object:
@@ -187,7 +195,7 @@ def _parse(path: str) -> _Target:
     """Split a path and check its section and whether a number may stand there."""
     match = _PATH.fullmatch(path.strip())
     if not match:
-        raise InputError(f"`{path}` is not the name of a value; {_EXAMPLES}.")
+        raise InputError.UNKNOWN_NAME(f"`{path}` is not the name of a value; {_EXAMPLES}.")
     section, index, key = match["section"], match["index"], match["key"]
     if section == "name" and index is None and key is None:
         return _Target(path, "name", None, "")
@@ -195,19 +203,21 @@ def _parse(path: str) -> _Target:
         owners = [f"`{one}.{section}`" for one in _SECTIONS if section in _keys_of(one)]
         near = nearest(section, ["name", *_SECTIONS])
         meant = f" (did you mean {' or '.join(owners)}?)" if owners else near
-        raise InputError(f"`{path}` is not the name of a value{meant}; {_EXAMPLES}.")
+        raise InputError.UNKNOWN_NAME(f"`{path}` is not the name of a value{meant}; {_EXAMPLES}.")
     if section not in _SECTIONS:
         allowed = ["name", *_SECTIONS]
-        raise InputError(
+        raise InputError.UNKNOWN_NAME(
             f"`{path}` begins with `{section}`, which no robot has{nearest(section, allowed)}. "
             f"Allowed: {', '.join(allowed)}."
         )
     if key is None:
-        raise InputError(f"`{path}` names no single value; {_EXAMPLES}.")
+        raise InputError.UNKNOWN_NAME(f"`{path}` names no single value; {_EXAMPLES}.")
     if index is not None and section not in ("notch", "tendon"):
-        raise InputError(f"`{path}` has a number, but there is one {section}: `{section}.{key}`.")
+        raise InputError.UNKNOWN_NAME(
+            f"`{path}` has a number, but there is one {section}: `{section}.{key}`."
+        )
     if index is not None and len(index) > _DIGITS:
-        raise InputError(f"there is no {section} of that number; {_EXAMPLES}.")
+        raise InputError.OUT_OF_RANGE(f"there is no {section} of that number; {_EXAMPLES}.")
     return _Target(path, section, None if index in (None, "*") else int(index), key)
 
 
@@ -221,7 +231,7 @@ def _chosen(table: dict[str, Any], target: _Target) -> list[dict[str, Any]]:
     number = sum(one.get("repeat", 1) for one in tables)
     if not 1 <= target.number <= number:
         plural = {"notch": "notches", "tendon": "tendons"}[target.section]
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"`{target.path}`: the robot has {number} {target.section if number == 1 else plural}; "
             f"give a number from 1 to {number}."
         )
@@ -244,7 +254,7 @@ def _chosen(table: dict[str, Any], target: _Target) -> list[dict[str, Any]]:
 def _set_key(table: dict[str, Any], target: _Target, value: object) -> None:
     """Set a key wherever the kind of part has it."""
     if (target.section, target.key) == ("notch", "repeat"):
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"`{target.path}` would change the number of notches; change `repeat` in the robot "
             "file instead."
         )
@@ -257,18 +267,18 @@ def _set_key(table: dict[str, Any], target: _Target, value: object) -> None:
             one[target.key] = value
             taken = True
     if not taken:
-        raise InputError(unknown_key(target.path, target.key, allowed))
+        raise InputError.UNKNOWN_NAME(unknown_key(target.path, target.key, allowed))
 
 
 def _set_kind(table: dict[str, Any], target: _Target, value: object) -> list[str]:
     """Change a kind: keep the keys that both kinds share, and return the paths of the others."""
     base = _SECTIONS[target.section]
     if target.section in ("tube", "tendon"):
-        raise InputError(unknown_key(target.path, "kind", fields_of(base)))
+        raise InputError.UNKNOWN_NAME(unknown_key(target.path, "kind", fields_of(base)))
     kinds = kinds_of(base)
     if value not in kinds:
         allowed = ", ".join(f'"{kind}"' for kind in kinds)
-        raise InputError(
+        raise InputError.UNKNOWN_NAME(
             f'`{target.path}` is "{value}"; allowed: {allowed}{nearest(str(value), kinds)}.'
         )
     new = fields_of(kinds[str(value)])

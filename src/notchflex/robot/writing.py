@@ -61,11 +61,13 @@ def save_robot(
             source = Path(template).read_text(encoding="utf-8-sig")
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-            raise RobotFileError(f"{template} cannot be read: {reason}.") from None
+            raise RobotFileError.FILE_UNREADABLE(f"{template} cannot be read: {reason}.") from None
     try:
         Path(path).write_text(robot_text(robot, source, fitted), encoding="utf-8", newline="\n")
     except OSError as error:
-        raise RobotFileError(f"{path} cannot be written: {error.strerror}.") from None
+        raise RobotFileError.FILE_UNWRITABLE(
+            f"{path} cannot be written: {error.strerror}."
+        ) from None
 
 
 def robot_text(

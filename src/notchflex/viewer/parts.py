@@ -61,7 +61,9 @@ def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = No
             keys = {key: own.get(key, value) for key, value in table.items() if key != "kind"}
             values = {f"{section}.{key}": value for key, value in keys.items()}
             return robot.with_values({f"{section}.kind": kind, **values})
-    raise InputError(f'no ready robot has a {section} of the kind "{kind}" to take values from')
+    raise InputError.UNKNOWN_NAME(
+        f'no ready robot has a {section} of the kind "{kind}" to take values from'
+    )
 
 
 def numbers(robot: Robot, section: str) -> Iterator[Number]:

@@ -91,14 +91,14 @@ def differentiable(
     check_refinement(refinement)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if not names or len(set(names)) < len(names):
-        raise InputError("parameters must name at least one number, and none of them twice")
+        raise InputError.NO_DATA("parameters must name at least one number, and none of them twice")
     of_loads = (*_TENDONS, *_TIP)
     start: dict[str, Any] = {name: number_at(robot, name) for name in names if name not in of_loads}
     for name in _TENDONS:
         if name in names:
             given = path.tension if name == "tension" else path.stroke
             if np.isnan(given).all():
-                raise InputError(f"the loads give no {name} that could vary")
+                raise InputError.NO_DATA(f"the loads give no {name} that could vary")
             start[name] = np.nan_to_num(given)
     for name in _TIP:
         if name in names:
@@ -182,7 +182,9 @@ class Differentiable:
         along = {name: along[name] if name in direction else 0.0 * along[name] for name in along}
         size = max(float(jnp.max(jnp.abs(step))) for step in along.values())
         if size == 0.0:
-            raise InputError("the direction changes nothing; give a change of some parameter")
+            raise InputError.NO_DATA(
+                "the direction changes nothing; give a change of some parameter"
+            )
 
         def outputs(part: float) -> dict[str, np.ndarray]:
             moved = {name: at[name] + part * along[name] for name in at}
@@ -234,11 +236,15 @@ class Differentiable:
     def _taken(self, values: Mapping[str, Any] | None) -> dict[str, Array]:
         """Values of all parameters, in their shapes."""
         if not isinstance(values, Mapping | None):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise InputError(f"give values by name of the parameter; got {shown(values)}")
+            raise InputError.WRONG_TYPE(
+                f"give values by name of the parameter; got {shown(values)}"
+            )
         given = dict(values or {})
         wrong = [name for name in given if name not in self.start]
         if wrong:
-            raise InputError(f"`{wrong[0]}` is none of the parameters {', '.join(self.start)}")
+            raise InputError.UNKNOWN_NAME(
+                f"`{wrong[0]}` is none of the parameters {', '.join(self.start)}"
+            )
         return {name: self._value(name, given.get(name, at)) for name, at in self.start.items()}
 
     def _check(self, values: dict[str, Array]) -> None:
@@ -247,7 +253,7 @@ class Differentiable:
         if numbers != {name: float(self.start[name]) for name in self.numbers}:
             self.robot.with_values(numbers)
         if "tension" in values and not (values["tension"] >= 0.0).all():
-            raise InputError("a tendon can only pull; give tensions of 0 N or more")
+            raise InputError.OUT_OF_RANGE("a tendon can only pull; give tensions of 0 N or more")
 
     def _value(self, name: str, value: Any) -> Array:
         wanted = self.start[name].shape
@@ -256,7 +262,7 @@ class Differentiable:
         try:
             return jnp.broadcast_to(jnp.asarray(value, float), wanted)
         except (TypeError, ValueError):
-            raise InputError(
+            raise InputError.WRONG_SHAPE(
                 f"`{name}` must be numbers of shape {wanted}; got {shown(value)}"
             ) from None
 
@@ -335,7 +341,7 @@ class _Solver:
     def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
         """The path at some values; the last one is kept, as its derivatives are asked for next."""
         if not np.isfinite(flat).all():  # a tension that is no number would mean a slack tendon
-            raise InputError("values must be finite numbers")
+            raise InputError.NOT_FINITE("values must be finite numbers")
         key = flat.tobytes()
         if self.last is None or self.last[0] != key:
             self.last = key, self._of._path(self._named(flat))  # pyright: ignore[reportPrivateUsage]
@@ -386,7 +392,9 @@ class _Solver:
         robot, load = of._robot(values), of._load(values)  # pyright: ignore[reportPrivateUsage]
         ready = of._prepared(robot)  # pyright: ignore[reportPrivateUsage]
         if ready.chain_form is not of.ready.chain_form:
-            raise InputError("with these values the robot has another form; it must stay the same")
+            raise InputError.UNSUPPORTED(
+                "with these values the robot has another form; it must stay the same"
+            )
         loads, _ = ready.long_commands(command(load, robot, ready.chain))
         return np.concatenate([ready.long.vector, loads.ravel()])
 

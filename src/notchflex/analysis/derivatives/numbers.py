@@ -36,7 +36,7 @@ def slope(
             return _extrapolated(vector_of, np.array(numbers), index, width, points, halvings)
         except InputError:  # beyond what the number may be
             continue
-    raise InputError(f"number {index + 1} cannot be varied around {numbers[index]:g}")
+    raise InputError.OUT_OF_RANGE(f"number {index + 1} cannot be varied around {numbers[index]:g}")
 
 
 # Where to look, in widths: both sides, or one side only at the end of a range.

@@ -25,12 +25,14 @@ def beside_robots(first: Robot, name: str, beside: Sequence[str]) -> dict[str, R
         InputError: Not of this form, too many, two of one label, or a robot that cannot be used.
     """
     if len(beside) > MOST:
-        raise InputError(f"--beside may be given {MOST} times at most; got {len(beside)}.")
+        raise InputError.OUT_OF_RANGE(
+            f"--beside may be given {MOST} times at most; got {len(beside)}."
+        )
     robots = {_stem(name): first}
     for text in beside:
         label, robot = _one(first, text)
         if label in robots:
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"--beside {text}: there is already a robot called {label}; put another label "
                 'before it, such as "second: ROBOT".'
             )

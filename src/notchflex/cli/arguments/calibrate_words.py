@@ -47,28 +47,30 @@ def parse_pairs(texts: Sequence[str]) -> Given:
     """
     given = Given({}, {})
     if not texts:
-        raise InputError(f"Give a robot with its data: {PAIR}.")
+        raise InputError.MISSING_VALUE(f"Give a robot with its data: {PAIR}.")
     for text in texts:
         words = [word.strip() for word in text.split("=")]
         if len(words) not in (2, 3) or not all(words):
-            raise InputError(f"`{text}` is no robot with its data; give {PAIR}.")
+            raise InputError.BAD_SYNTAX(f"`{text}` is no robot with its data; give {PAIR}.")
         robot, data = words[-2:]
         label = words[0] if len(words) == 3 else _label(robot)
         if ":" in label or os.sep in label:
-            raise InputError(f"`{text}`: a label must not hold `:` or `{os.sep}`; choose another.")
+            raise InputError.BAD_SYNTAX(
+                f"`{text}`: a label must not hold `:` or `{os.sep}`; choose another."
+            )
         if given.robot.setdefault(label, robot) != robot:
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"{given.robot[label]} and {robot} are both called {label}; give one of them "
                 f"another label: LABEL={robot}={data}."
             )
         if label == "each":
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"`{text}`: no robot can be called each, which stands for every robot; choose "
                 "another label."
             )
         own = given.data.setdefault(label, [])
         if data in own:
-            raise InputError(f"{data} is given twice for {label}; give it once.")
+            raise InputError.CONFLICT(f"{data} is given twice for {label}; give it once.")
         own.append(data)
     return given
 
@@ -88,13 +90,13 @@ def parse_fit(
     """
     names = [name.strip() for text in texts for name in text.split(",")]
     if not names or not all(names):
-        raise InputError(
+        raise InputError.MISSING_VALUE(
             "--fit needs names of constants joined by commas, such as "
             "friction.coefficient,material.elastic_modulus."
         )
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise InputError(f"--fit {twice} is given twice; give it once.")
+        raise InputError.CONFLICT(f"--fit {twice} is given twice; give it once.")
     limits = dict(_bounds(text, names) for text in _once(bounds, "--bounds"))
     known = dict(_prior(text, names) for text in _once(priors, "--prior"))
     return tuple(Wanted(name, *limits.get(name, (None, None)), known.get(name)) for name in names)
@@ -111,7 +113,7 @@ def robots_of(given: Given, settings: Sequence[str]) -> dict[str, Robot]:
         label, colon, rest = text.partition(":")
         named = colon and "=" not in label
         if named and label not in own:
-            raise InputError(
+            raise InputError.UNKNOWN_NAME(
                 f"--set {text}: no robot of this fit is called {label}; there are {', '.join(own)}."
             )
         for one in [label] if named else own:
@@ -131,14 +133,18 @@ def check_options(
 ) -> None:
     """Refuse what does not go together before anything is loaded."""
     if huber is not None and objective != "least-squares":
-        raise InputError(f"--huber {huber:g} belongs to least-squares; leave out one of the two.")
+        raise InputError.CONFLICT(
+            f"--huber {huber:g} belongs to least-squares; leave out one of the two."
+        )
     for option, number, least in (("--starts", starts, 1), ("--seed", seed, 0)):
         if number < least:
-            raise InputError(f"{option} {number}: give {least} or more.")
+            raise InputError.OUT_OF_RANGE(f"{option} {number}: give {least} or more.")
     if (next_robot is not None or narrow) and not next_:
-        raise InputError("--next-robot and --narrow belong to --next; give candidates with it.")
+        raise InputError.CONFLICT(
+            "--next-robot and --narrow belong to --next; give candidates with it."
+        )
     if next_robot is not None and next_robot not in given.robot:
-        raise InputError(
+        raise InputError.UNKNOWN_NAME(
             f"--next-robot {next_robot}: no robot of this fit is called so; there are "
             f"{', '.join(given.robot)}."
         )
@@ -149,16 +155,18 @@ def check_beyond(
 ) -> None:
     """Refuse what could not be done after the fit before the time for it is spent."""
     if posterior and objective != "least-squares":
-        raise InputError(
+        raise InputError.CONFLICT(
             f"--posterior needs least-squares: {objective} is no likelihood. Leave out one of the "
             "two."
         )
     if posterior:
         need("numpyro", "bayes", "--posterior")
     if draws < 4:
-        raise InputError(f"--draws {draws}: give 4 or more.")
+        raise InputError.OUT_OF_RANGE(f"--draws {draws}: give 4 or more.")
     if leave_out == "robot" and len(given.robot) < 2:
-        raise InputError("--leave-out robot: there is only one robot; give two or more.")
+        raise InputError.TOO_FEW_DATA(
+            "--leave-out robot: there is only one robot; give two or more."
+        )
 
 
 def check_sensor(names: list[str]) -> None:
@@ -168,7 +176,7 @@ def check_sensor(names: list[str]) -> None:
     for name in names:
         path = name.rpartition(":")[2]
         if path.startswith("sensor.") and path not in SENSOR:
-            raise InputError(f"--fit {name}: there are {' and '.join(SENSOR)}.")
+            raise InputError.UNKNOWN_NAME(f"--fit {name}: there are {' and '.join(SENSOR)}.")
 
 
 def _label(robot: str) -> str:
@@ -180,7 +188,7 @@ def _once(texts: Sequence[str], option: str) -> Sequence[str]:
     names = [text.partition("=")[0].strip() for text in texts]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise InputError(f"{option} of {twice} is given twice; give it once.")
+        raise InputError.CONFLICT(f"{option} of {twice} is given twice; give it once.")
     return texts
 
 
@@ -189,7 +197,7 @@ def _bounds(text: str, names: Sequence[str]) -> tuple[str, tuple[float | None, f
     name, values = _of_constant(text, names, "--bounds", form)
     low, colon, high = values.partition(":")
     if not colon or not (low.strip() or high.strip()):
-        raise InputError(f"--bounds {text}: give {form}.")
+        raise InputError.BAD_SYNTAX(f"--bounds {text}: give {form}.")
     lower, upper = (
         _number(word, text, "--bounds", form) if word.strip() else None for word in (low, high)
     )
@@ -201,7 +209,7 @@ def _prior(text: str, names: Sequence[str]) -> tuple[str, tuple[float, float]]:
     name, values = _of_constant(text, names, "--prior", form)
     words = re.split(r"\+-|±", values)
     if len(words) != 2:
-        raise InputError(f"--prior {text}: give {form}.")
+        raise InputError.BAD_SYNTAX(f"--prior {text}: give {form}.")
     mean, deviation = (_number(word, text, "--prior", form) for word in words)
     return name, (mean, deviation)
 
@@ -209,9 +217,11 @@ def _prior(text: str, names: Sequence[str]) -> tuple[str, tuple[float, float]]:
 def _of_constant(text: str, names: Sequence[str], option: str, form: str) -> tuple[str, str]:
     name, equals, values = (word.strip() for word in text.partition("="))
     if not (name and equals and values):
-        raise InputError(f"{option} {text}: give {form}.")
+        raise InputError.BAD_SYNTAX(f"{option} {text}: give {form}.")
     if name not in names:
-        raise InputError(f"{option} {text}: {name} is not fitted; --fit names {', '.join(names)}.")
+        raise InputError.UNKNOWN_NAME(
+            f"{option} {text}: {name} is not fitted; --fit names {', '.join(names)}."
+        )
     return name, values
 
 
@@ -221,5 +231,7 @@ def _number(word: str, text: str, option: str, form: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"{option} {text}: {word.strip()!r} is no finite number; give {form}.")
+        raise InputError.BAD_SYNTAX(
+            f"{option} {text}: {word.strip()!r} is no finite number; give {form}."
+        )
     return value

@@ -106,9 +106,13 @@ def parse_loads(
     """
     acting = bool(tip_force or tip_moment)
     if following and not acting and not body_force:
-        raise InputError("--following: nothing turns; give --tip-force, --tip-moment or others.")
+        raise InputError.NO_DATA(
+            "--following: nothing turns; give --tip-force, --tip-moment or others."
+        )
     if tip_point is not None and not tip_force and not tip_mass:
-        raise InputError(f"--tip-point {tip_point}: nothing acts there; give a --tip-force too.")
+        raise InputError.NO_DATA(
+            f"--tip-point {tip_point}: nothing acts there; give a --tip-force too."
+        )
     vectors = (
         ("tip_force", "--tip-force", tip_force, "forces in N"),
         ("tip_moment", "--tip-moment", tip_moment, "moments in N mm"),
@@ -143,7 +147,7 @@ def parse_body_force(text: str, following: bool = False) -> dict[str, Any]:
     body, colon, rest = text.partition(":")
     force, at, point = rest.partition("@")
     if not colon or not body.strip().isdecimal() or len(body) > _DIGITS:
-        raise InputError(f"{option} {text}: give {_BODY}.")
+        raise InputError.BAD_SYNTAX(f"{option} {text}: give {_BODY}.")
     loads: dict[str, Any] = {"body": int(body)}
     for name, given, what, words in (
         ("force", True, "forces in N", force),
@@ -153,7 +157,7 @@ def parse_body_force(text: str, following: bool = False) -> dict[str, Any]:
             try:
                 loads[name] = parse_vector(words, option, what).tolist()
             except InputError:
-                raise InputError(
+                raise InputError.BAD_SYNTAX(
                     f"{option} {text}: {words!r} is no three finite {what}; give {_BODY}."
                 ) from None
     return loads | ({"following": True} if following else {})
@@ -174,5 +178,5 @@ def _mass(text: str) -> float:
     except ValueError:
         mass = -1.0
     if not 0.0 <= mass < float("inf"):
-        raise InputError(f"--tip-mass {text}: give a finite number of grams, 0 or more.")
+        raise InputError.NOT_FINITE(f"--tip-mass {text}: give a finite number of grams, 0 or more.")
     return mass

@@ -148,7 +148,7 @@ def variant(text: str, other: str = "") -> tuple[str, list[tuple[str, object]]]:
     """
     label, colon, values = text.partition(":")
     if not colon or not label.strip():
-        raise InputError(
+        raise InputError.BAD_SYNTAX(
             f'--beside {text}: give {other}"LABEL: PATH=VALUE, PATH=VALUE", for example '
             '"linear: material.kind=linear".'
         )

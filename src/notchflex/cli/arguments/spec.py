@@ -44,10 +44,12 @@ def parse_spec(
     for part in text.split(","):
         values.extend(_part(part.strip(), given, option))
         if len(values) > MOST_STEPS:
-            raise InputError(f"{option} {given}: this is more than {MOST_STEPS:,} steps.")
+            raise InputError.OUT_OF_RANGE(
+                f"{option} {given}: this is more than {MOST_STEPS:,} steps."
+            )
     for value in values:
         if value < 0 and not negative:
-            raise InputError(
+            raise InputError.OUT_OF_RANGE(
                 f"{option} {given}: got {value:g} N; a tendon only pulls, so give 0 N or more."
             )
     return values
@@ -58,23 +60,27 @@ def _part(part: str, text: str, option: str) -> list[float]:
     if len(numbers) == 1:
         return [_number(part, text, option)]
     if len(numbers) != 3:
-        raise InputError(f"{option} {text}: {part!r} is no start:stop:count; give {FORM}.")
+        raise InputError.BAD_SYNTAX(
+            f"{option} {text}: {part!r} is no start:stop:count; give {FORM}."
+        )
     start, stop = (_number(number, text, option) for number in numbers[:2])
     try:
         count = int(numbers[2])
     except ValueError:
-        raise InputError(
+        raise InputError.NOT_A_NUMBER(
             f"{option} {text}: the count in {part!r} is {numbers[2]!r}; give a whole number."
         ) from None
     if count < 1:
-        raise InputError(f"{option} {text}: a range of {count} steps; give a count of 1 or more.")
+        raise InputError.OUT_OF_RANGE(
+            f"{option} {text}: a range of {count} steps; give a count of 1 or more."
+        )
     if count == 1 and start != stop:
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"{option} {text}: a range of 1 step cannot go from {start:g} to {stop:g}; "
             "give a count of 2 or more."
         )
     if count > MOST_STEPS:
-        raise InputError(f"{option} {text}: this is more than {MOST_STEPS:,} steps.")
+        raise InputError.OUT_OF_RANGE(f"{option} {text}: this is more than {MOST_STEPS:,} steps.")
     return np.linspace(start, stop, count).tolist()
 
 
@@ -83,9 +89,9 @@ def _number(word: str, text: str, option: str) -> float:
         value = float(word)
     except ValueError:
         got = f"{word!r} is no number" if word.strip() else "a number is missing"
-        raise InputError(f"{option} {text}: {got}; give {FORM}.") from None
+        raise InputError.BAD_SYNTAX(f"{option} {text}: {got}; give {FORM}.") from None
     if not math.isfinite(value):
-        raise InputError(f"{option} {text}: got {word.strip()}; give finite numbers.")
+        raise InputError.NOT_FINITE(f"{option} {text}: got {word.strip()}; give finite numbers.")
     return value
 
 
@@ -115,7 +121,7 @@ def load_columns(
         for text in texts:
             index, spec = _tendon(text, kind, tendons)
             if index in commanded:
-                raise InputError(
+                raise InputError.CONFLICT(
                     f"{kind} {text}: tendon {index + 1} already has {commanded[index]}; "
                     "give each tendon one tension or one stroke."
                 )
@@ -123,11 +129,13 @@ def load_columns(
             commanded[index] = f"{kind} {text}"
             columns[kind, index] = (commanded[index], values)
     if not columns:
-        raise InputError("Give a load: --tension SPEC or --stroke SPEC, for example --tension 2.")
+        raise InputError.MISSING_VALUE(
+            "Give a load: --tension SPEC or --stroke SPEC, for example --tension 2."
+        )
     longest_name, longest = max(columns.values(), key=lambda column: len(column[1]))
     for name, values in columns.values():
         if len(values) not in (1, len(longest)):
-            raise InputError(
+            raise InputError.WRONG_SHAPE(
                 f"{name} has {len(values)} steps and {longest_name} has {len(longest)}; "
                 "give equal numbers of steps, or a single value for all of them."
             )
@@ -143,19 +151,21 @@ def _tendon(text: str, option: str, tendons: int) -> tuple[int, str]:
     if not equals:
         if tendons == 1:
             return 0, text
-        raise InputError(
+        raise InputError.MISSING_VALUE(
             f"{option} {text}: the robot has {tendons} tendons; say which one, "
             f"for example {option} 1={text}."
         )
     try:
         index = int(name)
     except ValueError:
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"{option} {text}: {name!r} is no tendon; give a number from 1 to {tendons}."
         ) from None
     if not 1 <= index <= tendons:
         has = "1 tendon" if tendons == 1 else f"{tendons} tendons"
-        raise InputError(f"{option} {text}: there is no tendon {index}; the robot has {has}.")
+        raise InputError.OUT_OF_RANGE(
+            f"{option} {text}: there is no tendon {index}; the robot has {has}."
+        )
     return index - 1, spec
 
 
@@ -183,5 +193,7 @@ def parse_vector(text: str, option: str, what: str) -> NDArray[np.float64]:
     except ValueError:
         values = np.empty(0)
     if values.shape != (3,) or not np.isfinite(values).all():
-        raise InputError(f"{option} {text}: give three finite {what} joined by commas: X,Y,Z.")
+        raise InputError.BAD_SYNTAX(
+            f"{option} {text}: give three finite {what} joined by commas: X,Y,Z."
+        )
     return values

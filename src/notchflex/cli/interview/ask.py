@@ -131,13 +131,13 @@ class Interview:
         try:
             return input(f"{prompt} " if prompt else "").strip()
         except UnicodeDecodeError:
-            raise InputError(
+            raise InputError.BAD_SYNTAX(
                 f"{question.text}: the answer is no text in {sys.stdin.encoding}."
             ) from None
         except EOFError:
             if question.default is not None:
                 return ""
-            raise InputError(
+            raise InputError.MISSING_VALUE(
                 f"No answer to: {question.text}. Give {question.option}, or a line of input."
             ) from None
 
@@ -155,7 +155,7 @@ class Interview:
         try:
             return question.read(answer.strip())
         except InputError as problem:
-            raise InputError(f"{question.option} {answer}: {problem}") from None
+            raise InputError(f"{question.option} {answer}: {problem}", problem.code) from None
 
 
 def _lines(text: str, indent: str = "") -> list[str]:

@@ -252,5 +252,5 @@ def _runs(rows: list[tuple[float, ...]]) -> list[tuple[tuple[float, ...], int]]:
 
 def _title(text: str) -> str:
     if not text:
-        raise InputError("give a title.")
+        raise InputError.MISSING_VALUE("give a title.")
     return text

@@ -45,7 +45,9 @@ def reading(
         value = _evaluate(ast.parse(text.replace("−", "-"), mode="eval").body)
     except (ValueError, SyntaxError, ZeroDivisionError, OverflowError, RecursionError, MemoryError):
         got = repr(text) if text else "nothing"
-        raise InputError(f"got {got}; give a number such as 1.62, or a sum: 1.62-0.22.") from None
+        raise InputError.NOT_A_NUMBER(
+            f"got {got}; give a number such as 1.62, or a sum: 1.62-0.22."
+        ) from None
     bounds = [
         (above, operator.gt, "greater than"),
         (at_least, operator.ge, "at least"),
@@ -57,7 +59,7 @@ def reading(
     if not math.isfinite(value) or any(
         bound is not None and not holds(value, bound) for bound, holds, _ in bounds
     ):
-        raise InputError(f"got {value:g}; give {wanted}.")
+        raise InputError.OUT_OF_RANGE(f"got {value:g}; give {wanted}.")
     # Nobody reads callipers to a nanometre; this drops the noise of 1.62-0.22.
     return round(value, 9)
 
@@ -70,7 +72,7 @@ def readings(text: str, count: int, **bounds: float) -> list[float]:
     """
     values = [reading(part.strip(), **bounds) for part in text.split(",")]
     if len(values) not in (1, count):
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"got {len(values)} numbers; give one for all, or {count} joined by commas, "
             "base to tip."
         )
@@ -88,7 +90,7 @@ def choice(text: str, allowed: tuple[str, ...]) -> str:
     ]
     if len(found) != 1:
         got = repr(text) if text else "nothing"
-        raise InputError(f"got {got}; give {' or '.join(allowed)}.")
+        raise InputError.UNKNOWN_NAME(f"got {got}; give {' or '.join(allowed)}.")
     return found[0]
 
 
@@ -102,9 +104,9 @@ def whole(text: str, *, at_least: int, at_most: int) -> int:
         value = int(text)
     except ValueError:
         got = repr(text) if text else "nothing"
-        raise InputError(f"got {got}; give a whole number.") from None
+        raise InputError.NOT_A_NUMBER(f"got {got}; give a whole number.") from None
     if not at_least <= value <= at_most:
-        raise InputError(f"got {value}; give {at_least} to {at_most}.")
+        raise InputError.OUT_OF_RANGE(f"got {value}; give {at_least} to {at_most}.")
     return value
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from notchflex._quantity import Quantity
 from notchflex.errors import InputError
-from notchflex.results.quantities.quantity import Quantity
 from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES
 from notchflex.results.quantities.spans import holds
 from notchflex.robot.error_messages import nearest
@@ -141,12 +141,12 @@ def parse_columns(text: str) -> list[str]:
     for place, name in enumerate(names):
         if name not in allowed:
             got = repr(name) if name else "an empty name"
-            raise InputError(
+            raise InputError.UNKNOWN_NAME(
                 f"--columns {text}: {got} is not the name of a quantity{nearest(name, allowed)}. "
                 f"Allowed: {', '.join(allowed)}."
             )
         if name in names[:place]:
-            raise InputError(f"--columns {text}: {name} is given twice; give it once.")
+            raise InputError.CONFLICT(f"--columns {text}: {name} is given twice; give it once.")
     return names
 
 

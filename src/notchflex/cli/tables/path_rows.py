@@ -92,7 +92,7 @@ def all_rows(path: EquilibriumPath) -> tuple[list[int], int]:
         InputError: The path is longer than a terminal can hold.
     """
     if len(path) > _MOST_ALL:
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"--all: a table of {len(path):,} rows; write them with --csv FILE instead "
             f"(--all shows up to {_MOST_ALL:,})."
         )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from cyclopts import Parameter
 
+from notchflex._quantity import DEGREES
 from notchflex.cli import terminal
 from notchflex.cli.arguments.measured import OnePath, from_rest, note_table
 from notchflex.cli.arguments.options import (
@@ -26,7 +27,6 @@ from notchflex.results.files.writing import (
     check_output,
     check_picture,
 )
-from notchflex.results.quantities.registry import DEGREES
 
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison

@@ -44,12 +44,12 @@ def completion(
         written: Path = app.install_completion(shell=shell)
         written.write_text(_with_files(written.read_text(encoding="utf-8")), encoding="utf-8")
     except ShellDetectionError:
-        raise InputError(
+        raise InputError.MISSING_VALUE(
             "which shell this is cannot be told; name it: notchflex completion bash (or zsh, fish, "
             "powershell)."
         ) from None
     except OSError as problem:
-        raise InputError(
+        raise InputError.FILE_UNWRITABLE(
             f"the script cannot be written: {problem.filename}: {problem.strerror}."
         ) from None
     terminal.output().print(

@@ -89,7 +89,9 @@ def new(
     """
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if os.path.lexists(path):
-        raise InputError(f"{path} is already there; choose another name, or remove it first.")
+        raise InputError.FILE_UNWRITABLE(
+            f"{path} is already there; choose another name, or remove it first."
+        )
     check_output(str(path), "NAME")
     interview = Interview(
         {
@@ -118,6 +120,8 @@ def new(
     robot = interview.conduct(lambda interview: interviewed(interview, path.stem))
     text = commented(robot_text(robot), interview.defaulted)
     if path.exists():
-        raise InputError(f"{path} appeared while you answered; choose another name.")
+        raise InputError.FILE_UNWRITABLE(
+            f"{path} appeared while you answered; choose another name."
+        )
     write_text(path, text)
     print(f"Wrote {path}. Look at it with: notchflex show {shlex.quote(str(path))}")

@@ -36,7 +36,6 @@ from notchflex.cli.arguments.options import (
 )
 from notchflex.cli.arguments.spec import load_columns, parse_vector
 from notchflex.cli.simulate_files import check_files, write_files
-from notchflex.cli.tables.path_columns import parse_columns
 from notchflex.errors import InputError
 from notchflex.results.files.writing import STANDARD_OUTPUT
 
@@ -146,6 +145,8 @@ def simulate(
     loading. Prints a table as wide as the terminal (the variable COLUMNS says otherwise) unless
     `--json -` or `--csv -` prints something else.
     """
+    from notchflex.cli.tables.path_columns import parse_columns
+
     terminal.be_quiet(quiet)
     named = () if columns is None else parse_columns(columns)
     chosen = chosen_robot(robot, settings)
@@ -221,7 +222,7 @@ def _start(file: str) -> SavedState:
 
 def _refinement(text: str) -> int:
     if text not in ("0", "1", "2", "3"):
-        raise InputError(f"--refinement {text}: give a whole number from 0 to 3.")
+        raise InputError.OUT_OF_RANGE(f"--refinement {text}: give a whole number from 0 to 3.")
     return int(text)
 
 

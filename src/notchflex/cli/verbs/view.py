@@ -78,5 +78,5 @@ def view(
 
 def _port(text: str) -> int:
     if not text.isdecimal() or len(text) > 5:
-        raise InputError(f"--port {text}: give a whole number from 1 to 65535.")
+        raise InputError.OUT_OF_RANGE(f"--port {text}: give a whole number from 1 to 65535.")
     return int(text)

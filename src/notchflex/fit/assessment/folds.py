@@ -94,10 +94,14 @@ def leave_out(
         label: tuple(one.measured for one in every if one.label == label) for label in found.given
     }
     if starts < 1 or seed < 0:
-        raise InputError(f"starts must be 1 or more, seed 0 or more; got {starts} and {seed}")
+        raise InputError.OUT_OF_RANGE(
+            f"starts must be 1 or more, seed 0 or more; got {starts} and {seed}"
+        )
     parts = _parts(data, by)
     if len(parts) < 2:
-        raise InputError(f"there is only one {by}; leaving it out leaves nothing to fit to")
+        raise InputError.TOO_FEW_DATA(
+            f"there is only one {by}; leaving it out leaves nothing to fit to"
+        )
     settings = every[0].rows.settings
     folds: list[Fold] = []
     for number, part in enumerate(parts):
@@ -150,7 +154,7 @@ def _parts(data: Mapping[str, Sequence[Measurements]], by: str) -> list[_Part]:
     if by == "robot":
         return [_Part(label) for label in data]
     if by != "pull":
-        raise InputError(f'leave out by "pull" or by "robot"; got {by!r}')
+        raise InputError.UNKNOWN_NAME(f'leave out by "pull" or by "robot"; got {by!r}')
     return [
         _Part(label, number, pull)
         for label, every in data.items()

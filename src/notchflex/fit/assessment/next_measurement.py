@@ -99,19 +99,21 @@ def next_measurement(
     """
     label = robot or next(iter(found.given))
     if label not in found.given:
-        raise InputError(
+        raise InputError.UNKNOWN_NAME(
             f"no robot of this fit is called {label}; there are {', '.join(found.given)}"
         )
     missing = [name for name in narrow if name not in found.names]
     if missing:
-        raise InputError(f"{missing[0]} was not fitted; narrow some of {', '.join(found.names)}")
+        raise InputError.UNKNOWN_NAME(
+            f"{missing[0]} was not fitted; narrow some of {', '.join(found.names)}"
+        )
     if found.tells_no_noise:
-        raise InputError(
+        raise InputError.TOO_FEW_DATA(
             "nothing tells the noise, so that nobody knows what another measurement would add; "
             "measure more, or give standard deviations"
         )
     if any(not 0.0 < value < np.inf for value in (deviation or {}).values()):
-        raise InputError("a deviation of the next measurement must be above 0")
+        raise InputError.OUT_OF_RANGE("a deviation of the next measurement must be above 0")
     fitted = found.robots[label]
     path = load_path(candidates, fitted.number_of_tendons)
     seen = tuple(observed or _observed(found, label))
@@ -126,7 +128,7 @@ def next_measurement(
         volume[step] = np.exp(_half_volume(after) - _half_volume(before))
     told = np.isfinite(volume)
     if not told.any():
-        raise InputError("none of the candidates has a solution; give smaller loads")
+        raise InputError.NOT_CONVERGED("none of the candidates has a solution; give smaller loads")
     return NextMeasurement(label, path, narrower, volume, found.names, tuple(narrow), told)
 
 
@@ -139,10 +141,14 @@ def _noise(found: Calibration, name: str, deviation: Mapping[str, float] | None)
     if deviation and name in deviation:
         return float(deviation[name])
     if name not in OBSERVED:
-        raise InputError(f"{name} is nothing that is measured; there are {', '.join(OBSERVED)}")
+        raise InputError.UNKNOWN_NAME(
+            f"{name} is nothing that is measured; there are {', '.join(OBSERVED)}"
+        )
     own: np.ndarray = found.residuals.quantity == OBSERVED.index(name)
     if not own.any():
-        raise InputError(f"{name} was not measured so far; tell its standard deviation")
+        raise InputError.MISSING_VALUE(
+            f"{name} was not measured so far; tell its standard deviation"
+        )
     return float(np.sqrt(np.mean(found.noise.deviation[own] ** 2)))
 
 

@@ -91,9 +91,11 @@ def sample_posterior(
             installed (extra `bayes`).
     """
     if not found.problem.objective.is_likelihood:
-        raise InputError("a posterior needs LeastSquares(); other objectives are no likelihoods")
+        raise InputError.UNSUPPORTED(
+            "a posterior needs LeastSquares(); other objectives are no likelihoods"
+        )
     if draws < LEAST_DRAWS or chains < 1 or warm_up < 0:
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             f"draws must be {LEAST_DRAWS} or more (the chain's halves are compared), chains 1 or "
             f"more, warm_up 0 or more; got {draws}, {chains} and {warm_up}"
         )
@@ -136,14 +138,16 @@ class _Target:
 
     def __init__(self, found: Calibration) -> None:
         if found.tells_no_noise:
-            raise InputError(
+            raise InputError.TOO_FEW_DATA(
                 "nothing tells the noise: as many constants were fitted as numbers measured; "
                 "measure more, or give standard deviations"
             )
         covariance = found.covariance_by_rows
         self._wider = found.by_pulls.wider
         if not np.isfinite(covariance).all():
-            raise InputError("the data cannot tell some of the constants; fit only the others")
+            raise InputError.TOO_FEW_DATA(
+                "the data cannot tell some of the constants; fit only the others"
+            )
         self._problem, self._best = found.problem, found.best.values
         self._spread = np.linalg.cholesky(covariance)
         self._temper = found.widened**2

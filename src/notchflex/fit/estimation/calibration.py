@@ -176,9 +176,11 @@ class Calibration:
             InputError: There is no such constant, or the objective is no likelihood.
         """
         if name not in self.names:
-            raise InputError(f"{name!r} was not fitted; there are {', '.join(self.names)}")
+            raise InputError.UNKNOWN_NAME(
+                f"{name!r} was not fitted; there are {', '.join(self.names)}"
+            )
         if not self.problem.objective.is_likelihood:
-            raise InputError(
+            raise InputError.UNSUPPORTED(
                 "an interval needs LeastSquares(); other objectives are no likelihoods"
             )
         lower, upper = self.problem.lower, self.problem.upper

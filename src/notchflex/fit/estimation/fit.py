@@ -75,9 +75,9 @@ def calibrate(
         True
     """
     if not isinstance(starts, int) or starts < 1:  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError(f"starts must be a whole number from 1 on; got {starts!r}")
+        raise InputError.OUT_OF_RANGE(f"starts must be a whole number from 1 on; got {starts!r}")
     if not isinstance(seed, int) or seed < 0:  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InputError(f"seed must be a whole number from 0 on; got {seed!r}")
+        raise InputError.OUT_OF_RANGE(f"seed must be a whole number from 0 on; got {seed!r}")
     named, data = _given(robots, measurements)
     unknown = unknowns(named, fit)
     problem = Problem(Samples.of(named, data, unknown, settings), objective or LeastSquares())
@@ -98,13 +98,17 @@ def _given(
     single = not isinstance(robots, Mapping)
     named = {getattr(robots, "name", ""): robots} if single else dict(robots)
     if not all(isinstance(one, Robot) for one in named.values()):  # pyright: ignore
-        raise InputError("calibrate needs a Robot, or robots by label; load_robot makes one")
+        raise InputError.WRONG_TYPE(
+            "calibrate needs a Robot, or robots by label; load_robot makes one"
+        )
     if not isinstance(measurements, Mapping):
         if len(named) != 1:
-            raise InputError("several robots need their measurements by the same labels")
+            raise InputError.WRONG_SHAPE(
+                "several robots need their measurements by the same labels"
+            )
         measurements = {next(iter(named)): measurements}
     if not named or set(named) != set(measurements):
-        raise InputError(
+        raise InputError.CONFLICT(
             f"robots are {', '.join(named) or 'none'}, but measurements are of "
             f"{', '.join(measurements) or 'none'}; give both by the same labels"
         )
@@ -113,11 +117,11 @@ def _given(
         own = measurements[label]
         every = (own,) if isinstance(own, Measurements) else tuple(own)
         if not every or not all(isinstance(one, Measurements) for one in every):  # pyright: ignore
-            raise InputError(f"{label} needs one Measurements or more")
+            raise InputError.NO_DATA(f"{label} needs one Measurements or more")
         for number, one in enumerate(every):
             if one in every[:number]:
                 same = every[every.index(one)].source
-                raise InputError(
+                raise InputError.CONFLICT(
                     f"{one.source} of {label} holds the same rows as {same}; give them once, or "
                     "they count twice"
                 )
@@ -153,11 +157,11 @@ def fitted(
         told = f": no solution at {where[0]} ({len(where)} rows)" if where else ""
         refused = problem.samples.refused.rstrip(".")
         if refused:
-            raise InputError(
+            raise InputError.NOT_CONVERGED(
                 f"no robot can be as the search would start: {refused}. Give other limits to "
                 "search between"
             )
-        raise InputError(
+        raise InputError.NOT_CONVERGED(
             f"the model has no solution at any start{told}. Check units and loads of the file, "
             "or give other limits to search between"
         )

@@ -47,7 +47,7 @@ class LeastSquares:
     def __post_init__(self) -> None:
         """Check the number."""
         if self.huber is not None and not 0.0 < self.huber < np.inf:
-            raise InputError(f"huber must be above 0, about 1.5; got {self.huber}")
+            raise InputError.OUT_OF_RANGE(f"huber must be above 0, about 1.5; got {self.huber}")
 
     def check(self, quantities: tuple[str, ...]) -> None:
         """Anything measured will do."""
@@ -114,7 +114,7 @@ class SumOfDistances:
 def _only(quantities: tuple[str, ...], allowed: tuple[str, ...], what: str) -> None:
     wrong = [name for name in quantities if name not in allowed]
     if wrong:
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"{what}; {wrong[0]} was measured too. Leave it out of the file, or use LeastSquares()"
         )
 

@@ -42,7 +42,9 @@ class Problem:
         """Put them together; noise is told later."""
         objective.check(samples.quantities)
         if not objective.is_likelihood and any(one.prior for one in samples.unknowns):
-            raise InputError("a prior needs LeastSquares(); other objectives are no likelihoods")
+            raise InputError.UNSUPPORTED(
+                "a prior needs LeastSquares(); other objectives are no likelihoods"
+            )
         self.samples, self.objective = samples, objective
         self.unknowns: tuple[Unknown, ...] = samples.unknowns
         self.noise: Noise | None = None

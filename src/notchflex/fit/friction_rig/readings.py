@@ -67,11 +67,13 @@ class FrictionReadings:
         if not deviation.size:
             deviation = np.full((count, 4), np.nan)
         if any(one.shape != (count,) for one in arrays) or deviation.shape != (count, 4):
-            raise InputError("readings need four numbers each, and as many standard deviations")
+            raise InputError.WRONG_SHAPE(
+                "readings need four numbers each, and as many standard deviations"
+            )
         if not count:
-            raise InputError("there are no readings; give at least one")
+            raise InputError.NO_DATA("there are no readings; give at least one")
         if not np.isfinite(arrays).all() or np.isinf(deviation).any() or (deviation <= 0.0).any():
-            raise InputError(
+            raise InputError.NOT_FINITE(
                 "readings must be finite, their standard deviations above 0 or NaN where not known"
             )
         for name, value in zip(COLUMNS, arrays, strict=True):
@@ -79,7 +81,7 @@ class FrictionReadings:
         object.__setattr__(self, "deviation", deviation)
         found = impossible(*arrays)
         if found is not None:
-            raise InputError(f"{self.at(found[0])}: {found[1]}")
+            raise InputError.OUT_OF_RANGE(f"{self.at(found[0])}: {found[1]}")
 
     def __len__(self) -> int:
         """Number of readings."""
@@ -149,7 +151,7 @@ def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
         words = f"column {missing[0]} is" if len(missing) == 1 else f"columns {missing[0]} "
         if len(missing) > 1:
             words = f"columns {', '.join(missing)} are"
-        raise InputError(f"{table.name}: the {words} not there; {table.columns}.")
+        raise InputError.TABLE_COLUMNS(f"{table.name}: the {words} not there; {table.columns}.")
     deviation = np.full((len(table), len(COLUMNS)), np.nan)
     values: dict[str, NDArray[np.float64]] = {}
     used: set[str] = set()
@@ -161,7 +163,7 @@ def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
             deviation[:, place] = table.numbers(spread, may_miss=True)
             if (deviation[:, place] <= 0.0).any():
                 row = int(np.argmax(deviation[:, place] <= 0.0))
-                raise InputError(
+                raise InputError.OUT_OF_RANGE(
                     f"{table.at(row)}: {spread} is {deviation[row, place]:g}; a standard deviation "
                     "is above 0, or empty where it is not known."
                 )

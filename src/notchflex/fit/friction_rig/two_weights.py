@@ -48,7 +48,7 @@ def coefficient_from_weights(
     m1, m2, a1, a2 = np.broadcast_arrays(*values)
     found = impossible(m1, m2, a1, a2)
     if found is not None:
-        raise InputError(f"reading {found[0] + 1}: {found[1]}")
+        raise InputError.OUT_OF_RANGE(f"reading {found[0] + 1}: {found[1]}")
     b1, b2 = np.tan(0.5 * a1), np.tan(0.5 * a2)
     part = (m1 - m2) / (m1 + m2)
     total = b1 + b2
@@ -80,7 +80,7 @@ def weight_held(
     m1, mu, a1, a2 = np.broadcast_arrays(*values)
     law = CornerLaw(constant(mu))
     if not np.asarray(law.valid(constant(a1), constant(a2))).all():
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             "an edge would hold any pull, because coefficient * tan(turn / 2) is 1 or more; give a "
             "smaller coefficient or turn"
         )

@@ -109,7 +109,7 @@ def _order(
     if order.unclear is None:
         return order
     row, name, top, bottom = order.unclear
-    raise InputError(
+    raise InputError.UNSUPPORTED(
         f"{table.at(row)}: the {name} falls from {top:g} to {bottom:g} neither step by step nor "
         "to where the pull began, so the order of the rows does not tell how the robot was loaded. "
         "Say so: --from-rest (a column from_rest "
@@ -132,7 +132,7 @@ def _check_numbers(table: Table, robot: Robot) -> None:
         first, last = counts[found[0]]
         if not first <= found[1] <= last:
             has = f"{found[0]} {first}" if first == last else f"{found[0]} {first} to {last}"
-            raise InputError(
+            raise InputError.TABLE_COLUMNS(
                 f"{table.name}: there is a column {column}, but {robot.name} has {has}; choose the "
                 "robot that was measured."
             )
@@ -163,7 +163,7 @@ def _commanded(
         missing = np.flatnonzero(np.isnan(tension[:, tendon]) & np.isnan(stroke[:, tendon]))
         if len(missing):
             names = " and ".join(name for name in (force, drawn) if name is not None)
-            raise InputError(
+            raise InputError.MISSING_VALUE(
                 f"{table.at(missing[0])}: {names} {'are' if ' and ' in names else 'is'} nothing; "
                 "say what was done to the tendon, 0 N where it was slack."
             )
@@ -181,10 +181,10 @@ def _observed(
             axis_places(robot, at)
         except InputError as problem:
             column = next(name for name in table.header if name.startswith(f"axis_{written}_"))
-            raise InputError(f"{table.name}: column {column}: {problem}.") from None
+            raise InputError.TABLE_COLUMNS(f"{table.name}: column {column}: {problem}.") from None
     if len(set(axis_at)) < len(axis_at):
         twice = [one for one in places if list(places.values()).count(places[one]) > 1]
-        raise InputError(
+        raise InputError.TABLE_COLUMNS(
             f"{table.name}: the columns axis_{twice[0]}_... and axis_{twice[1]}_... are of one "
             "point; keep one of them."
         )
@@ -207,7 +207,7 @@ def _observed(
         if column.quantity == "tip_tension" and tendons == 1 and name not in table.header:
             name, spread = (one.replace("tendon_", "tendon_1_") for one in (name, spread))
         if spread in table.header and name not in table.header:
-            raise InputError(
+            raise InputError.TABLE_COLUMNS(
                 f"{table.name}: there is a column {spread}, but none of what it is the standard "
                 f"deviation of; add {name}."
             )
@@ -218,7 +218,7 @@ def _observed(
             values = table.numbers(header, may_miss=True)
             if held is deviation and (values <= 0.0).any():
                 row = int(np.argmax(values <= 0.0))
-                raise InputError(
+                raise InputError.OUT_OF_RANGE(
                     f"{table.at(row)}: {header} is {values[row]:g}; a standard deviation is above "
                     "0, or empty where it is not known."
                 )
@@ -230,7 +230,7 @@ def _observed(
                 np.radians(values) if column.in_degrees else values
             )
     if not observed:
-        raise InputError(
+        raise InputError.NO_DATA(
             f"{table.name}: nothing is measured; there is no number in a column such as "
             f"notch_1_deg, total_deg, tip_x_mm or axis_5_x_mm; {table.columns}."
         )
@@ -264,7 +264,9 @@ def _flags(table: Table, column: str, taken: set[str]) -> list[bool] | None:
     flags: list[bool] = []
     for row, text in enumerate(table.texts(column)):
         if text.lower() not in _YES_OR_NO:
-            raise InputError(f"{table.at(row)}: {column} is {text or 'nothing'!r}; give 0 or 1.")
+            raise InputError.NOT_A_NUMBER(
+                f"{table.at(row)}: {column} is {text or 'nothing'!r}; give 0 or 1."
+            )
         flags.append(_YES_OR_NO[text.lower()])
     return flags
 
@@ -302,10 +304,10 @@ def _external(table: Table, robot: Robot, taken: set[str]) -> tuple[ExternalLoad
         try:
             loads.append(ExternalLoad(**given))
         except InputError as problem:
-            raise InputError(f"{table.at(row)}: {problem}.") from None
+            raise InputError(f"{table.at(row)}: {problem}.", problem.code) from None
         has_mass = robot.material.density is not None or given.get("tip_mass")
         if any(given.get("gravity", ())) and not has_mass:
-            raise InputError(
+            raise InputError.UNSUPPORTED(
                 f"{table.at(row)}: gravity has nothing to act on, because the density of "
                 f"{robot.name} is not known; give material.density, or a {TIP_MASS}."
             )
@@ -316,7 +318,7 @@ def _base_rotation(table: Table, taken: set[str]) -> NDArray[np.float64]:
     turned = _vectors(table, {"base": BASE_TURN}, taken).get("base", np.zeros((1, 3)))
     differs = np.flatnonzero((turned != turned[0]).any(axis=1))
     if len(differs):
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"{table.at(differs[0])}: the base is turned otherwise than in the row before it; "
             "write a file for each way that it is turned."
         )
@@ -330,7 +332,7 @@ def _from_rest(table: Table, taken: set[str]) -> bool | None:
         return None
     if len(set(flags)) > 1:
         row = flags.index(not flags[0])
-        raise InputError(
+        raise InputError.UNSUPPORTED(
             f"{table.at(row)}: {FROM_REST} differs from the rows before; it is the same for all."
         )
     return flags[0]

@@ -83,28 +83,32 @@ class Measurements:
             tension = self.load.tension
         clipped = np.maximum(tension, 0.0)
         if not np.array_equal(clipped, self.load.tension, equal_nan=True):
-            raise InputError(
+            raise InputError.CONFLICT(
                 "the measured tensions are not those of the load; it has the same, 0 N where they "
                 "are negative"
             )
         pull = tuple(str(label) for label in self.pull)
         if len(pull) != rows:
-            raise InputError(f"{rows} rows need a label of their pull each; got {len(pull)}")
+            raise InputError.WRONG_SHAPE(
+                f"{rows} rows need a label of their pull each; got {len(pull)}"
+            )
         observed = {name: _checked(value, name, rows) for name, value in self.observed.items()}
         if not any(np.isfinite(value).any() for value in observed.values()):
-            raise InputError(f"nothing is measured; give some of {', '.join(OBSERVED)}")
+            raise InputError.NO_DATA(f"nothing is measured; give some of {', '.join(OBSERVED)}")
         points = observed.get("axis_points")
         if (0 if points is None else points.shape[1]) != len(axis_at):
-            raise InputError(
+            raise InputError.MISSING_VALUE(
                 "axis_points need axis_at, how far from the base each of them lies on the straight "
                 "robot, mm"
             )
         deviation = {name: _checked(value, name, rows) for name, value in self.deviation.items()}
         for name, value in deviation.items():
             if name not in observed or value.shape != observed[name].shape:
-                raise InputError(f"the deviation of {name} must have the shape of what is observed")
+                raise InputError.WRONG_SHAPE(
+                    f"the deviation of {name} must have the shape of what is observed"
+                )
             if (value <= 0.0).any():
-                raise InputError(
+                raise InputError.OUT_OF_RANGE(
                     f"a standard deviation of {name} is {np.nanmin(value):g}; give it above 0, or "
                     "NaN where it is not known"
                 )
@@ -189,7 +193,7 @@ class Measurements:
             rows = slice(0)
         which = np.arange(len(self))[rows if isinstance(rows, slice) else np.asarray(rows)]
         if not len(which):
-            raise InputError(f"no row of {self.source} is left; take at least one")
+            raise InputError.NO_DATA(f"no row of {self.source} is left; take at least one")
         return replace(
             self,
             load=rows_of(self.load, which),
@@ -207,7 +211,7 @@ class Measurements:
         """
         missing = [label for label in labels if label not in self.pulls]
         if missing:
-            raise InputError(
+            raise InputError.UNKNOWN_NAME(
                 f"{self.source} has no pull {missing[0]!r}; it has {', '.join(self.pulls)}"
             )
         return self.taken([label in labels for label in self.pull])
@@ -223,14 +227,18 @@ def rows_of(load: LoadPath, rows: Sequence[int] | NDArray[np.intp]) -> LoadPath:
 def _checked(value: Any, name: str, rows: int) -> NDArray[np.float64]:
     axes = {"total_angle": 1, "axis_points": 3}
     if name not in OBSERVED:
-        raise InputError(f"`{name}` is nothing that is measured; there are {', '.join(OBSERVED)}")
+        raise InputError.UNKNOWN_NAME(
+            f"`{name}` is nothing that is measured; there are {', '.join(OBSERVED)}"
+        )
     array = np.array(value, float)
     last = {"tip_position": (3,), "tip_rotation": (3,), "axis_points": (3,)}.get(name, ())
     fits = array.ndim == axes.get(name, 2) and len(array) == rows
     if not fits or (last and array.shape[-1:] != last):
-        raise InputError(f"{name} of {rows} rows cannot have the shape {array.shape}")
+        raise InputError.WRONG_SHAPE(f"{name} of {rows} rows cannot have the shape {array.shape}")
     if np.isinf(array).any():
-        raise InputError(f"{name} holds an infinite number; give NaN where nothing was measured")
+        raise InputError.NOT_FINITE(
+            f"{name} holds an infinite number; give NaN where nothing was measured"
+        )
     return array
 
 

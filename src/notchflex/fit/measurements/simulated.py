@@ -64,18 +64,20 @@ def simulate_measurements(
     noise = dict(deviation or {})
     wrong = [name for name in (*observed, *noise) if name not in OBSERVED]
     if wrong:
-        raise InputError(
+        raise InputError.UNKNOWN_NAME(
             f"`{wrong[0]}` is nothing that is measured; there are {', '.join(OBSERVED)}"
         )
     for name, value in noise.items():
         if name not in observed or not 0.0 < value < np.inf:
-            raise InputError(
+            raise InputError.OUT_OF_RANGE(
                 f"the deviation of {name} must be positive and {name} be observed; got {value:g}"
             )
     path = load_path(load, robot.number_of_tendons)
     labels = ("1",) * len(path) if pull is None else tuple(str(label) for label in pull)
     if len(labels) != len(path):
-        raise InputError(f"{len(path)} steps need a label of their pull each; got {len(labels)}")
+        raise InputError.WRONG_SHAPE(
+            f"{len(path)} steps need a label of their pull each; got {len(labels)}"
+        )
     random = np.random.default_rng(seed)
 
     def read(states: EquilibriumPath) -> dict[str, NDArray[np.float64]]:

@@ -73,7 +73,7 @@ def _commands(measurements: Measurements) -> dict[str, Any]:
         number = "" if tendons == 1 else tendon + 1
         given = ~np.isnan(tension[:, tendon]) | ~np.isnan(stroke[:, tendon])
         if given.any() and not given.all():
-            raise InputError(
+            raise InputError.UNSUPPORTED(
                 f"tendon {tendon + 1} is commanded in some rows only; give 0 N where it is slack"
             )
         for name, values in (("tension", tension), ("stroke", stroke)):
@@ -103,7 +103,9 @@ def _outside(measurements: Measurements) -> dict[str, Any]:
     loads = measurements.load.external
     table: dict[str, Any] = {}
     if any(one.gravity is None for one in loads) and any(one.gravity is not None for one in loads):
-        raise InputError("gravity is given in some rows only; give it in all or in none")
+        raise InputError.UNSUPPORTED(
+            "gravity is given in some rows only; give it in all or in none"
+        )
     for name, pattern in TIP_VECTORS.items():
         rows = [getattr(one, name) for one in loads]
         # Gravity of 0 is not the same as none given, by which a mass hangs.
@@ -116,7 +118,9 @@ def _outside(measurements: Measurements) -> dict[str, Any]:
     for body in sorted({force.body for one in loads for force in one.body_forces}):
         own = [[force for force in one.body_forces if force.body == body] for one in loads]
         if max(len(forces) for forces in own) > 1:
-            raise InputError(f"several forces act on body {body}; a table has room for one")
+            raise InputError.UNSUPPORTED(
+                f"several forces act on body {body}; a table has room for one"
+            )
         forces = [one[0] if one else BodyForce(body, (0.0, 0.0, 0.0)) for one in own]
         for name, pattern in BODY_VECTORS.items():
             if any(any(getattr(force, name)) for force in forces):

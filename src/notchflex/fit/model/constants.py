@@ -52,19 +52,19 @@ class Constant:
     def __post_init__(self) -> None:
         """Check the numbers."""
         if not isinstance(self.name, str) or not self.name.strip():  # pyright: ignore
-            raise InputError(f"a constant needs the name of a value; got {self.name!r}")
+            raise InputError.WRONG_TYPE(f"a constant needs the name of a value; got {self.name!r}")
         for limit in (self.lower, self.upper):
             if limit is not None and not _is_finite(limit):
-                raise InputError(f"`{self.name}`: limits must be finite; got {limit}")
+                raise InputError.NOT_FINITE(f"`{self.name}`: limits must be finite; got {limit}")
         if None not in (self.lower, self.upper) and not self.lower < self.upper:  # pyright: ignore
-            raise InputError(
+            raise InputError.OUT_OF_RANGE(
                 f"`{self.name}`: the lower limit must be below the upper one; got {self.lower:g} "
                 f"and {self.upper:g}"
             )
         if self.prior is not None:
             pair = np.atleast_1d(np.asarray(self.prior, object))
             if len(pair) != 2 or not all(map(_is_finite, pair)) or not pair[1] > 0.0:
-                raise InputError(
+                raise InputError.OUT_OF_RANGE(
                     f"`{self.name}`: a prior is a mean and a standard deviation above 0; "
                     f"got {' and '.join(map(str, pair))}"
                 )
@@ -109,7 +109,7 @@ class Unknown:
         """
         own = tuple(place for place in self.sets if place[0] in labels)
         if not own:
-            raise InputError(
+            raise InputError.TOO_FEW_DATA(
                 f"`{self.name}` belongs to {self.sets[0][0]} alone; without it there is nothing "
                 "to find it from"
             )
@@ -136,10 +136,12 @@ def unknowns(
         InputError: A name is none, is given twice, or belongs to no robot.
     """
     if "each" in robots:
-        raise InputError("no robot can be called each: `each:` stands for every robot of the fit")
+        raise InputError.CONFLICT(
+            "no robot can be called each: `each:` stands for every robot of the fit"
+        )
     given = (fit,) if isinstance(fit, str | Constant) else tuple(fit)
     if not given:
-        raise InputError("fit names no constant; name one, such as friction.coefficient")
+        raise InputError.NO_DATA("fit names no constant; name one, such as friction.coefficient")
     found: list[Unknown] = []
     for one in given:
         found += _expanded(robots, one if isinstance(one, Constant) else Constant(one))
@@ -147,7 +149,7 @@ def unknowns(
     for one in found:
         for place in one.sets:
             if place in taken:
-                raise InputError(
+                raise InputError.CONFLICT(
                     f"`{place[1]}` of {place[0]} is set by `{taken[place]}` and by `{one.name}`; "
                     "fit it once"
                 )
@@ -165,7 +167,7 @@ def _expanded(robots: Mapping[str, Robot], constant: Constant) -> list[Unknown]:
         own = (replace(constant, name=f"{one}:{path}") for one in robots)
         return [unknown for one in own for unknown in _expanded(robots, one)]
     if label and label not in robots:
-        raise InputError(
+        raise InputError.UNKNOWN_NAME(
             f"`{name}`: no robot of this fit is called {label}; there are {', '.join(robots)}"
         )
     if _EACH_NOTCH in path:
@@ -214,7 +216,7 @@ def _range(path: str, unit: str, value: float) -> tuple[float, float]:
     if unit == "deg":
         return value - _TURN, value + _TURN
     if value == 0.0:
-        raise InputError(
+        raise InputError.MISSING_VALUE(
             f"`{path}` is 0 in this robot, which tells nothing of its size; give limits to search "
             "between"
         )

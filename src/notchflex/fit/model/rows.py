@@ -131,7 +131,9 @@ class Rows:
         robot = self.robot.with_values(values) if values else self.robot
         ready = self._prepared(robot)
         if ready.chain_form is not self._ready.chain_form:
-            raise InputError(f"with {values} {robot.name} has another form; it must stay the same")
+            raise InputError.UNSUPPORTED(
+                f"with {values} {robot.name} has another form; it must stay the same"
+            )
         packed = ready.chain_form.pack(ready.chain)
         if is_unloaded(self.load):
             return packed

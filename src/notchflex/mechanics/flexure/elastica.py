@@ -74,7 +74,7 @@ def elastica(
         0.46135 rad, 0.30172 of the length
     """
     if clamp_angle is not None and follower is not None:
-        raise InputError("give either clamp_angle or follower, not both")
+        raise InputError.CONFLICT("give either clamp_angle or follower, not both")
     held = follower if follower is not None else 0.5 * np.pi if clamp_angle is None else clamp_angle
     name = "clamp_angle" if follower is None else "follower"
     load, length, stiffness, angle = np.broadcast_arrays(
@@ -87,7 +87,7 @@ def elastica(
         (name, (angle > 0.0) & (angle < np.pi), "between 0 and pi"),
     ):
         if not np.all(good):
-            raise InputError(f"{word} must be {allowed} and finite")
+            raise InputError.NOT_FINITE(f"{word} must be {allowed} and finite")
     from scipy import special  # takes half a second, and bending a robot does without
 
     scaled = length * np.sqrt(load / stiffness)  # λ
@@ -178,7 +178,7 @@ def _slope_for(scaled: np.ndarray, clamp: np.ndarray) -> tuple[np.ndarray, np.nd
         excess, (low, high), args=(wanted, clamp), tolerances={"xatol": 1e-15, "xrtol": 1e-15}
     )
     if not np.all(found.success | ~loaded):
-        raise InputError(
+        raise InputError.OUT_OF_RANGE(
             "load * length^2 / bending_stiffness must be at least 1e-30 (or 0) and below 3000"
         )
     logit = np.where(loaded, found.x, 0.0)
@@ -225,13 +225,15 @@ def modulus_from_single_notch(
 
     pull, measured = np.asarray(force, dtype=float), np.asarray(chord_angle, dtype=float)
     if pull.ndim != 1 or pull.shape != measured.shape or not len(pull):
-        raise InputError(
+        raise InputError.WRONG_SHAPE(
             f"force and chord_angle must be lists of one length, got shapes {pull.shape} and "
             f"{measured.shape}"
         )
     bends = pull * length**2 / (3.0 * second_moment)  # of small deflections, by E times the angle
     if not np.all(np.isfinite(measured)) or not bends @ measured > 0.0:
-        raise InputError("no modulus fits: the angles must be finite, and grow with the force")
+        raise InputError.NOT_FINITE(
+            "no modulus fits: the angles must be finite, and grow with the force"
+        )
 
     def misses(logarithm: np.ndarray) -> np.ndarray:
         stiffness = np.exp(logarithm[0]) * second_moment

@@ -86,7 +86,7 @@ def _masks(numbers: tuple[int, ...], tendons: Sequence[Tendon], line: Passage) -
     for column, number in enumerate(numbers):
         if not (ends * visits)[:, column].any():
             on_its_side = ", ".join(str(j + 1) for j in np.flatnonzero(line.visits[:, column]))
-            raise InputError(
+            raise InputError.UNSUPPORTED(
                 f"tendon[{number + 1}].end_body has no wall on the tendon's side; "
                 f"the bodies there are {on_its_side}"
             )

@@ -104,7 +104,7 @@ def notch_view(notch: Notch, robot: Robot, first: bool, following: Notch | None)
         InputError: There is no drawing of its kind.
     """
     del robot, first, following
-    raise InputError(
+    raise InputError.UNSUPPORTED(
         f'there is no dimensioned drawing of notches of kind = "{notch.kind}"; '
         "register one in notchflex.plotting.drawings.notch_views."
     )

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from notchflex._quantity import Quantity
 from notchflex.results.files.writing import write_text
-from notchflex.results.quantities.quantity import Quantity
 from notchflex.results.quantities.registry import AXES, QUANTITIES, span_names
 from notchflex.results.quantities.spans import holds, spans_of
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.errors import InputError
+from notchflex.results.files.writing import read_text
 from notchflex.results.quantities.registry import QUANTITIES
 
 LARGEST = 1e6
@@ -63,14 +64,27 @@ class Table:
         Raises:
             InputError: An entry is no finite number; the message names line and column.
         """
+        entries = zip(self.texts(column), self.lines, strict=True)
         return np.array(
             [
-                math.nan
-                if may_miss and not text
-                else _number(text, column, line, self.name, self.decimal)
-                for text, line in zip(self.texts(column), self.lines, strict=True)
+                math.nan if may_miss and not text else self._number(text, column, line)
+                for text, line in entries
             ]
         )
+
+    def _number(self, text: str, column: str, line: int) -> float:
+        try:
+            value = float(text.replace(self.decimal, ".", 1))
+        except ValueError:
+            value, text = None, repr(text) if text else "nothing"
+        at = f"{self.name}, line {line}: {column} is {text}"
+        if value is None:
+            raise InputError.NOT_A_NUMBER(f"{at}; give a number.")
+        if not math.isfinite(value):
+            raise InputError.NOT_FINITE(f"{at}; give a finite number.")
+        if abs(value) > LARGEST:
+            raise InputError.OUT_OF_RANGE(f"{at}; give at most {LARGEST:g}.")
+        return value
 
     def at(self, row: int) -> str:
         """Return where a row (from 0) stands, as messages begin: file and line."""
@@ -95,50 +109,46 @@ def read_table(source: str | os.PathLike[str]) -> Table:
         InputError: No such file, not a CSV, empty, two columns of one name, or a row that has
             more or fewer entries than the header.
     """
-    path = Path(source)
-    try:
-        # utf-8-sig: spreadsheets put a byte-order mark before the first column's name.
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
-    except IsADirectoryError:
-        raise InputError(f"{path} is a folder; name a CSV file.") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is no text in UTF-8; save it as CSV.") from None
-    except (OSError, ValueError) as problem:
-        words = getattr(problem, "strerror", None) or str(problem)
-        raise InputError(f"{path} cannot be read: {words}.") from None
+    path, text = Path(source), read_text(source, "CSV file")
     separator = _separator(text)
-    table: list[tuple[int, tuple[str, ...]]] = []
+    reader = csv.reader(text.splitlines(), strict=True, delimiter=separator)
     try:
-        reader = csv.reader(text.splitlines(), strict=True, delimiter=separator)
-        for row in reader:
-            if any(field.strip() for field in row) and not row[0].lstrip().startswith("#"):
-                table.append((reader.line_num, tuple(field.strip() for field in row)))
+        table = [
+            (reader.line_num, tuple(map(str.strip, row)))
+            for row in reader
+            if any(map(str.strip, row)) and not row[0].lstrip().startswith("#")
+        ]
     except csv.Error as problem:
-        raise InputError(f"{path} is no CSV: {problem}.") from None
+        raise InputError.FILE_UNREADABLE(f"{path} is no CSV: {problem}.") from None
+    header = table[0][1] if table else ()
+    lines, rows = zip(*table[1:], strict=True) if table[1:] else ((), ())
+    twice = [column for column in header if column and header.count(column) > 1]
+    uneven = [place for place, row in enumerate(rows) if len(row) != len(header)]
     if not table:
-        raise InputError(f"{path} is empty; it needs a header and at least one row of numbers.")
-    (_, header), *body = table
+        raise InputError.TABLE_ROWS(
+            f"{path} is empty; it needs a header and at least one row of numbers."
+        )
     if len(header) == 1 and "\t" in header[0]:
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{path}: the columns are separated by tabs; save it with commas between the columns "
             "and points in the numbers."
         )
-    for column in header:
-        if column and header.count(column) > 1:
-            raise InputError(f"{path}: the column {column} is there more than once; keep one.")
-    if not body:
-        raise InputError(f"{path} has a header and no rows; it needs at least one row of numbers.")
-    for line, row in body:
-        if len(row) != len(header):
-            raise InputError(
-                f"{path}, line {line}: {len(row)} entries for {len(header)} columns; "
-                "every row needs one entry for each column."
-            )
-    lines, rows = tuple(line for line, _ in body), tuple(row for _, row in body)
-    decimal = "." if separator == "," else _decimal(path, lines, rows)
-    return Table(str(source), header, lines, rows, decimal)
+    if twice:
+        raise InputError.TABLE_COLUMNS(
+            f"{path}: the column {twice[0]} is there more than once; keep one."
+        )
+    if not rows:
+        raise InputError.TABLE_ROWS(
+            f"{path} has a header and no rows; it needs at least one row of numbers."
+        )
+    if uneven:
+        raise InputError.TABLE_ROWS(
+            f"{path}, line {lines[uneven[0]]}: {len(rows[uneven[0]])} entries for {len(header)} "
+            "columns; every row needs one entry for each column."
+        )
+    return Table(
+        str(source), header, lines, rows, "." if separator == "," else _decimal(path, lines, rows)
+    )
 
 
 def _separator(text: str) -> str:
@@ -162,7 +172,7 @@ def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) ->
                 found.setdefault(number[1], (line, entry))
     if len(found) == 2:
         (line, entry), (other_line, other) = sorted(found.values())
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{path}: {entry} in line {line} and {other} in line {other_line} have different "
             "decimal separators; write all numbers with points, or all with commas."
         )
@@ -192,19 +202,6 @@ def no_tendon_column(table: Table, tendons: int) -> InputError:
     label = "" if tendons == 1 else 1
     wanted = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
     more = "" if tendons == 1 else f" (and so on to tendon {tendons})"
-    return InputError(
+    return InputError.TABLE_COLUMNS(
         f"{table.name}: there is no column {wanted[0]} or {wanted[1]}{more}; {table.columns}."
     )
-
-
-def _number(text: str, column: str, line: int, name: str, decimal: str) -> float:
-    try:
-        value = float(text if decimal == "." else text.replace(decimal, ".", 1))
-    except ValueError:
-        got = repr(text) if text else "nothing"
-        raise InputError(f"{name}, line {line}: {column} is {got}; give a number.") from None
-    if not math.isfinite(value):
-        raise InputError(f"{name}, line {line}: {column} is {text}; give a finite number.")
-    if abs(value) > LARGEST:
-        raise InputError(f"{name}, line {line}: {column} is {text}; give at most {LARGEST:g}.")
-    return value

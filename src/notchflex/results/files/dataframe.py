@@ -28,7 +28,9 @@ def dataframe_of(path: EquilibriumPath, library: str = "polars") -> Any:
         InputError: There is no such library, or it is not installed.
     """
     if library not in LIBRARIES:
-        raise InputError(f"to_dataframe makes a table of polars or pandas; got {library!r}")
+        raise InputError.UNKNOWN_NAME(
+            f"to_dataframe makes a table of polars or pandas; got {library!r}"
+        )
     need(library, "data", f"to_dataframe({library!r})")  # xarray, of the same extra, needs pandas
     columns = {name: np.asarray(values) for name, values in path_columns(path).items()}
     if library == "polars":

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex._extras import need
+from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.results.files.record import Record, path_of, record_of
-from notchflex.results.quantities.quantity import Quantity
 from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES
 
 if TYPE_CHECKING:
@@ -88,23 +88,25 @@ def path_of_datasets(data: Dataset, record: Dataset | None, source: str) -> Equi
     """
     rest = data if record is None else record
     if "robot_file" not in data.attrs:
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{source} holds no path of notchflex; give a file that --nc or save_path wrote."
         )
     if "step" not in data.dims:
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{source} holds one state, not a path: the work done before it is not in it. "
             "Write the path that it belongs to, or the state alone with state.save."
         )
     if _FACTS not in rest.attrs:
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{source} holds the quantities of a path, but not the states between its steps, so "
             "no path can be made of it; write the path with notchflex.save_path."
         )
     try:
         facts = {**json.loads(rest.attrs[_FACTS]), "robot": data.attrs["robot_file"]}
     except (TypeError, ValueError):
-        raise InputError(f"{source} is damaged: its facts are no JSON; write it again.") from None
+        raise InputError.FILE_DAMAGED(
+            f"{source} is damaged: its facts are no JSON; write it again."
+        ) from None
     both = {**data.data_vars, **rest.data_vars}
     arrays = {str(name): np.asarray(values.to_numpy()) for name, values in both.items()}
     return path_of(Record(facts, arrays), source)

@@ -63,7 +63,7 @@ def save_path(path: EquilibriumPath, file: str | FilePath) -> None:
 
             write_path_csv(file, path)
         case other:
-            raise InputError(_no_kind(file, other, "written"))
+            raise InputError.FILE_FORMAT(_no_kind(file, other, "written"))
 
 
 def read_path(file: str | FilePath) -> EquilibriumPath:
@@ -94,15 +94,15 @@ def read_path(file: str | FilePath) -> EquilibriumPath:
     """
     suffix = FilePath(file).suffix.lower()
     if suffix == ".csv":
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{file}: a CSV holds the numbers of every step, but neither the robot nor the memory "
             "of its friction, so no path can be made of it. Read its numbers with "
             "notchflex.read_table, or write .json, .nc or .parquet."
         )
     if suffix not in (".json", ".nc", ".parquet"):
-        raise InputError(_no_kind(file, suffix, "read"))
+        raise InputError.FILE_FORMAT(_no_kind(file, suffix, "read"))
     if not FilePath(file).is_file():
-        raise InputError(f"there is no file {file}.")
+        raise InputError.FILE_NOT_FOUND(f"there is no file {file}.")
     if suffix == ".json":
         return _from_json(file)
     if suffix == ".nc":
@@ -151,7 +151,7 @@ def _from_netcdf(file: str | FilePath) -> EquilibriumPath:
             record = xarray.load_dataset(file, engine="h5netcdf", group=RECORD_GROUP)
     except (OSError, ValueError, KeyError) as problem:
         words = " ".join(str(problem).split())
-        raise InputError(f"{file} cannot be read as NetCDF: {words}.") from None
+        raise InputError.FILE_UNREADABLE(f"{file} cannot be read as NetCDF: {words}.") from None
     return path_of_datasets(data, record, str(file))
 
 
@@ -167,15 +167,15 @@ def _from_json(file: str | FilePath) -> EquilibriumPath:
         document = json.loads(FilePath(file).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
         reason = getattr(problem, "strerror", None) or f"it is no JSON ({problem})"
-        raise InputError(f"{file} cannot be read: {reason}.") from None
+        raise InputError.FILE_UNREADABLE(f"{file} cannot be read: {reason}.") from None
     if not isinstance(document, dict) or READ_BACK not in document:
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{file} holds no path that can be read back; give a file that simulate --json or "
             "save_path wrote."
         )
     path = path_of(decoded(document[READ_BACK], str(file)), str(file))
     if not _same_steps(path, document.get("steps")):
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{file}: its steps are not those that its part {READ_BACK!r} holds, so one of them "
             "was changed; write the file again."
         )
@@ -185,13 +185,16 @@ def _from_json(file: str | FilePath) -> EquilibriumPath:
 def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
     """Whether the steps of a document are those of a path, but for steps that were not tried.
 
-    Version 0.1.0 wrote zeros for the shape of those.
+    Version 0.1.0 wrote zeros for the shape of those, and no `reason_code`.
     """
     wanted = plain(path_document(path))["steps"]
     if not isinstance(steps, list) or len(steps) != len(wanted):
         return False
-    pairs = zip(wanted, steps, np.asarray(path.run.tried), strict=True)
-    return all(one == other for one, other, tried in pairs if tried)
+    return all(
+        isinstance(other, dict) and one == {"reason_code": one["reason_code"], **other}
+        for one, other, tried in zip(wanted, steps, np.asarray(path.run.tried), strict=True)
+        if tried
+    )
 
 
 def _no_kind(file: str | FilePath, suffix: str, done: str) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from notchflex import __version__
+from notchflex._quantity import Quantity
 from notchflex.results.files.writing import write_text
-from notchflex.results.quantities.quantity import Quantity
 from notchflex.results.quantities.registry import CONTACT_STATES, QUANTITIES, units
 from notchflex.results.quantities.spans import holds, spans_of
 from notchflex.robot import Robot
@@ -26,17 +27,18 @@ PLAIN = tuple(
 )  # all but the contacts, which are gathered contact by contact
 CONTACTS = tuple(q for q in QUANTITIES.values() if q.key and q.per == ("tendon", "contact"))
 
-# External loads are what a user gave, and no result: they have no row in the table.
-LOAD_UNITS = {
-    "load.tip_force_N": "N",
-    "load.tip_moment_Nmm": "N mm",
-    "load.tip_point_mm": "mm",
-    "load.tip_mass_g": "g",
-    "load.gravity_m_s2": "m/s^2",
-    "load.body_forces.force_N": "N",
-    "load.body_forces.moment_Nmm": "N mm",
-    "load.body_forces.point_mm": "mm",
+# External loads are what a user gave, and no result: they are not registered as quantities.
+_LOAD_KEYS = {
+    "tip_force": ("tip_force_N", "N"),
+    "tip_moment": ("tip_moment_Nmm", "N mm"),
+    "tip_point": ("tip_point_mm", "mm"),
+    "tip_mass": ("tip_mass_g", "g"),
+    "gravity": ("gravity_m_s2", "m/s^2"),
+    "force": ("body_forces.force_N", "N"),
+    "moment": ("body_forces.moment_Nmm", "N mm"),
+    "point": ("body_forces.point_mm", "mm"),
 }
+LOAD_UNITS = {f"load.{key}": unit for key, unit in _LOAD_KEYS.values()}
 
 
 def path_document(path: EquilibriumPath) -> dict[str, Any]:
@@ -47,18 +49,19 @@ def path_document(path: EquilibriumPath) -> dict[str, Any]:
 
     Returns:
         `name`, `version`, `robot` (its whole description), `units` (JSON key to unit),
-        `converged`, `reason` and `steps`, a list of S objects. None stands where there is no
-        number. Angles in deg, lengths in mm, forces in N. Where loads act from outside in any
-        step, `load` tells those of every step.
+        `converged`, `reason`, `reason_code` (name of a `Failure`) and `steps`, a list of S
+        objects. None stands where there is no number. Angles in deg, lengths in mm, forces in N.
+        Where external loads act in any step, `load` holds those of every step.
     """
     outside = _outside(path)
-    failed = [str(r) for r, good in zip(path.reason, path.converged, strict=True) if not good]
+    failed = next((step for step, good in enumerate(path.converged) if not good), None)
     steps = [_step(path, index, outside) for index in range(len(path))]
     return {
         **document_head(path.robot),
         "units": units() | (LOAD_UNITS if outside else {}),
-        "converged": not failed,
-        "reason": failed[0] if failed else "",
+        "converged": failed is None,
+        "reason": "" if failed is None else str(path.reason[failed]),
+        "reason_code": "" if failed is None else str(path.reason_code[failed]),
         "steps": steps,
     }
 
@@ -144,27 +147,15 @@ def _outside(path: EquilibriumPath) -> list[dict[str, Any]]:
     external = path.load.external
     if all(one.is_nothing for one in external):
         return []
-    return [
-        {
-            "tip_force_N": one.tip_force,
-            "tip_moment_Nmm": one.tip_moment,
-            "tip_point_mm": one.tip_point,
-            "following": one.following,
-            "tip_mass_g": one.tip_mass,
-            "gravity_m_s2": one.gravity,
-            "body_forces": [
-                {
-                    "body": force.body,
-                    "force_N": force.force,
-                    "moment_Nmm": force.moment,
-                    "point_mm": force.point,
-                    "following": force.following,
-                }
-                for force in one.body_forces
-            ],
-        }
-        for one in external
-    ]
+    return [_with_units(asdict(one)) for one in external]
+
+
+def _with_units(values: dict[str, Any]) -> dict[str, Any]:
+    forces = values.pop("body_forces", None)
+    own = {
+        _LOAD_KEYS.get(name, (name,))[0].rpartition(".")[2]: value for name, value in values.items()
+    }
+    return own if forces is None else {**own, "body_forces": [_with_units(one) for one in forces]}
 
 
 def _value(path: EquilibriumPath, quantity: Quantity, index: int) -> Any:

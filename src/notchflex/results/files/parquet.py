@@ -58,14 +58,16 @@ def read_head(file: str | FilePath) -> Record:
     with _told(file):
         head = polars.read_parquet_metadata(FilePath(file))
     if _KEY not in head:
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{file} has no path of notchflex in its head; give a file that --parquet or "
             "save_path wrote, or read its columns with notchflex.read_table."
         )
     try:
         document = json.loads(head[_KEY])
     except ValueError:
-        raise InputError(f"{file} is damaged: its head is no JSON; write it again.") from None
+        raise InputError.FILE_DAMAGED(
+            f"{file} is damaged: its head is no JSON; write it again."
+        ) from None
     return decoded(document, str(file))
 
 
@@ -77,7 +79,7 @@ def _told(file: str | FilePath) -> Generator[None]:
     try:
         yield
     except FileNotFoundError:
-        raise InputError(f"there is no file {file}.") from None
+        raise InputError.FILE_NOT_FOUND(f"there is no file {file}.") from None
     except (OSError, PolarsError) as problem:
         words = " ".join(str(problem).split())
-        raise InputError(f"{file} cannot be read as Parquet: {words}.") from None
+        raise InputError.FILE_UNREADABLE(f"{file} cannot be read as Parquet: {words}.") from None

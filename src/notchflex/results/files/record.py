@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex import __version__
+from notchflex._quantity import REGISTERED
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ FORMAT = "notchflex path 1"
 IN_BASE = "_in_base"
 """Ends the name of an array in the frame of a base that is turned in the world."""
 
-_TURNED = ("body_position", "body_rotation", "tip_position", "base_force", "base_moment")
 _STATE, _START = "state", "before."
 _RUN = ("residual", "iterations", "converged", "tried", "reached")
 _HELD = ("smallest_eigenvalue", "determinant_sign")
@@ -86,20 +86,20 @@ def path_of(record: Record, source: str) -> EquilibriumPath:
     """
     if record.facts.get("format") != FORMAT:
         got = record.facts.get("format")
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{source} is laid out as {got!r}, not as {FORMAT!r}: it cannot be made a path of by "
             f"notchflex {__version__}; write it again with this version."
         )
     try:
         return _path_of(record)
     except InputError as problem:
-        raise InputError(f"{source} cannot be read back: {problem}") from None
+        raise InputError.FILE_DAMAGED(f"{source} cannot be read back: {problem}") from None
     except KeyError as problem:
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{source} cannot be read back: {problem.args[0]} is missing; write it again."
         ) from None
     except (TypeError, ValueError, IndexError) as problem:
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{source} cannot be read back: it is damaged ({problem}); write it again."
         ) from None
 
@@ -132,7 +132,7 @@ def decoded(document: Any, source: str) -> Record:
         }
         return Record(dict(document["facts"]), arrays)
     except (AttributeError, KeyError, TypeError, ValueError) as problem:
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{source} cannot be read back: what it holds for that is damaged ({problem}); "
             "write it again."
         ) from None
@@ -169,8 +169,7 @@ def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     yield "commanded_tension", path.load.tension
     yield "commanded_stroke", path.load.stroke
     for name in TOLD:
-        own = f"{name}{IN_BASE}" if turned and name in _TURNED else name
-        yield own, np.asarray(run.quantity(name))
+        yield _key(name, turned), np.asarray(run.quantity(name))
     for name in _RUN:
         # A path counts more as not converged than the solver does.
         yield ("solver_converged" if name == "converged" else name), np.asarray(getattr(run, name))
@@ -214,9 +213,7 @@ def _path_of(record: Record) -> EquilibriumPath:
         name = _STATE + tree_util.keystr(key)
         state.append(_of_shape(arrays[name], (steps, *np.shape(leaf)), name))
     turned = bool(load.base_rotation.any())
-    told = {
-        name: arrays[f"{name}{IN_BASE}" if turned and name in _TURNED else name] for name in TOLD
-    }
+    told = {name: arrays[_key(name, turned)] for name in TOLD}
     for name, values in told.items():
         _of_shape(values, (steps, *values.shape[1:]), name)
     run = {
@@ -235,9 +232,14 @@ def _path_of(record: Record) -> EquilibriumPath:
     )
 
 
+def _key(name: str, turned: bool) -> str:
+    """Return the name of an array of the solver, whose vectors are in the frame of the base."""
+    return f"{name}{IN_BASE}" if turned and REGISTERED[name].in_world else name
+
+
 def _of_shape(array: NDArray[Any], shape: tuple[int, ...], name: str) -> NDArray[Any]:
     if array.shape != shape:
-        raise InputError(
+        raise InputError.FILE_DAMAGED(
             f"{name} has the shape {array.shape}, and this robot and its loads ask for {shape}."
         )
     return array

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
@@ -12,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex._quantity import Quantity
 from notchflex.errors import InputError
-from notchflex.results.quantities.quantity import Quantity
+from notchflex.results.files import csv_reading
+from notchflex.results.files.parquet import read_columns
 from notchflex.results.quantities.registry import AXES, QUANTITIES
 
 _PATTERNS = {
@@ -51,46 +51,30 @@ def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
         >>> found["notch_angle"].shape, "contact_slid" in found
         ((3, 5), False)
     """
-    columns = _parquet(file) if FilePath(file).suffix.lower() == ".parquet" else _csv(file)
     found: dict[str, dict[tuple[int, ...], NDArray[Any]]] = {}
-    for header, values in columns.items():
+    for header, values in _columns(file).items():
         place = _place(header)
         if place is not None:
             quantity, index = place
             try:
                 found.setdefault(quantity.name, {})[index] = _numbers(quantity, values)
             except (TypeError, ValueError):
-                raise InputError(
+                raise InputError.NOT_A_NUMBER(
                     f"{file}: the column {header} holds what is no number; write the table again."
                 ) from None
     if not found:
-        raise InputError(
+        raise InputError.TABLE_COLUMNS(
             f"{file} has no column of a path (such as {QUANTITIES['total_angle'].header()}); give "
             "a table that --csv or --parquet wrote."
         )
     return {name: _joined(QUANTITIES[name], parts) for name, parts in found.items()}
 
 
-def _csv(file: str | FilePath) -> Mapping[str, Sequence[Any]]:
-    try:
-        text = FilePath(file).read_text(encoding="utf-8-sig")
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or "it is not UTF-8 text"
-        raise InputError(f"{file} cannot be read: {reason}.") from None
-    try:
-        header, *rows = list(csv.reader(io.StringIO(text)))
-        columns = list(zip(*rows, strict=True)) or [()] * len(header)
-        return dict(zip(header, columns, strict=True))
-    except (csv.Error, ValueError):
-        raise InputError(
-            f"{file} is no table: its rows must have as many fields as its first line has names."
-        ) from None
-
-
-def _parquet(file: str | FilePath) -> Mapping[str, Sequence[Any]]:
-    from notchflex.results.files.parquet import read_columns
-
-    return read_columns(file)
+def _columns(file: str | FilePath) -> Mapping[str, Sequence[Any]]:
+    if FilePath(file).suffix.lower() == ".parquet":
+        return read_columns(file)
+    table = csv_reading.read_table(file)
+    return {column: table.texts(column) for column in table.header}
 
 
 def _place(header: str) -> tuple[Quantity, tuple[int, ...]] | None:

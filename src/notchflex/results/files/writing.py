@@ -39,39 +39,42 @@ def check_output(target: str, option: str, *, inputs: Iterable[str | Path] = ())
     if target == STANDARD_OUTPUT:
         return
     if not target.strip():
-        raise InputError(f"{option} needs the name of a file, and got an empty one.")
+        raise InputError.MISSING_VALUE(f"{option} needs the name of a file, and got an empty one.")
     if "\0" in target:
-        raise InputError(f"{option} {target!r} cannot be written: it holds a null character.")
+        raise InputError.FILE_UNWRITABLE(
+            f"{option} {target!r} cannot be written: it holds a null character."
+        )
     path = Path(target)
-    folder = path.parent
     try:
-        if path.is_dir():
-            raise InputError(
-                f"{option} {target}: this is a folder; give the name of a file to write in it."
-            )
-        if not folder.exists():
-            raise InputError(
-                f"{option} {target}: the folder {folder} does not exist; "
-                "make it first or choose another."
-            )
-        if not folder.is_dir():
-            raise InputError(f"{option} {target}: {folder} is a file, not a folder.")
-        if path.exists() and not os.access(path, os.W_OK):
-            raise InputError(f"{option} {target}: this file may not be written; choose another.")
-        if _replaceable(path) and not _folder_takes_files(folder):
-            raise InputError(
-                f"{option} {target}: no file may be written in the folder {folder}; choose another."
-            )
-        for source in inputs:
+        obstacle = _obstacle(path)
+        for source in [] if obstacle else inputs:
             if Path(source).exists() and path.exists() and path.samefile(source):
-                raise InputError(
+                raise InputError.CONFLICT(
                     f"{option} {target}: this would replace the file that is read; choose another."
                 )
-    except (OSError, ValueError) as problem:
-        if isinstance(problem, InputError):
-            raise
-        words = getattr(problem, "strerror", None) or str(problem)
-        raise InputError(f"{option} {target!r} cannot be written: {words}.") from None
+    except OSError as problem:
+        words = problem.strerror or problem
+        raise InputError.FILE_UNWRITABLE(
+            f"{option} {target!r} cannot be written: {words}."
+        ) from None
+    if obstacle:
+        raise InputError.FILE_UNWRITABLE(f"{option} {target}: {obstacle}.")
+
+
+def _obstacle(path: Path) -> str:
+    """Say why a file cannot be written, "" if it can."""
+    folder = path.parent
+    if path.is_dir():
+        return "this is a folder; give the name of a file to write in it"
+    if not folder.exists():
+        return f"the folder {folder} does not exist; make it first or choose another"
+    if not folder.is_dir():
+        return f"{folder} is a file, not a folder"
+    if path.exists() and not os.access(path, os.W_OK):
+        return "this file may not be written; choose another"
+    if _replaceable(path) and not _folder_takes_files(folder):
+        return f"no file may be written in the folder {folder}; choose another"
+    return ""
 
 
 def check_folder(
@@ -92,13 +95,19 @@ def check_folder(
         InputError: A file cannot be written there, has no name of a file, or is an input.
     """
     if not folder.strip():
-        raise InputError(f"{option} needs the name of a folder, and got an empty one.")
+        raise InputError.MISSING_VALUE(
+            f"{option} needs the name of a folder, and got an empty one."
+        )
     if folder == STANDARD_OUTPUT:
-        raise InputError(f"{option} - : files cannot go to standard output; name a folder.")
+        raise InputError.FILE_FORMAT(
+            f"{option} - : files cannot go to standard output; name a folder."
+        )
     files: list[Path] = []
     for name in names:
         if Path(name).name != name or "\0" in name:
-            raise InputError(f"{option} {folder}: a file cannot be called {name!r}.")
+            raise InputError.FILE_UNWRITABLE(
+                f"{option} {folder}: a file cannot be called {name!r}."
+            )
         files.append(Path(folder) / name)
     there = os.path.exists(folder) if "\0" not in folder else False
     sources = list(inputs)
@@ -126,7 +135,7 @@ def check_picture(
         InputError: The suffix is none of them, or what draws the picture is not installed.
     """
     if target == STANDARD_OUTPUT:
-        raise InputError(
+        raise InputError.FILE_FORMAT(
             f"{option} - : a picture cannot go to standard output; name a file, "
             "for example wrist.png."
         )
@@ -134,7 +143,9 @@ def check_picture(
     if suffix not in kinds:
         got = f"the suffix {suffix}" if suffix else "no suffix"
         known = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
-        raise InputError(f"{option} {target}: got {got}; a picture is written as {known}.")
+        raise InputError.FILE_FORMAT(
+            f"{option} {target}: got {got}; a picture is written as {known}."
+        )
     check_output(target, option, inputs=inputs)
     for module in _DRAWN_BY.get(suffix, ("matplotlib",)):
         need(module, "plot", option)
@@ -158,7 +169,7 @@ def check_distinct(outputs: dict[str, str | None]) -> None:
         name = target if plain else os.path.realpath(target)
         if name in seen:
             where = "standard output" if target == STANDARD_OUTPUT else target
-            raise InputError(
+            raise InputError.CONFLICT(
                 f"{seen[name]} and {option} both write to {where}; give them different files."
             )
         seen[name] = option
@@ -186,7 +197,7 @@ def replacing(target: str | Path) -> Generator[Path]:
             yield Path(target)
         except OSError as problem:
             words = problem.strerror or problem
-            raise InputError(f"{target} cannot be written: {words}.") from None
+            raise InputError.FILE_UNWRITABLE(f"{target} cannot be written: {words}.") from None
         return
     destination = Path(os.path.realpath(target))
     try:
@@ -195,16 +206,44 @@ def replacing(target: str | Path) -> Generator[Path]:
         )
         os.close(handle)
     except OSError as problem:
-        raise InputError(f"{target} cannot be written: {problem.strerror}.") from None
+        raise InputError.FILE_UNWRITABLE(
+            f"{target} cannot be written: {problem.strerror}."
+        ) from None
     temporary = Path(name)
     try:
         yield temporary
         temporary.chmod(_mode_for(destination))
         os.replace(temporary, destination)
     except OSError as problem:
-        raise InputError(f"{target} cannot be written: {problem.strerror or problem}.") from None
+        raise InputError.FILE_UNWRITABLE(
+            f"{target} cannot be written: {problem.strerror or problem}."
+        ) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def read_text(source: str | os.PathLike[str], kind: str) -> str:
+    """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it.
+
+    Args:
+        source: Path of the file.
+        kind: What kind of file it is, for messages.
+
+    Raises:
+        InputError: It is missing, a folder, no text or cannot be read.
+    """
+    try:
+        return Path(source).read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError.FILE_NOT_FOUND(f"{source}: there is no such file.") from None
+    except IsADirectoryError:
+        raise InputError.FILE_UNREADABLE(f"{source} is a folder; name a {kind}.") from None
+    except UnicodeDecodeError:
+        saved = f"save it as {kind.removesuffix(' file')}"
+        raise InputError.FILE_UNREADABLE(f"{source} is no text in UTF-8; {saved}.") from None
+    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
+        words = getattr(problem, "strerror", None) or problem
+        raise InputError.FILE_UNREADABLE(f"{source} cannot be read: {words}.") from None
 
 
 def write_text(target: str | Path, text: str) -> None:

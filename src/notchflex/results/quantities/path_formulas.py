@@ -1,174 +1,122 @@
-"""Quantities of a path that follow from what the solver returned, each by its formula.
-
-What has no formula here is returned by the solver (`Shape` and `Quantities`).
-"""
+"""Quantities of a path that follow from what the solver returned, each beside its formula."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
-from notchflex.results.quantities.front import friction_front
-from notchflex.results.reason import why_not
+from notchflex._quantity import Quantity
 from notchflex.solver.derived.quantities import believable
 
 if TYPE_CHECKING:  # for the type only: a path evaluates these
     from notchflex.results.path import EquilibriumPath
 
-FORMULAS: dict[str, Callable[[EquilibriumPath], Any]] = {}
-"""Formulas by the name of the quantity; a path evaluates each once."""
 
-_Formula = Callable[["EquilibriumPath"], Any]
-
-
-def _formula(function: _Formula) -> _Formula:
-    """Register a formula under the name of its function."""
-    FORMULAS[function.__name__] = function
-    return function
-
-
-@_formula
-def commanded_tension(path: EquilibriumPath) -> Float[np.ndarray, "s t"]:
-    """Return the tensions of the load path."""
+@Quantity("path", "commanded tension", "T", "N", key="load.tension_N", per=("tendon",), after="")
+def commanded_tension(path: EquilibriumPath) -> np.ndarray:
+    """Tension commanded at the base of a tendon; empty (NaN) where it is not commanded."""
     return path.load.tension
 
 
-@_formula
-def commanded_stroke(path: EquilibriumPath) -> Float[np.ndarray, "s t"]:
-    """Return the strokes of the load path."""
+@Quantity("path", "commanded stroke", "u", "mm", key="load.stroke_mm", per=("tendon",),
+          after="commanded_tension")  # fmt: skip
+def commanded_stroke(path: EquilibriumPath) -> np.ndarray:
+    """Tendon length commanded to be drawn out at the base; empty (NaN) where not commanded."""
     return path.load.stroke
 
 
-@_formula
-def total_chord_angle(path: EquilibriumPath) -> Float[np.ndarray, " s"]:
-    """Sum the chord angles (Liu 2022)."""
+@Quantity("path", "total chord angle", r"\psi", "deg", key="total_chord_angle_deg",
+          column="total_chord_deg", after="chord_angle", optional=True)  # fmt: skip
+def total_chord_angle(path: EquilibriumPath) -> np.ndarray:
+    """Sum of the chord angles, where every flexure has one."""
     return path.chord_angle.sum(axis=-1)
 
 
-@_formula
-def body_position(path: EquilibriumPath) -> Float[np.ndarray, "s bodies 3"]:
-    """Turn the positions from the frame of the base into the world."""
-    return _in_world(path, "body_position")
-
-
-@_formula
-def body_rotation(path: EquilibriumPath) -> Float[np.ndarray, "s bodies 3 3"]:
-    """Turn the rotations from the frame of the base into the world."""
-    turn, rotation = path.base_to_world, path.solver_quantity("body_rotation")
-    return rotation if turn is None else turn @ rotation
-
-
-@_formula
-def tip_position(path: EquilibriumPath) -> Float[np.ndarray, "s 3"]:
-    """Turn the tip from the frame of the base into the world."""
-    return _in_world(path, "tip_position")
-
-
-@_formula
-def tip_rotation(path: EquilibriumPath) -> Float[np.ndarray, "s 3 3"]:
-    """Return the rotation of the last body."""
-    return path.body_rotation[..., -1, :, :]
-
-
-@_formula
-def base_force(path: EquilibriumPath) -> Float[np.ndarray, "s 3"]:
-    """Turn the force from the frame of the base into the world."""
-    return _in_world(path, "base_force")
-
-
-@_formula
-def base_moment(path: EquilibriumPath) -> Float[np.ndarray, "s 3"]:
-    """Turn the moment from the frame of the base into the world."""
-    return _in_world(path, "base_moment")
-
-
-@_formula
-def closed(path: EquilibriumPath) -> Bool[np.ndarray, "s n"]:
-    """Compare contact force and gap: one of them is zero, but for rounding."""
-    return path.contact_force > path.gap * np.asarray(path.chain.lip_stiffness)
-
-
-@_formula
-def front(path: EquilibriumPath) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
-    """Find the friction front along every tendon."""
-    return friction_front(path.contact_log_ratio, path.contact_bound)
-
-
-@_formula
-def front_contact(path: EquilibriumPath) -> Int[np.ndarray, "s t"]:
-    """Return contact m of the front."""
-    return path.front[0]
-
-
-@_formula
-def front_eta(path: EquilibriumPath) -> Float[np.ndarray, "s t"]:
-    """Return eta of the front."""
-    return path.front[1]
-
-
-@_formula
-def tendon_work(path: EquilibriumPath) -> Float[np.ndarray, "s t"]:
-    """Integrate the tension over the stroke."""
-    return _accumulated(path, "tension", "stroke")
-
-
-@_formula
-def dissipation(path: EquilibriumPath) -> Float[np.ndarray, "s t contacts"]:
-    """Integrate the tension drop at every contact over the slid length."""
+@Quantity("path", "dissipation", "D_i", "N mm", per=("tendon", "contact"), after="contact_bound",
+          note="Integrated by the trapezoid rule from step to step, as is the tendon work, so the "
+          "two balance with the stored energy as the steps get small. A few coarse steps across a "
+          "reversal give a rough value, which may even decrease.")  # fmt: skip
+def dissipation(path: EquilibriumPath) -> np.ndarray:
+    """Work that a friction contact has turned to heat since the start of the path."""
+    # The tension drop at every contact over the slid length.
     return _accumulated(path, "span_tension", "contact_slid")
 
 
-@_formula
-def converged(path: EquilibriumPath) -> Bool[np.ndarray, " s"]:
-    """Return which steps were solved within the limits of friction law and strain modes."""
-    names = ("friction_holds", "moment_error", "bend_possible")
-    limits = (path.solver_quantity(name) for name in names)
-    return np.asarray(path.run.converged) & believable(*limits)
+@Quantity("path", "friction front", "m", key="front.m", column="tendon{tendon}_front_m",
+          per=("tendon",), after="dissipation", kind=int)  # fmt: skip
+def front_contact(path: EquilibriumPath) -> np.ndarray:
+    """Contact up to which the friction of a tendon has turned from loading to unloading.
+
+    Contacts are counted from 1 at the base (Gao 2017, eq. 26); one more than there are where all
+    have turned.
+    """
+    return path.front[0]
 
 
-@_formula
-def residual(path: EquilibriumPath) -> Float[np.ndarray, " s"]:
-    """Return the largest imbalance of the last attempt, scaled to an angle; NaN if not tried."""
-    return np.asarray(path.run.residual)
+@Quantity("path", "friction at the front", r"\eta", key="front.eta",
+          column="tendon{tendon}_front_eta", per=("tendon",), after="front_contact")  # fmt: skip
+def front_eta(path: EquilibriumPath) -> np.ndarray:
+    """Friction of that contact over its largest, from 1 (loading) to -1 (unloading)."""
+    return path.front[1]
 
 
-@_formula
-def iterations(path: EquilibriumPath) -> Int[np.ndarray, " s"]:
-    """Return the number of Newton iterations."""
-    return np.asarray(path.run.iterations)
+@Quantity("path", "tendon work", "W", "N mm", key="tendon_work_Nmm",
+          column="tendon{tendon}_work_Nmm", per=("tendon",))  # fmt: skip
+def tendon_work(path: EquilibriumPath) -> np.ndarray:
+    """Work done on a tendon at the base since the start of the path."""
+    return _accumulated(path, "tension", "stroke")
 
 
-@_formula
+@Quantity("path", "converged", key="converged", column="converged", kind=bool,
+          note="A solved state beyond the limits of the friction law or of the strain modes "
+          "counts as not converged.")  # fmt: skip
+def converged(path: EquilibriumPath) -> np.ndarray:
+    """True where the equilibrium was found."""
+    return np.asarray(path.run.converged) & believable(path.solver_quantity)
+
+
+@Quantity("path", "reason", key="reason", column="reason", kind=str)
 def reason(path: EquilibriumPath) -> list[str]:
-    """Say why a step did not converge."""
-    return [why_not(path, step) for step in range(len(path))]
+    """Why the equilibrium was not found; empty where it was."""
+    return [text for _, text in path.failures]
 
 
-@_formula
-def smallest_eigenvalue(path: EquilibriumPath) -> Float[np.ndarray, " s"]:
-    """Return the eigenvalue of the stiffness with the smallest real part."""
-    return path.stability[0]
+@Quantity("path", "code of the reason", key="reason_code", kind=str)
+def reason_code(path: EquilibriumPath) -> list[str]:
+    """Name of the `Failure` that stopped the solver; empty where the equilibrium was found."""
+    return [failure.name if failure else "" for failure, _ in path.failures]
 
 
-@_formula
-def determinant_sign(path: EquilibriumPath) -> Float[np.ndarray, " s"]:
-    """Return the sign of the determinant of the stiffness."""
-    return path.stability[1]
-
-
-@_formula
-def stable(path: EquilibriumPath) -> Bool[np.ndarray, " s"]:
-    """Test whether every eigenvalue of the stiffness has a positive real part."""
+@Quantity("path", "stable", key="stable", column="stable", kind=bool)
+def stable(path: EquilibriumPath) -> np.ndarray:
+    """True where the equilibrium is stable with its sticking contacts held."""
     return path.run.stable(path.commands)
 
 
-def _in_world(path: EquilibriumPath, name: str) -> np.ndarray:
-    """Turn vectors, as last axis, from the frame of the base into the world."""
-    turn, vectors = path.base_to_world, path.solver_quantity(name)
-    return vectors if turn is None else vectors @ turn.T
+@Quantity("path", "smallest eigenvalue", r"\lambda_\mathrm{min}", "N mm",
+          key="smallest_eigenvalue_Nmm")  # fmt: skip
+def smallest_eigenvalue(path: EquilibriumPath) -> np.ndarray:
+    """Smallest real part of an eigenvalue of the stiffness, sticking contacts held."""
+    return path.stability[0]
+
+
+@Quantity("path", "sign of the determinant")
+def determinant_sign(path: EquilibriumPath) -> np.ndarray:
+    """Sign of the determinant of that stiffness; +1 at every stable state."""
+    return path.stability[1]
+
+
+@Quantity("path", "residual", "r", key="residual", column="residual")
+def residual(path: EquilibriumPath) -> np.ndarray:
+    """Largest scaled residual of the equations at the end of the iteration."""
+    return np.asarray(path.run.residual)
+
+
+@Quantity("path", "iterations", key="iterations", column="iterations", kind=int)
+def iterations(path: EquilibriumPath) -> np.ndarray:
+    """Number of Newton iterations."""
+    return np.asarray(path.run.iterations)
 
 
 def _accumulated(path: EquilibriumPath, force: str, length: str) -> np.ndarray:
@@ -185,6 +133,3 @@ def _accumulated(path: EquilibriumPath, force: str, length: str) -> np.ndarray:
     (force_before, force_after), (length_before, length_after) = pairs
     work = 0.5 * (force_before + force_after) * (length_after - length_before)
     return work if path.each_from_rest else np.cumsum(work, axis=0)
-
-
-__all__ = ["FORMULAS"]

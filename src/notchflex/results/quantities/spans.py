@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from notchflex.results.quantities.quantity import Quantity
+from notchflex._quantity import Quantity
 
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath

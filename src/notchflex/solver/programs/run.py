@@ -17,7 +17,8 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import Solved, advance
-from notchflex.solver.derived.quantities import Shape, notch_lips, of_own, quantities, shape
+from notchflex.solver.derived.quantities import Shape, of_own, quantities, shape
+from notchflex.solver.derived.solved_state import notch_lips
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.capacity import lengthen, places_within
 from notchflex.solver.programs.compiled import native
@@ -105,7 +106,7 @@ class Run:
         return {name: of_own(own.chain, name, values) for name, values in every.items()}
 
     def quantity(self, name: str) -> np.ndarray:
-        """What is reported of each state, by its name in `Shape` or `Quantities`."""
+        """What is reported of each state, by its name in the registry."""
         if name not in Shape._fields:
             return self._more[name][1:]
         long = self._prepared.long
@@ -264,4 +265,4 @@ def _quantities(
     state_form: Form,
 ) -> tuple[Array, dict[str, Array]]:
     """What is reported of a state beyond its shape, by name; nothing is carried on."""
-    return carried, quantities(chain_form.unpack(vector), state_form.unpack(state))._asdict()
+    return carried, quantities(chain_form.unpack(vector), state_form.unpack(state))

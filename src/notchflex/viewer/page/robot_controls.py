@@ -106,7 +106,9 @@ def _robot(name: str, content: bytes) -> Any:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(f"{name} is not UTF-8 text; a robot file is a TOML text file") from None
+        raise InputError.FILE_UNREADABLE(
+            f"{name} is not UTF-8 text; a robot file is a TOML text file"
+        ) from None
     return robot_from_text(text, name)
 
 

@@ -85,7 +85,9 @@ def send_picture(client: viser.ClientHandle, session: Session, scene: Scene, ten
             timeout=_WAIT,
         )
     except (TimeoutError, RuntimeError):
-        raise InputError("the browser sent no picture; bring its window to the front") from None
+        raise InputError.NO_CONNECTION(
+            "the browser sent no picture; bring its window to the front"
+        ) from None
     content = picture(session, view, tendon)
     client.send_file_download(file_name(session.robot, "png"), content, save_immediately=True)
 

@@ -22,7 +22,7 @@ def check_installed() -> None:
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         plural = "are" if len(missing) > 1 else "is"
-        raise InputError(
+        raise InputError.MISSING_PACKAGE(
             f"the viewer needs {', '.join(missing)}, which {plural} not installed: {INSTALL}"
         )
 
@@ -59,14 +59,14 @@ def check_host(host: str, port: int) -> None:
         InputError: The host is no address of this machine, or the port is none.
     """
     if not 0 < port < 65536:
-        raise InputError(f"a port is a whole number from 1 to 65535; got {port}")
+        raise InputError.OUT_OF_RANGE(f"a port is a whole number from 1 to 65535; got {port}")
     try:
         kind = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.socket(kind, socket.SOCK_STREAM) as probe:
             probe.bind((host, 0))
     except (OSError, UnicodeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
-        raise InputError(
+        raise InputError.NO_CONNECTION(
             f"nothing can be served on {host!r}: {reason}; give an address of this machine, such "
             f"as {HOST}"
         ) from None

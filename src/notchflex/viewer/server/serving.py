@@ -42,7 +42,7 @@ def serve(host: str, port: int) -> viser.ViserServer:
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if server.get_port() not in guarded:
         server.stop()
-        raise InputError(
+        raise InputError.MISSING_PACKAGE(
             f"viser {viser.__version__} does not let requests be checked, so nothing is served; "
             f"install the version that notchflex asks for: {INSTALL}"
         )
