@@ -67,7 +67,12 @@ def differences(of, value: float) -> float:
     return (4.0 * narrow - wide) / 3.0
 
 
-@pytest.mark.parametrize("case", CASES)
+LONG = ("links, loaded",)
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(one, marks=[pytest.mark.nightly] * (one in LONG)) for one in CASES]
+)
 def test_slopes_against_differences(case, margin):
     name, path, parameters = CASES[case]
     robot = nf.load_robot(name)

@@ -128,8 +128,9 @@ def test_wrists_of_one_to_forty_notches_share_four_programs(wrist: nf.Robot) -> 
         longer = wrist.replace(notch=wrist.notches[:1] * notches, tendon=(nf.Tendon(0.7),))
         state = nf.solve(longer, nf.Load(tension=0.3)).raise_if_failed()
         programs.add(state.path.prepared.long.known_form)
-        alone = nf.solve_batch(longer, [nf.Load(tension=0.3)])  # a program without added flexures
-        assert state.total_angle == pytest.approx(alone["total_angle"][0], abs=1e-12)
+        if notches in (1, 8, 24, 40):  # against a program without added flexures, compiled for each
+            alone = nf.solve_batch(longer, [nf.Load(tension=0.3)])
+            assert state.total_angle == pytest.approx(alone["total_angle"][0], abs=1e-12)
     assert len(programs) <= 4
 
 
