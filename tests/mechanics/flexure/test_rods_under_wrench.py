@@ -98,7 +98,7 @@ def strip_errors(table: np.ndarray, shape: Rod, steps: int) -> np.ndarray:
     return np.abs(np.stack([slope, x, y, np.arctan2(y, x)], axis=-1) - table[:, 3:])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_strip_converges_with_its_modes(margin):
     table = reference("liu_single_beam.csv")
     worst = []
