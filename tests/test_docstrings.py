@@ -21,7 +21,7 @@ FILES = {
 WITH_EXAMPLES = [
     name.removesuffix(".__init__")
     for name, file in FILES.items()
-    if ">>> " in file.read_text(encoding="utf-8")
+    if re.search(r">>> (?!.*\+SKIP)", file.read_text(encoding="utf-8"))
 ]
 
 
