@@ -132,6 +132,7 @@ def test_slopes_that_nobody_knows_are_not_told(wrist):
     assert np.isnan(response.compliance).all()
 
 
+@pytest.mark.nightly
 def test_without_friction_a_load_may_be_cut(wrist, margin):
     smooth = wrist.with_value("friction.kind", "frictionless")
     response = nf.tip_response(smooth, HARD)

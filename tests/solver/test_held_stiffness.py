@@ -63,7 +63,7 @@ def held(path: nf.EquilibriumPath) -> np.ndarray:
     return np.concatenate([one.stiffness for one in pieces])
 
 
-LONG = ("U-links",)  # as those that buckle, without
+LONG = ("U-links", "four tendons, two by stroke")
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,7 @@ def test_opposite_tendon_is_the_mirror_image(margin) -> None:
     margin.within("tensions", one.span_tension - other.span_tension, 1e-9, "N")
 
 
+@pytest.mark.nightly
 def test_both_tendons_pulled_at_once() -> None:
     left = gao_robot()
     opposite = dataclasses.replace(left.tendon[0], direction_deg=180.0)
