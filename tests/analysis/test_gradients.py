@@ -211,16 +211,17 @@ def test_numbers_at_the_end_of_their_range(margin):
 
 
 def test_slopes_of_plain_functions(margin):
-    def curve(numbers: np.ndarray) -> np.ndarray:
-        x, y = numbers
+    def curve(x: float, y: float) -> np.ndarray:
         if y < 0.0:
             raise nf.InputError("not below 0")
         return np.array([np.sin(x) * y, np.inf, np.exp(x + y)])
 
-    at = np.array([0.7, 0.0])
-    by_x, by_y = slope(curve, at, 0), slope(curve, at, 1)
-    margin.within("by x", by_x - [0.0, 0.0, np.exp(0.7)], 1e-10)
-    margin.within("by y, inward", by_y - [np.sin(0.7), 0.0, np.exp(0.7)], 1e-6)
+    for order in (2, 6):
+        by_x = slope(lambda x: curve(x, 0.0), 0.7, order=order)
+        by_y = slope(lambda y: curve(0.7, y), 0.0, order=order)
+        margin.within(f"by x, order {order}", by_x - [0.0, 0.0, np.exp(0.7)], 1e-10)
+        by_hand = [np.sin(0.7), 0.0, np.exp(0.7)]
+        margin.within(f"by y, inward, order {order}", by_y - by_hand, 1e-9)
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from notchflex.fit.estimation.problem import Problem
 from notchflex.fit.model.constants import unknowns
 from notchflex.fit.model.samples import Samples
 from notchflex.robot.value_names import number_at
+from notchflex.solver.programs.compiled import Native
 from shared_data import measured_path
 
 WRIST = nf.load_robot("pacheco2021-a")
@@ -250,3 +251,19 @@ def test_the_identification_of_pacheco_2021():
     assert found.cost <= 11.5942
     expected = [10_329.0, 3_063.8, 0.026397, 0.12599]
     np.testing.assert_allclose(list(found.values.values()), expected, rtol=1e-4)
+
+
+def test_a_fit_makes_no_program_of_xla(monkeypatch):
+    def refuse(*_):
+        raise AssertionError("XLA compiles mechanics")
+
+    monkeypatch.setattr(Native, "_xla", refuse)
+    load = nf.pull(0.4, 1.6, steps=3).release()
+    observed = ("notch_angle", "tip_position", "axis_points", "tip_rotation", "tip_tension")
+    seen = simulate_measurements(
+        WRIST, load, observed=observed, axis_at=[5.0], from_rest=False, deviation=NOISE, seed=1
+    )
+    names = ("friction.coefficient", "notch.depth", "sensor.force_offset")
+    found = calibrate(WRIST, seen, names, starts=1, intervals=False)
+    assert found.converged
+    assert next_measurement(found, nf.pull(0.3, 1.8, steps=4)).converged.all()

@@ -1,4 +1,4 @@
-"""The damped Newton search: limits, kinks of the objective, places without a solution."""
+"""The search for a minimum: limits, kinks of the objective, places without a solution."""
 
 import numpy as np
 import pytest

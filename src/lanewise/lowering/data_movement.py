@@ -63,6 +63,10 @@ def _stack(*tables: Table, axis: int = 0, **_: Any) -> Table:
     return np.stack(tables, axis=axis)
 
 
+def _unstack(table: Table, *, axis: int, **_: Any) -> list[Table]:
+    return list(np.moveaxis(table, axis, 0))
+
+
 def _split(table: Table, *, sizes: tuple[int, ...], axis: int, **_: Any) -> list[Table]:
     return np.split(table, np.cumsum(sizes)[:-1], axis=axis)
 
@@ -104,6 +108,7 @@ MOVES: dict[str, Callable[..., Any]] = {
     "slice": _slice,
     "concatenate": _concatenate,
     "stack": _stack,
+    "unstack": _unstack,
     "split": _split,
     "pad": _pad,
     "copy": _same,

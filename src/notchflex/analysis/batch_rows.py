@@ -5,7 +5,7 @@ from __future__ import annotations
 from jaxtyping import Array, Float
 
 from notchflex.analysis.outputs import followed
-from notchflex.solver.continuation import advance, at_rest
+from notchflex.solver.continuation import at_rest
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.pytree_layout import Form, lane_sizes
@@ -36,7 +36,7 @@ def followed_row(
     """
     robot, loads = chain_form.unpack(chain), command_form.unpack(commands)
     start, settings = at_rest(robot), Settings.of(numbers)
-    return followed(robot, loads, start, settings, outputs, advance)
+    return followed(robot, loads, start, settings, outputs)
 
 
 __all__ = ["followed_row"]

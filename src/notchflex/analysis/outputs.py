@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from jaxtyping import Array
@@ -12,7 +12,7 @@ from notchflex._quantity import REGISTERED
 from notchflex.errors import InputError
 from notchflex.loads.validation import shown
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import Advance, Solved
+from notchflex.solver.continuation import Solved, advance
 from notchflex.solver.derived.quantities import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import Settings
@@ -43,7 +43,6 @@ def followed(
     start: Solved,
     settings: Settings,
     outputs: tuple[str, ...],
-    stepping: Callable[[Chain, Any, Solved, Settings], Advance],
 ) -> dict[str, Array]:
     """Follow a path of loads, and tell of every state what is asked.
 
@@ -53,11 +52,10 @@ def followed(
 
     Args:
         chain: The chain.
-        commands: The loads, as leading axis; for `answered` with what came of them.
+        commands: The loads, as leading axis.
         start: The state before the first.
         settings: How hard to try.
         outputs: Names of what is asked.
-        stepping: `advance`, or `answered` for derivatives of what is solved already.
 
     Returns:
         By name, loads as leading axis; after a load that failed the last good state.
@@ -65,7 +63,7 @@ def followed(
 
     def step(state: tuple[Solved, Array], command: Any) -> tuple[Any, dict[str, Array]]:
         last, alive = state
-        came = stepping(chain, command, last, settings)
+        came = advance(chain, command, last, settings)
         solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), came.solved, last)
         reached = alive & came.converged
         told = _told(chain, solved, outputs)

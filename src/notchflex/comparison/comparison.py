@@ -269,12 +269,8 @@ def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
     if not len(rows) or not np.isfinite(measured.observed[name][rows]).any():
         return float("nan")
     values = {one: model[one][rows] for one in outputs_for((name,))}
-    slopes = {one: np.zeros((0, *value.shape)) for one, value in values.items()}
-    predicted = Predicted(values, np.ones(len(rows), bool), slopes)
-    part = measured.taken(rows)
-    # States of a path are in the world already, as what was measured.
-    part = replace(part, load=replace(part.load, base_rotation=np.zeros(3)))
-    off = misfit(name, part, predicted).values
+    predicted = Predicted(values, np.ones(len(rows), bool), {})
+    off = misfit(name, measured.taken(rows), predicted).values
     coordinates = 1 if name == "tip_tension" else 3
     squares = off.reshape(len(rows), -1, coordinates) ** 2
     known = np.isfinite(squares).any(axis=2)

@@ -115,7 +115,7 @@ def _drawn(
     slopes = jax.jacfwd(demand, argnums=(0, 1, 2))(*jax.tree.map(jax.lax.stop_gradient, here))
     back = back[len(back) - 2 * len(order) :].reshape(2, len(order), -1)
     # Rows in the order of the robot's tendons.
-    drawn, stretch = jnp.zeros_like(back).at[:, order].set(back)
+    drawn, stretch = jnp.stack([back[:, place] for place in np.argsort(order)], axis=1)
     by_base = slopes[1] @ drawn + slopes[2] @ stretch
     matrix = slopes[0] + by_base[:, 1:]
     # Where every contact counts as stuck by a tie, the stroke does not depend on the tension; a

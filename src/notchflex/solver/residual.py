@@ -234,7 +234,7 @@ def _spans(
     group, log_ratio = chain.groups[k], unknowns.log_ratio[k]
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
-    at_base = base_tension[jnp.array(group.numbers)][None]
+    at_base = _of_group(base_tension, group)[None]
     passed_on = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(passed_on[..., 0] * passed_on[..., 1], axis=0)
     gap_tension = runs * passed_on[..., 0] * _from_base_side(beyond_both, at_base[0])
@@ -244,7 +244,7 @@ def _spans(
     lengths = jnp.stack([shortening, gap_tension * group.natural_gap + in_body])
     behind = jnp.cumsum(lengths[:, ::-1], axis=1)[:, ::-1]
     beyond = behind - lengths
-    stiffness = chain.memory_stiffness[jnp.array(group.numbers)][None]
+    stiffness = _of_group(chain.memory_stiffness, group)[None]
     at_exit = behind[0] + behind[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
     bounds = chain.friction.bounds(crossing.exit_turning, crossing.entry_turning)
@@ -260,6 +260,11 @@ def _spans(
         slid=jnp.stack([at_exit, at_entry], axis=-1),
         bound=holds(group) * jnp.stack(bounds, axis=-1),
     )
+
+
+def _of_group(values: Float[Array, " all"], group: TendonGroup) -> Float[Array, " t"]:
+    """Values of the tendons of a group; by slices, whose adjoint the native compiler knows."""
+    return jnp.stack([values[number] for number in group.numbers])
 
 
 def holds(group: TendonGroup) -> Float[Array, "n t 2"]:
@@ -350,4 +355,4 @@ def per_tendon(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...]) -> A
     if not grouped:
         return jnp.zeros(0)
     together = jnp.concatenate(grouped, axis=-1)
-    return together[..., np.argsort(chain.tendon_order)]
+    return jnp.stack([together[..., place] for place in np.argsort(chain.tendon_order)], axis=-1)

@@ -16,45 +16,10 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import stroke
 from notchflex.solver.block_elimination import linear_step
-from notchflex.solver.continuation import Advance, Solved, advance, on_the_way
+from notchflex.solver.continuation import Solved, on_the_way
 from notchflex.solver.element import Memory
-from notchflex.solver.newton import Point, Settings
+from notchflex.solver.newton import Point
 from notchflex.solver.residual import evaluate
-
-
-def solved_path(chain: Chain, commands: Command, start: Solved, settings: Settings) -> Advance:
-    """Follow a path of loads without derivatives; `answered` gives what came of it some.
-
-    Args:
-        chain: The chain.
-        commands: The loads, as leading axis.
-        start: The state before the first.
-        settings: How hard to try.
-
-    Returns:
-        What came of every load, as leading axis; after one that failed each starts from the last
-        good state.
-    """
-    chain, commands, start, settings = _still((chain, commands, start, settings))
-
-    def step(last: Solved, command: Command) -> tuple[Solved, Advance]:
-        came = advance(chain, command, last, settings)
-        return came.solved, came
-
-    return jax.lax.scan(step, start, commands)[1]
-
-
-def answered(
-    chain: Chain, item: tuple[Command, Advance], last: Solved, settings: Settings
-) -> Advance:
-    """A load that is solved already, from a solved state, with derivatives by all it takes.
-
-    They are NaN where it was not reached, and where nobody knows them, see `answering`.
-    """
-    del settings  # it was needed to solve
-    command, came = item
-    way = Way(came.between, came.part_before, came.parts, came.converged)
-    return came._replace(solved=answering(chain, command, last, came.solved, way))
 
 
 class Way(NamedTuple):
@@ -157,4 +122,4 @@ def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Arra
     return jnp.zeros_like(varied), tangents[1] * jnp.where(known, 1.0, jnp.nan)
 
 
-__all__ = ["Way", "answered", "answering", "solved_path"]
+__all__ = ["Way", "answering"]

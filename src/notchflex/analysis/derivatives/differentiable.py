@@ -14,22 +14,18 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.analysis.derivatives.callback import outputs_function
+from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
 from notchflex.analysis.derivatives.kinks import Kink, kinks
-from notchflex.analysis.derivatives.numbers import slope
-from notchflex.analysis.derivatives.tangent import PathTangents
 from notchflex.analysis.outputs import known_outputs
-from notchflex.analysis.solve import check_refinement, prepared_for
+from notchflex.analysis.solve import check_refinement
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.command import command
 from notchflex.loads.conversion import load_path
 from notchflex.loads.validation import robot_given, shown
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import Prepared, prepared
-from notchflex.solver.programs.run import run
 
 _TENDONS = ("tension", "stroke")
 _TIP = ("tip_force", "tip_moment")
@@ -207,11 +203,7 @@ class Differentiable:
 
     def _path(self, values: Mapping[str, Any]) -> EquilibriumPath:
         """Solve the path at some values."""
-        robot, load = self._robot(values), self._load(values)
-        ready = self._prepared(robot)
-        loads = command(load, robot, ready.chain)
-        came = run(ready, loads, None, self.settings, each_from_start=False)
-        return EquilibriumPath(robot, load, ready, came, settings=self.settings)
+        return self.model.solve(self._robot(values), self._load(values))
 
     def _robot(self, values: Mapping[str, Any]) -> Robot:
         numbers = {name: float(values[name]) for name in self.numbers}
@@ -275,15 +267,11 @@ class Differentiable:
     def _tip(self) -> tuple[str, ...]:
         return tuple(name for name in _TIP if name in self.start)
 
-    def _prepared(self, robot: Robot) -> Prepared:
-        if self._tip:  # may point anywhere
-            return prepared(robot, "space", loaded=True, refinement=self.refinement, flat=False)
-        return prepared_for(robot, self.load, None, self.refinement)
-
     @cached_property
-    def ready(self) -> Prepared:
-        """The robot as it is, as arrays."""
-        return self._prepared(self.robot)
+    def model(self) -> ForwardModel:
+        """The forward model of the robot and its loads."""
+        free = bool(self._tip)
+        return ForwardModel(self.robot, self.load, self.settings, self.refinement, any_load=free)
 
     @cached_property
     def _traced(self) -> Callable[[dict[str, Array]], dict[str, Array]]:
@@ -306,7 +294,7 @@ class _Solver:
     def __init__(self, function: Differentiable) -> None:
         self._of = function
         self.last: tuple[bytes, EquilibriumPath] | None = None
-        self._kept: dict[Any, np.ndarray] = {}
+        self._kept: dict[Any, Change] = {}
 
     def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
         """Return the outputs.
@@ -325,9 +313,11 @@ class _Solver:
         Raises:
             InputError: No robot or load can have these values.
         """
-        tangents = PathTangents(self._path(flat), tuple(n for n in outputs if n != "residual"))
-        columns = [tangents.along(*change) for change in self._changes(flat)]
-        found = {name: np.stack([one[name] for one in columns], axis=-1) for name in columns[0]}
+        path = self._path(flat)
+        changes = self._changes(path, self._named(flat))
+        names = tuple(name for name in outputs if name != "residual")
+        found = self._of.model.derivatives(path, changes, names)
+        found = {name: np.moveaxis(one, 0, -1) for name, one in found.items()}
         if "residual" in outputs:  # what the solver leaves is no function of the values
             found["residual"] = np.zeros((len(self._of.load), len(flat)))
         return found
@@ -347,56 +337,38 @@ class _Solver:
             self.last = key, self._of._path(self._named(flat))  # pyright: ignore[reportPrivateUsage]
         return self.last[1]
 
-    def _changes(
-        self, flat: Float[np.ndarray, " k"]
-    ) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
-        """Change of loads and chain, packed for the long chain, per unit of every value."""
-        values, of = self._named(flat), self._of
-        steps = len(of.load)
-        size = of.ready.long.chain_form.size
+    def _changes(self, path: EquilibriumPath, values: Mapping[str, np.ndarray]) -> Iterator[Change]:
+        """Change of loads and chain per unit of every value."""
+        of = self._of
+        # One program for all: with a change of the chain where any value changes it.
+        still = np.zeros(of.model.ready.long.chain_form.size) if of.numbers else None
         for name, value in values.items():
             if name in of.numbers:
-                change = self._by_number(values, name)
-                yield change[size:].reshape(steps, -1), change[:size]
+                yield self._by_number(path, values, name)
                 continue
-            base = self._packed(values)[size:].reshape(steps, -1)
             for place in np.ndindex(value.shape):
                 varied = np.array(value)
                 varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
-                more = self._packed({**values, name: varied})[size:].reshape(steps, -1)
-                yield more - base, np.zeros(size) if of.numbers else None  # one program for all
+                more = of._load({**values, name: varied})  # pyright: ignore[reportPrivateUsage]
+                yield Change(of.model.load_change(path, more), still)
 
-    def _by_number(self, values: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-        """Change of chain and loads by a number of the robot.
+    def _by_number(
+        self, path: EquilibriumPath, values: Mapping[str, np.ndarray], name: str
+    ) -> Change:
+        """Change by a number of the robot.
 
         The last ones are kept: a control loop asks for the same robot again and again, under other
         tensions and strokes, of which this does not depend.
         """
-        numbers = np.array([values[own] for own in self._of.numbers], float)
+        of = self._of
+        numbers = [float(values[own]) for own in of.numbers]
         tip = [values[own].tobytes() for own in values if own in _TIP]
-        key = (name, numbers.tobytes(), *tip)
+        key = (name, *numbers, *tip)
         if key not in self._kept:
-
-            def packed(numbers: np.ndarray) -> np.ndarray:
-                given = dict(zip(self._of.numbers, numbers, strict=True))
-                return self._packed({**values, **given})
-
             if len(self._kept) >= _REMEMBERED:
                 del self._kept[next(iter(self._kept))]
-            self._kept[key] = slope(packed, numbers, self._of.numbers.index(name))
+            self._kept[key] = of.model.change(path.robot, path.load, name)
         return self._kept[key]
-
-    def _packed(self, values: Mapping[str, Any]) -> np.ndarray:
-        """The long chain and all loads as one vector."""
-        of = self._of
-        robot, load = of._robot(values), of._load(values)  # pyright: ignore[reportPrivateUsage]
-        ready = of._prepared(robot)  # pyright: ignore[reportPrivateUsage]
-        if ready.chain_form is not of.ready.chain_form:
-            raise InputError.UNSUPPORTED(
-                "with these values the robot has another form; it must stay the same"
-            )
-        loads, _ = ready.long_commands(command(load, robot, ready.chain))
-        return np.concatenate([ready.long.vector, loads.ravel()])
 
 
 __all__ = ["Differentiable", "differentiable"]

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from notchflex._jax import jax
+from notchflex._jax import jax, jnp
 from notchflex.analysis.outputs import reported
-from notchflex.loads.command import Command
 from notchflex.results.path import EquilibriumPath
 from notchflex.solver.derived.quantities import of_own
 from notchflex.solver.programs.capacity import lengthen
@@ -25,8 +24,33 @@ from notchflex.solver.programs.run import Run
 from notchflex.solver.programs.static_structure import KnownForm
 from notchflex.solver.sensitivity import Way, answering
 
-_VECTORS = ("tip_position", "body_position", "base_force", "base_moment")
-_ROTATIONS = ("tip_rotation", "body_rotation")
+VECTORS = ("tip_position", "body_position", "base_force", "base_moment")
+ROTATIONS = ("tip_rotation", "body_rotation")
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Change of what a path is computed from, per unit of a number.
+
+    Attributes:
+        loads: Of the loads, packed for the long chain, steps as leading axis; None for none.
+        chain: Of the long chain, packed whole; None for none.
+    """
+
+    loads: Float[np.ndarray, "s command"] | None
+    chain: Float[np.ndarray, " chain"] | None
+
+    def entries(self, form: KnownForm) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """Return where the chain changes, as packed for programs, and by how much."""
+        if form not in self._entries:
+            chain = np.zeros(0) if self.chain is None else self.chain
+            places = np.flatnonzero(chain)
+            self._entries[form] = form.places_of(places), chain[places]
+        return self._entries[form]
+
+    @cached_property
+    def _entries(self) -> dict[KnownForm, tuple[np.ndarray, np.ndarray]]:
+        return {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,56 +68,50 @@ class PathTangents:
     outputs: tuple[str, ...]
     remembers: bool = True
 
-    def along(
-        self,
-        loads: Float[np.ndarray, "s command"],
-        chain: Float[np.ndarray, " chain"] | None = None,
-    ) -> dict[str, np.ndarray]:
+    def along(self, direction: Change) -> dict[str, np.ndarray]:
         """Differentiate along one direction.
-
-        Args:
-            loads: Change of the loads, packed for the long chain, steps as leading axis.
-            chain: Change of the long chain, packed whole; None for none.
 
         Returns:
             Change of every output by name, in the world, steps as leading axis. NaN from a step on
             that did not converge, or was so hard that its derivatives are not known.
         """
+        loads, chain = direction.loads, direction.chain
         long = self.path.prepared.long
         form = long.known_form
         varies = chain is not None
         change = form.pack(chain) if varies else np.zeros(1)
-        remembers = np.array([1.0 if self.remembers else 0.0])
-        rows = (False, False, False, False, *(True,) * 6)
-        before, states, between, how = self._states
-        packed, command_form = self._packed
-        given = (np.zeros(long.state.size), long.known_vector, change, remembers)
-        steps = (before, states, packed, loads, between, how)
+        packed, command_form, states = self.steps
+        moved = np.zeros_like(packed) if loads is None else loads
+        given = (np.zeros(long.state.size), long.known_vector, change)
+        steps = (*states, packed, moved)
+        rows = (*(False,) * len(given), *(True,) * len(steps))
         others = (form, command_form, long.state, self.outputs, varies)
         found = _tangent.along(rows, *given, *steps, *others)
         return {name: self._own(name, values) for name, values in found.items()}
 
     @cached_property
-    def _packed(self) -> tuple[np.ndarray, Form]:
-        """The loads packed for the long chain, and the form of one of them."""
-        return self.path.prepared.long_commands(self.path.commands)
+    def steps(self) -> tuple[np.ndarray, Form, tuple[np.ndarray, ...]]:
+        """What programs take of every load, for the long chain.
 
-    @cached_property
-    def _states(self) -> tuple[np.ndarray, ...]:
-        """States before, at and between the loads, for the long chain, and how they were found."""
+        Returns:
+            The loads, the form of one of them; and whether a change of the state before passes on,
+            the states before and at the load and between, and how it was found.
+        """
         ready, came = self.path.prepared, self.path.run
         assert isinstance(came, Run)
-        before = np.concatenate([came.first[None], came.states[:-1]])
-        every = (before, came.states, came.between)
+        packed, form = ready.long_commands(self.path.commands)
+        own = (came.states_before, came.states, came.between)
+        every = (lengthen(one, ready.state, ready.long.state) for one in own)
         how = np.stack([came.part_before, came.parts, self.path.converged], axis=1)
-        return (*(lengthen(one, ready.state, ready.long.state) for one in every), how)
+        remembers = (self.remembers & ~came.from_start)[:, None].astype(float)
+        return packed, form, (remembers, *every, how)
 
     def _own(self, name: str, values: np.ndarray) -> np.ndarray:
         own = of_own(self.path.chain, name, values)
         turn = self.path.base_to_world
-        if turn is None or name not in (*_VECTORS, *_ROTATIONS):
+        if turn is None or name not in (*VECTORS, *ROTATIONS):
             return own
-        return own @ turn.T if name in _VECTORS else turn @ own
+        return own @ turn.T if name in VECTORS else turn @ own
 
 
 @native(10, lane_sizes)
@@ -104,10 +122,10 @@ def _tangent(
     remembers: Float[Array, " 1"],
     before: Float[Array, " state"],
     state: Float[Array, " state"],
-    load: Float[Array, " command"],
-    load_change: Float[Array, " command"],
     between: Float[Array, " state"],
     how: Float[Array, " 3"],
+    load: Float[Array, " command"],
+    load_change: Float[Array, " command"],
     chain_form: KnownForm,
     command_form: Form,
     state_form: Form,
@@ -123,14 +141,20 @@ def _tangent(
 
     def told(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
         own, last = chain_form.unpack(varied), state_form.unpack(before)
-        command: Command = command_form.unpack(load)
+        command = command_form.unpack(load)
         found = answering(own, command, last, solved, way)
         return state_form.pack(found), reported(own, found, outputs)
 
-    at, changes = (load, before), (load_change, remembers[0] * last_change)
+    at, changes = (
+        (load, before),
+        (
+            load_change,
+            jnp.where(remembers[0] > 0.0, last_change, 0.0),
+        ),
+    )
     if varies:
         at, changes = (*at, chain), (*changes, chain_change)
     return jax.jvp(told, at, changes)[1]
 
 
-__all__ = ["PathTangents"]
+__all__ = ["ROTATIONS", "VECTORS", "Change", "PathTangents"]

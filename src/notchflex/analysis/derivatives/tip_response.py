@@ -10,19 +10,20 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex._jax import constant
+from notchflex.analysis.derivatives.forward_model import ForwardModel
 from notchflex.analysis.derivatives.kinks import Kink, kinks
-from notchflex.analysis.derivatives.tangent import PathTangents
+from notchflex.analysis.derivatives.tangent import Change
 from notchflex.analysis.solve import check_refinement
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.applied import Applied
-from notchflex.loads.command import Command, command
+from notchflex.loads.command import Command
 from notchflex.loads.conversion import load_path
 from notchflex.loads.validation import robot_given
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.prepare import prepared
-from notchflex.solver.programs.run import run
+
+_POSE = ("tip_rotation", "tip_position")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,18 +85,16 @@ def tip_response(
     """
     path = load_path(loads, robot_given(robot).number_of_tendons)
     check_refinement(refinement)
-    ready = prepared(robot, "space", loaded=True, refinement=refinement, flat=False)
-    commands = command(path, robot, ready.chain)
-    came = run(ready, commands, None, settings or DEFAULT, each_from_start=False)
-    found = EquilibriumPath(robot, path, ready, came)
+    model = ForwardModel(robot, path, settings or DEFAULT, refinement, any_load=True)
+    found = model.solve(robot, path)
+    changes = [Change(loads, None) for loads in _unit_loads(found)]
     # Each state is varied alone: what the contacts remember of the state before stays.
-    tangents = PathTangents(found, ("tip_rotation", "tip_position"), remembers=False)
-    columns = [_pose_change(found, tangents.along(loads)) for loads in _unit_loads(found)]
-    slopes = np.stack(columns, axis=-1)
+    by_loads = model.derivatives(found, changes, _POSE, remembers=False)
+    slopes = np.moveaxis(_pose_change(found, by_loads), 0, -1)
     turn = np.eye(6)
     if found.base_to_world is not None:
         turn = np.kron(np.eye(2), found.base_to_world)
-    tendons = ready.chain.tendons
+    tendons = found.chain.tendons
     return TipResponse(found, slopes[..., :tendons], slopes[..., tendons:] @ turn.T)
 
 
@@ -115,10 +114,10 @@ def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"
 
 def _pose_change(
     path: EquilibriumPath, changes: Mapping[str, np.ndarray]
-) -> Float[np.ndarray, "s 6"]:
-    """Rotation vector and displacement of the tip, in the world."""
+) -> Float[np.ndarray, "k s 6"]:
+    """Rotation vectors and displacements of the tip, in the world."""
     spin = changes["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
-    turned = [spin[:, b, a] - spin[:, a, b] for a, b in ((1, 2), (2, 0), (0, 1))]
+    turned = [spin[..., b, a] - spin[..., a, b] for a, b in ((1, 2), (2, 0), (0, 1))]
     return np.concatenate([0.5 * np.stack(turned, axis=-1), changes["tip_position"]], axis=-1)
 
 

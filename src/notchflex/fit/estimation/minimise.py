@@ -1,24 +1,22 @@
-"""Finding the least value of a function whose slope and (about) curvature are known, within limits.
+"""Finding the least value of a function whose gradient and (about) curvature are known, in limits.
 
-A damped Newton step (Levenberg 1944, Marquardt 1963): the curvature is that of the objective with
-the residuals' own curvature left out, so it is never negative. Values at a limit that want to leave
-it are held there. A trial value at which the model has no solution counts as too high.
+`scipy.optimize.least_squares` does the search: its trust region, and its steps along limits. It
+takes residuals; a function that is no sum of squares is given to it as residuals that have its
+value, gradient and curvature. A trial value at which the model has no solution counts as too high.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
+from scipy.optimize import least_squares
 
-from notchflex.fit.estimation.curvature import unit_free
-
-# Damping at first, by how much it falls and grows, and where no smaller step is worth a trial.
-_FIRST, _FALL, _GROW, _MOST = 1e-3, 0.2, 4.0, 1e12
-_ITERATIONS = 100
-# What a full step may still promise at a kink, of the objective.
+_EVALUATIONS = 200
+# What a full step may still promise where the search ends, of the objective: at a kink, such as
+# where a notch closes, no step gains what the curvature promises.
 _KINK = 1e-3
 
 
@@ -26,7 +24,7 @@ class Cost(NamedTuple):
     """An objective at some values.
 
     Attributes:
-        value: Its value.
+        value: Its value, 0 or more.
         gradient: Its derivatives.
         curvature: About its second derivatives, never negative.
         residuals: What it was made of.
@@ -79,8 +77,7 @@ def minimise(
         start: Where to begin.
         lower: Least values allowed.
         upper: Greatest values allowed.
-        tolerance: Stop where a full step promises to lower the objective by less than this,
-            absolute and relative to it.
+        tolerance: Stop where a step lowers the objective by less than this part of it.
 
     Returns:
         Where it ended, converged or why not.
@@ -91,85 +88,75 @@ def minimise(
         >>> minimise(bowl, np.zeros(1), np.zeros(1), np.ones(1)).values
         array([1.])
     """
-    at = np.clip(np.asarray(start, float), lower, upper)
-    cost = objective(at)
-    calls = 1
+    first = np.clip(np.asarray(start, float), lower, upper)
+    cost = objective(first)
     if cost is None:
-        return Minimum(at, None, False, "the model has no solution at the start", 0, calls)
-    damping = _FIRST
-    size = np.zeros(len(at))
-    for iteration in range(_ITERATIONS):
-        size = np.maximum(size, np.diag(cost.curvature))
-        if _promised(cost, at, lower, upper) <= tolerance * (1.0 + abs(cost.value)):
-            return Minimum(at, cost, True, "", iteration, calls)
-        while True:
-            step = _step(cost, at, lower, upper, damping * np.where(size > 0.0, size, 1.0))
-            promised = -(cost.gradient @ step + 0.5 * step @ cost.curvature @ step)
-            trial = objective(np.clip(at + step, lower, upper)) if promised > 0.0 else None
-            calls += 1
-            gain = -1.0 if trial is None else (cost.value - trial.value) / promised
-            if trial is not None and gain > 1e-4:
-                break
-            damping *= _GROW
-            if damping > _MOST:
-                return _at_kink(cost, at, lower, upper, iteration, calls)
-        at = np.clip(at + step, lower, upper)
-        damping = max(damping * (_FALL if gain > 0.5 else 1.0 if gain > 0.1 else 2.0), 1e-12)
-        cost = trial
-    return Minimum(at, cost, False, f"not settled after {_ITERATIONS} steps", _ITERATIONS, calls)
+        return Minimum(first, None, False, "the model has no solution at the start", 0, 1)
+    own, size = np.diag(cost.curvature), np.where(first == 0.0, 1.0, np.abs(first))
+    scale = np.where(own > 0.0, 1.0 / np.sqrt(np.where(own > 0.0, own, 1.0)), size)
+    least, most = (lower - first) / scale, (upper - first) / scale
+    tried: dict[bytes, Cost | None] = {np.zeros(len(first)).tobytes(): cost}
 
+    def values(moved: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        at = np.where(moved <= least, lower, np.where(moved >= most, upper, first + scale * moved))
+        return np.clip(at, lower, upper)
 
-def _at_kink(
-    cost: Cost, at: np.ndarray, lower: np.ndarray, upper: np.ndarray, iteration: int, calls: int
-) -> Minimum:
-    """Where no step, however small, lowers the objective: a kink, or rounding.
+    def cost_at(moved: Float[np.ndarray, " k"]) -> Cost | None:
+        key = moved.tobytes()
+        if key not in tried:
+            tried[key] = objective(values(moved))
+        return tried[key]
 
-    Measurements at which a notch closes make kinks; if a full step would not have gained much
-    either, that is as good as any other minimum.
-    """
-    settled = _promised(cost, at, lower, upper) <= _KINK * (1.0 + abs(cost.value))
+    def residuals(moved: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k+1"]:
+        came = cost_at(moved)
+        return np.full(len(moved) + 1, np.inf) if came is None else _squares(came, scale)[0]
+
+    def jacobian(moved: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k+1 k"]:
+        came = cost_at(moved)
+        assert came is not None  # asked only where the residuals are finite
+        return _squares(came, scale)[1]
+
+    found = least_squares(
+        residuals,
+        np.zeros(len(first)),
+        cast("Any", jacobian),  # SciPy's annotations forget functions, and that it may be None
+        (least, most),
+        method="dogbox",
+        ftol=tolerance,
+        xtol=1e-10,
+        gtol=cast("Any", None),
+        max_nfev=_EVALUATIONS,
+    )
+    at, cost = values(found.x), cost_at(found.x)
+    assert cost is not None
+    # How much lower a full step of the values that are not at a limit should be.
+    residual, slopes = _squares(cost, scale)
+    free = slopes[:, found.active_mask == 0]
+    promised = 0.5 * np.sum((free @ np.linalg.lstsq(free, residual)[0]) ** 2)
+    settled = promised <= _KINK * (1.0 + cost.value)
     reason = "" if settled else "no step lowers the objective (a kink, or rounding)"
-    return Minimum(at, cost, settled, reason, iteration, calls)
+    if found.status == 0:
+        reason = f"not settled after {_EVALUATIONS} evaluations"
+    return Minimum(at, cost, not reason, reason, int(found.njev) - 1, len(tried))
 
 
-def free_of_limits(
-    gradient: Float[np.ndarray, " k"],
-    at: Float[np.ndarray, " k"],
-    lower: Float[np.ndarray, " k"],
-    upper: Float[np.ndarray, " k"],
-) -> Bool[np.ndarray, " k"]:
-    """Which values may move: not those at a limit that the slope pushes against."""
-    return ~(((at <= lower) & (gradient > 0.0)) | ((at >= upper) & (gradient < 0.0)))
+def _squares(
+    cost: Cost, scale: Float[np.ndarray, " k"]
+) -> tuple[Float[np.ndarray, " k+1"], Float[np.ndarray, "k+1 k"]]:
+    """Residuals f with slopes J of scaled values: |f|^2 / 2 is the objective, J^T f its gradient.
+
+    J^T J is its curvature, or more: the objective is never below 0, so no step may promise to
+    lower it by more than its value.
+    """
+    sizes, axes = np.linalg.eigh(cost.curvature * np.outer(scale, scale))
+    known = sizes > 1e-12 * sizes[-1]
+    root = np.sqrt(np.where(known, sizes, 1.0))
+    along = np.where(known, axes.T @ (scale * cost.gradient) / root, 0.0)
+    slopes = np.where(known, root, 0.0)[:, None] * axes.T
+    stiffer = max(np.sqrt(along @ along / max(2.0 * cost.value, 1e-300)), 1.0)
+    along, slopes = along / stiffer, slopes * stiffer
+    rest = np.sqrt(max(2.0 * cost.value - along @ along, 0.0))
+    return np.append(along, rest), np.vstack([slopes, np.zeros(len(scale))])
 
 
-def _promised(cost: Cost, at: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
-    """By how much a full step would lower the objective, were it as simple as its curvature."""
-    free = free_of_limits(cost.gradient, at, lower, upper)
-    plain = unit_free(cost.curvature[np.ix_(free, free)])
-    values, vectors = np.linalg.eigh(plain.curvature)
-    along = vectors.T @ (cost.gradient[free] / plain.size)
-    known = values > 1e-12
-    return 0.5 * float(np.sum(along[known] ** 2 / values[known]))
-
-
-def _step(
-    cost: Cost, at: np.ndarray, lower: np.ndarray, upper: np.ndarray, damping: np.ndarray
-) -> Float[np.ndarray, " k"]:
-    """The damped step that ends within the limits; what would pass one stops there."""
-    step = np.zeros(len(at))
-    free = free_of_limits(cost.gradient, at, lower, upper)
-    for _ in range(len(at)):
-        if not free.any():
-            break
-        held = cost.curvature[np.ix_(free, ~free)] @ step[~free]
-        matrix = cost.curvature[np.ix_(free, free)] + np.diag(damping[free])
-        step[free] = np.linalg.solve(matrix, -(cost.gradient[free] + held))
-        beyond = free & ((at + step < lower) | (at + step > upper))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(at + step, lower, upper)[beyond] - at[beyond]
-        free &= ~beyond
-    return step
-
-
-__all__ = ["Cost", "Minimum", "Objective", "free_of_limits", "minimise"]
+__all__ = ["Cost", "Minimum", "Objective", "minimise"]

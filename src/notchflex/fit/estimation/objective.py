@@ -30,7 +30,7 @@ class FitObjective(Protocol):
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """Half the sum of squared residuals over their noise (Gaussian noise; Levenberg-Marquardt).
+    """Half the sum of squared residuals over their noise (Gaussian noise).
 
     Args:
         huber: Residuals beyond so many standard deviations count by their size, not its square

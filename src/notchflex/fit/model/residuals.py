@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from notchflex._jax import constant
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.model.rows import Predicted
-from notchflex.mechanics.motion import left_slope, rotation_about
+from notchflex.mechanics.motion import left_slope
 
 ANGLES = ("notch_angle", "total_angle")
 LENGTHS = ("tip_position", "axis_points")
@@ -70,47 +70,33 @@ def outputs_for(quantities: tuple[str, ...]) -> tuple[str, ...]:
 
 def misfit(name: str, measured: Measurements, predicted: Predicted) -> Misfit:
     """Model less measurement of one quantity; NaN where nothing was measured."""
-    base = np.asarray(rotation_about(constant(measured.load.base_rotation)))
-    seen = measured.observed[name]
-    moved = predicted.slopes
-    count = len(next(iter(moved.values())))
-    tables = [predicted.values]
-    tables += [{key: table[k] for key, table in moved.items()} for k in range(count)]
+    seen, output = measured.observed[name], _OUTPUTS.get(name, name)
+    values, slopes = predicted.values[output], predicted.slopes.get(output)
+    if slopes is None:
+        slopes = np.zeros((0, *values.shape))
     if name == "tip_rotation":
-        rows = _turned(seen, base, [table[name] for table in tables])
-    else:
-        model = [_model(name, table, seen.shape) for table in tables]
-        if name in LENGTHS:  # in the world, where coordinates may be missing one by one
-            model = [one @ base.T for one in model]
-        model[0] = model[0] - seen
-        rows = [np.reshape(one, (len(seen), -1)) for one in model]
-    slopes = np.array(rows[1:]).reshape(count, *rows[0].shape)  # of no constant, perhaps
-    return Misfit(rows[0], slopes)
-
-
-def _model(name: str, table: dict[str, np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
-    """What the model says of a quantity; linear in the outputs, so that slopes go through too."""
+        return _turned(seen, values, slopes)
     if name == "tip_tension":
-        spans = table["span_tension"]
-        last = np.sum(np.isfinite(spans[0]), axis=-1) - 1
-        return np.stack([spans[:, t, end] for t, end in enumerate(last)], axis=-1)
-    return table[name][:, : shape[1]] if len(shape) == 2 else table[name]
+        last = np.isfinite(values[0]).sum(axis=-1) - 1
+        tendons = np.arange(len(last))
+        values, slopes = values[:, tendons, last], slopes[:, :, tendons, last]
+    values = (values - seen).reshape(len(seen), -1)
+    return Misfit(values, slopes.reshape(len(slopes), *values.shape))
 
 
 def _turned(
-    seen: Float[np.ndarray, "p 3"], base: Float[np.ndarray, "3 3"], model: list[np.ndarray]
-) -> list[np.ndarray]:
+    seen: Float[np.ndarray, "p 3"],
+    rotation: Float[np.ndarray, "p 3 3"],
+    slopes: Float[np.ndarray, "k p 3 3"],
+) -> Misfit:
     """Rotation vectors from the measured to the model's orientation, and their slopes."""
-    was = Rotation.from_matrix(base).inv() * Rotation.from_rotvec(np.nan_to_num(seen))
-    turned = Rotation.from_matrix(model[0]) * was.inv()
+    turned = Rotation.from_matrix(rotation) * Rotation.from_rotvec(np.nan_to_num(seen)).inv()
     vector = turned.as_rotvec()
-    vector_of_turn = np.stack([np.linalg.inv(np.asarray(left_slope(one))) for one in vector])
-    rows = [np.where(np.isnan(seen), np.nan, vector)]
-    for change in model[1:]:
-        spin = change @ np.swapaxes(model[0], -1, -2)
-        turn = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=-1)
-        rows.append(np.einsum("pij,pj->pi", vector_of_turn, turn))
-    return rows
+    spin = slopes @ np.swapaxes(rotation, -1, -2)
+    turn = np.stack([spin[..., 2, 1], spin[..., 0, 2], spin[..., 1, 0]], axis=-1)
+    by_turn = np.linalg.inv(np.asarray(left_slope(constant(vector))))
+    values = np.where(np.isnan(seen), np.nan, vector)
+    return Misfit(values, np.einsum("pij,kpj->kpi", by_turn, turn))
 
 
 __all__ = ["ANGLES", "LENGTHS", "Misfit", "Residuals", "misfit", "outputs_for"]

@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.analysis.axis_points import AxisPlaces, axis_places
-from notchflex.analysis.solve import prepared_for
 from notchflex.errors import InputError
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import Unknown
@@ -69,7 +68,6 @@ class Samples:
         """Lay out all measurements of all robots."""
         every: list[Sample] = []
         pulls = 0
-        length = _lengths(robots, measurements)
         for label, robot in robots.items():
             mine = [
                 (number, path)
@@ -89,7 +87,6 @@ class Samples:
                     names=tuple(path for _, path in mine),
                     outputs=outputs_for(tuple(measured.observed)),
                     measured=np.where(by_stroke, measured.load.stroke, measured.measured_tension),
-                    flexures=length[label],
                     places=_places(robot, measured),
                     settings=settings or DEFAULT,
                 )
@@ -183,18 +180,6 @@ def _paths(measured: Measurements) -> tuple[tuple[int, ...], ...]:
     if measured.from_rest:
         return tuple((row,) for row in rows)
     return tuple(tuple(row for row in rows if measured.pull[row] == one) for one in measured.pulls)
-
-
-def _lengths(
-    robots: Mapping[str, Robot], measurements: Mapping[str, Sequence[Measurements]]
-) -> dict[str, int]:
-    """How many flexures each robot's arrays have: as many as the longest of its kind."""
-    kind = {label: tuple({type(notch) for notch in one.notches}) for label, one in robots.items()}
-    own = {
-        label: max(prepared_for(one, data.load).chain.flexures for data in measurements[label])
-        for label, one in robots.items()
-    }
-    return {label: max(own[one] for one in robots if kind[one] == kind[label]) for label in robots}
 
 
 __all__ = ["Sample", "Samples"]

@@ -1,16 +1,19 @@
 """The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
 
-from notchflex.mechanics.chain.chain import Chain, assemble, flexure_states
+from notchflex.mechanics.chain.chain import Chain, Shaped, assemble, flexure_states, laws, shape_of
 from notchflex.mechanics.chain.pad import padded
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
 from notchflex.mechanics.chain.structure import structural
 
 __all__ = [
     "Chain",
+    "Shaped",
     "assemble",
     "bending_normal",
     "flexure_states",
+    "laws",
     "padded",
+    "shape_of",
     "structural",
     "tendons_in_plane",
 ]

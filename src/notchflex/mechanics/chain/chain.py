@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple, cast
 
@@ -32,7 +31,7 @@ from notchflex.mechanics.material import SectionLaw, section_law
 from notchflex.mechanics.motion import Motion, rotation_about
 from notchflex.mechanics.tendon import Ground, Laid, TendonGroup, route
 from notchflex.robot import Robot, Tendon, Tube
-from notchflex.robot.kinds import Notch
+from notchflex.robot.kinds import Friction, Material, Notch
 
 # Axial stiffness of a tendon that only tells apart how much has slid over two stuck contacts of
 # one rigid piece, between which an inextensible tendon would leave the tension open: so many
@@ -158,20 +157,13 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    chord = getattr(robot.friction, "turning", None) == "chord"
-    shaped = _shaped(robot.tube, robot.notches, robot.tendon, level, refinement, chord)
+    shaped = shape_of(robot, level, refinement)
     rods, laid, body_length = shaped.rods, shaped.laid, shaped.body_length
     body_mass, body_centre = body_masses(robot, rods)
-    law = section_law(robot.material)
-    elastic = _elastic(shaped.alike, law)[shaped.which]
-    stiffness = np.einsum("nmm->nm", elastic)
     tendons = robot.tendon
-    lip_stiffness = _lip_stiffness(rods, stiffness, robot.tube.outer_radius)
     chain = Chain(
         rods=rods,
         memory=(),
-        law=law,
-        friction=friction_law(robot.friction),
         groups=laid.groups,
         lips=shaped.lips,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
@@ -179,11 +171,6 @@ def assemble(
         body_length=body_length,
         body_mass=constant(body_mass),
         body_centre=constant(body_centre),
-        stiffness=constant(stiffness),
-        elastic=constant(elastic) if law.is_linear else None,
-        lip_stiffness=constant(lip_stiffness),
-        closing_force=constant(np.mean(lip_stiffness * rods.length.sum(axis=-1))),
-        drawn_stiffness=constant(np.mean(lip_stiffness) / len(lip_stiffness)),
         frame=None,
         notch_frame=shaped.notch_frame,
         tendon_place=laid.place,
@@ -193,6 +180,8 @@ def assemble(
         follows=loaded and follows,  # unloaded chains are of one form
         refinement=refinement,
         window=max((int(np.max(part.back)) for part in (*laid.groups, *shaped.lips)), default=1),
+        **laws(robot.material, shaped),
+        **laws(robot.friction, shaped),
     )
     normal = bending_normal(robot)
     if not flat or level == "space" or normal is None or not tendons_in_plane(robot):
@@ -200,7 +189,30 @@ def assemble(
     return _flat(chain, np.stack([np.cross(normal, _UP), normal, _UP], axis=1))
 
 
-class _Shaped(NamedTuple):
+def laws(part: Material | Friction, shaped: Shaped) -> dict[str, Any]:
+    """Return the fields of a chain that follow from its material, or from its friction.
+
+    Args:
+        part: The material or the friction.
+        shaped: The shape of the robot.
+    """
+    if isinstance(part, Friction):
+        return {"friction": friction_law(part)}
+    law = section_law(part)
+    elastic = _elastic(shaped.alike, law)[shaped.which]
+    stiffness = np.einsum("nmm->nm", elastic)
+    lip_stiffness = 1.0 / np.sum(shaped.lip_slope / stiffness, axis=-1)
+    return {
+        "law": law,
+        "stiffness": constant(stiffness),
+        "elastic": constant(elastic) if law.is_linear else None,
+        "lip_stiffness": constant(lip_stiffness),
+        "closing_force": constant(lip_stiffness @ shaped.height / len(lip_stiffness)),
+        "drawn_stiffness": constant(lip_stiffness.sum() / len(lip_stiffness) ** 2),
+    }
+
+
+class Shaped(NamedTuple):
     """What of a chain follows from the shape of the robot alone.
 
     Attributes:
@@ -211,6 +223,8 @@ class _Shaped(NamedTuple):
         lips: The lips.
         body_length: Length of each body on the tube axis, mm.
         notch_frame: Rotation from the frame of every notch to the tube.
+        height: Length of the neutral axis of every flexure, mm.
+        lip_slope: Square of the motion of each notch's lips by every mode, mm^2.
     """
 
     alike: Rod
@@ -220,6 +234,14 @@ class _Shaped(NamedTuple):
     lips: tuple[LipGroup, ...]
     body_length: Array
     notch_frame: Array
+    height: Float[np.ndarray, " n"]
+    lip_slope: Float[np.ndarray, "n modes"]
+
+
+def shape_of(robot: Robot, level: str, refinement: int) -> Shaped:
+    """What of a robot's chain follows from its shape alone."""
+    chord = getattr(robot.friction, "turning", None) == "chord"
+    return _shaped(robot.tube, robot.notches, robot.tendon, level, refinement, chord)
 
 
 # A search for constants of the material or of friction assembles one shape hundreds of times.
@@ -231,10 +253,10 @@ def _shaped(
     level: str,
     refinement: int,
     turns_with_chord: bool,
-) -> _Shaped:
+) -> Shaped:
     # Notches that are alike are worked out once.
     unlike = {notch: _flexure(notch, tube, level, refinement) for notch in dict.fromkeys(notches)}
-    own_rods = list(unlike.values())
+    own_rods, free_poses = zip(*unlike.values(), strict=True)
     alike = stack(own_rods)
     number = {notch: index for index, notch in enumerate(unlike)}
     which = [number[notch] for notch in notches]
@@ -242,13 +264,13 @@ def _shaped(
     body_length = constant(body_lengths(tube, notches))
     lead = body_length[:-1, None] * _UP
     rods = dataclasses.replace(rods, start_offset=rods.start_offset + lead)
-    free = jax.tree.map(lambda leaf: leaf[which], _free_poses(own_rods))
+    free = jax.tree.map(lambda *leaves: np.stack(leaves)[which], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
     ground = Ground(notches, rods, free, body_length, turns_with_chord=turns_with_chord)
     directions = {notch.direction_deg: np.empty(0) for notch in notches}
     for side in directions:
         directions[side] = np.asarray(rotation_about(constant(_UP * np.radians(side))))
-    return _Shaped(
+    return Shaped(
         alike,
         which,
         rods,
@@ -256,12 +278,16 @@ def _shaped(
         lay_lips(notches, tube, rods, body_length),
         body_length,
         constant(np.stack([directions[notch.direction_deg] for notch in notches])),
+        np.sum(rods.length, axis=-1),
+        _lip_slope(rods, tube.outer_radius),
     )
 
 
 @lru_cache(maxsize=512)
-def _flexure(notch: Notch, tube: Tube, level: str, refinement: int) -> Rod:
-    return with_level(rod(notch, tube, refinement), level)
+def _flexure(notch: Notch, tube: Tube, level: str, refinement: int) -> tuple[Rod, Motion]:
+    """A flexure and its pose in the free robot."""
+    made = with_level(rod(notch, tube, refinement), level)
+    return made, free_pose(made)
 
 
 def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
@@ -289,10 +315,6 @@ def flexure_states(
     return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, chain.memory, modes)
 
 
-def _free_poses(rods: Sequence[Rod]) -> Motion:
-    return jax.tree.map(lambda *leaves: np.stack(leaves), *(free_pose(rod) for rod in rods))
-
-
 def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
     """Stiffness of every flexure in the free robot; 1 for modes that fill up."""
     basis = rods.basis
@@ -301,10 +323,8 @@ def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:
     return own + rods.idle[:, None] * np.eye(rods.modes)
 
 
-def _lip_stiffness(
-    rods: Rod, stiffness: Float[np.ndarray, "n modes"], outer_radius: float
-) -> Float[np.ndarray, " n"]:
-    """How hard a notch alone is to close at its lips, N/mm: the scale of contact forces.
+def _lip_slope(rods: Rod, outer_radius: float) -> Float[np.ndarray, "n modes"]:
+    """Square of the motion of a notch's lips by its modes: over their stiffness, its flexibility.
 
     Lips opposite a spine move with their fibre; where edges meet, by their distance from the
     tube axis times the turn of the distal body.
@@ -313,7 +333,7 @@ def _lip_stiffness(
     turn = rods.start_rotation @ rods.turn[:, -1, :, 1:]
     edge = outer_radius * np.linalg.norm(turn[:, :2], axis=1)
     slope = np.where(rods.lip_closes[:, None] > 0.0, fibre, edge)
-    return 1.0 / np.sum(slope**2 * (1.0 - rods.idle) / stiffness, axis=-1)
+    return slope**2 * (1.0 - rods.idle)
 
 
 def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:

@@ -124,7 +124,6 @@ def elastic_stiffness(
     elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
 ) -> Float[Array, "*shape 6 6"]:
     """Resultants per strain of a linear elastic section, or of many; see `elastic_resultants`."""
-    xp = array_module(*jax.tree.leaves((elastic_modulus, shear_modulus, section)))
-    moduli = elastic_modulus, shear_modulus
-    by_strain = [elastic_resultants(*moduli, section, unit) for unit in constant(np.eye(6))]
-    return xp.stack(by_strain, axis=-1)
+    every = jax.tree.map(lambda leaf: leaf[..., None], section)
+    by_strain = elastic_resultants(elastic_modulus, shear_modulus, every, constant(np.eye(6)))
+    return by_strain.swapaxes(-1, -2)

@@ -26,6 +26,8 @@ from notchflex.robot import Superelastic
 
 _POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
 _NODES, _WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
+# Of all strains and resultants those of weak-axis bending.
+_WEAK = np.arange(6) == 1
 
 
 class SuperelasticLaw(SectionLaw):
@@ -90,14 +92,14 @@ class SuperelasticLaw(SectionLaw):
         """Resultants with the weak-axis moment taken from the outer fibre on the spine."""
         stress = self.stress(strain[1] * section.edge_spine)
         moment = section.second_moment_weak / section.edge_spine * stress
-        return Response(self._elastic(strain, section).at[1].set(moment), memory)
+        return Response(jnp.where(_WEAK, moment, self._elastic(strain, section)), memory)
 
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
         """Area under the moment over the curvature, and the elastic rest."""
         del memory
-        others = self._elastic(strain, section).at[1].set(0.0)
+        others = jnp.where(_WEAK, 0.0, self._elastic(strain, section))
         density = self.energy_density(strain[1] * section.edge_spine)
         return 0.5 * others @ strain + (
             section.second_moment_weak / section.edge_spine**2 * density

@@ -7,6 +7,7 @@ program too long to be written out), and on a GPU, XLA makes them, of the same f
 from __future__ import annotations
 
 import json
+import threading
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
@@ -16,9 +17,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lanewise import Program, UnknownHereError, machine_code, processor, source
-from notchflex._jax import jax, jnp
+from notchflex._jax import jax, jit, jnp
 from notchflex.solver.programs import shipped, store
-from notchflex.solver.programs.kept_xla import Kept, making
 
 # Rows that XLA's programs are made for; more are cut up, fewer filled up.
 _PIECES = (64, 256, 1024)
@@ -26,6 +26,7 @@ _PIECES = (64, 256, 1024)
 _MOST = 96
 # JAX remembers what it traced; it forgets that after so many programs.
 _TRACES = 24
+_making = threading.RLock()
 
 
 class CompiledFunction:
@@ -103,8 +104,7 @@ class Native:
         """Compile nothing yet."""
         self._function, self._vectors, self._long = function, vectors, long
         self._name = f"{function.__module__}.{function.__qualname__}"
-        self._kept = Kept(function, tuple(range(vectors, function.__code__.co_argcount)))
-        self._by_xla: dict[Any, Kept] = {}
+        self._by_xla: dict[Any, Callable[..., Any]] = {}
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -112,7 +112,8 @@ class Native:
         made = self._made("once", None, arguments)
         if made is None:
             vectors = map(jnp.asarray, arguments[: self._vectors])
-            return jax.tree.map(np.asarray, self._kept(*vectors, *arguments[self._vectors :]))
+            by_xla = self._xla("once", (), self._function, len(arguments))
+            return jax.tree.map(np.asarray, by_xla(*vectors, *arguments[self._vectors :]))
         return made(arguments[: self._vectors])
 
     def rows(self, by_row: tuple[bool, ...], *arguments: Any) -> Any:
@@ -169,7 +170,7 @@ class Native:
             return found
         except KeyError:
             pass
-        with making:  # threads that ask for the same program wait for the one at work
+        with _making:  # threads that ask for the same program wait for the one at work
             if key not in Native.made:
                 Native.made[key] = self._found(how, by_row, shapes, others)
                 while len(Native.made) > _MOST:
@@ -248,8 +249,8 @@ class Native:
             return jax.lax.scan(step, vectors[0], along)[1]
 
         vectors = map(jnp.asarray, arguments[: self._vectors])
-        kept = self._xla("along", by_row, every, len(arguments))
-        return jax.tree.map(np.asarray, kept(*vectors, *arguments[self._vectors :]))
+        by_xla = self._xla("along", by_row, every, len(arguments))
+        return jax.tree.map(np.asarray, by_xla(*vectors, *arguments[self._vectors :]))
 
     def _side_by_side(self, by_row: tuple[bool, ...], arguments: tuple[Any, ...]) -> Any:
         """Rows by a program of XLA, in pieces."""
@@ -272,11 +273,11 @@ class Native:
 
     def _xla(
         self, how: str, by_row: tuple[bool, ...], function: Callable[..., Any], count: int
-    ) -> Kept:
+    ) -> Callable[..., Any]:
         key = (how, by_row)
         if key not in self._by_xla:
-            function.__qualname__ = f"{self._name}.{how}{by_row}"
-            self._by_xla[key] = Kept(function, tuple(range(self._vectors, count)))
+            static = tuple(range(self._vectors, count))
+            self._by_xla[key] = jit(function, static_argnums=static)
         return self._by_xla[key]
 
 

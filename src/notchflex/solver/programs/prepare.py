@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from notchflex._jax import constant
+from notchflex._jax import constant, jax
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, assemble, padded
 from notchflex.robot import Robot
@@ -67,6 +69,40 @@ class Prepared:
         own, form = self.command_form(commands), self.long.command_form(commands)
         return lengthen(own.pack(commands, leading=1), own, form), form
 
+    def places(self, fields: Mapping[str, Any]) -> Int[np.ndarray, " m"]:
+        """Where the vector of the long chain holds some fields of the chain, flattened.
+
+        Args:
+            fields: As `chain.laws` returns them.
+        """
+        if (key := tuple(fields)) not in self._places:
+            form = self.long.chain_form
+            every: Chain = jax.tree.unflatten(form.structure, form.places)
+            long = {name: getattr(every, name) for name in fields}
+            own = jax.tree.map(lambda at, leaf: at[tuple(map(slice, leaf.shape))], long, fields)
+            self._places[key] = flat(own)
+        return self._places[key]
+
+    @cached_property
+    def _places(self) -> dict[Any, Int[np.ndarray, " m"]]:
+        return {}
+
+    def with_fields(self, fields: Mapping[str, Any]) -> Prepared:
+        """Return a robot of the same shape with other laws of material and friction.
+
+        Args:
+            fields: Those of the chain that change, as `chain.laws` returns them.
+        """
+        vector = self.long.vector.copy()
+        vector[self.places(fields)] = flat(fields)
+        other = Prepared(dataclasses.replace(self.chain, **fields))
+        long = Prepared(self.long.chain_form.unpack(vector))
+        for new, old in ((other, self), (long, self.long)):
+            new.__dict__.update({name: getattr(old, name) for name in _OF_SHAPE})
+        long.__dict__["vector"] = vector
+        other.__dict__["long"] = long
+        return other
+
     @cached_property
     def rest(self) -> Solved:
         """The free robot with slack tendons."""
@@ -107,6 +143,18 @@ class Prepared:
     def shape(self) -> Form:
         """Form of what is told of the shape of every state."""
         return Shape.form(self.chain.flexures, self.chain.tendons)
+
+
+# What robots of one shape share.
+_OF_SHAPE = (
+    *("chain_form", "rest", "rest_vector", "rest_carried", "state", "shape"),
+    *("_tension_form", "_stroke_form"),
+)
+
+
+def flat(tree: Any) -> np.ndarray:
+    """Return all numbers of a tree as one vector."""
+    return np.concatenate([np.ravel(leaf) for leaf in jax.tree.leaves(tree)])
 
 
 @lru_cache(maxsize=6)

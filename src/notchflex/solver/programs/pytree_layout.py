@@ -67,12 +67,7 @@ class Form:
 
     def unpack(self, vector: Any) -> Any:
         """The tree of a vector (NumPy's or JAX's), with the vector's leading axes."""
-        xp = array_module(vector)
-        parts = xp.split(vector, self.ends, axis=-1)
-        leaves = [
-            as_kind(part.reshape(*vector.shape[:-1], *shape), kind)
-            for part, shape, kind in zip(parts, self.shapes, self.kinds, strict=True)
-        ]
+        leaves = [self.leaf(vector, number) for number in range(len(self.shapes))]
         return jax.tree.unflatten(self.structure, leaves)
 
     def leaf(self, vector: Any, number: int) -> Any:

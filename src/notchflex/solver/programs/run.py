@@ -35,9 +35,16 @@ _TOLD = 7
 class Run:
     """States of many loads, loads as leading axis."""
 
-    def __init__(self, prepared: Prepared, start: np.ndarray, table: np.ndarray) -> None:
-        """Take what the program returned for the long chain."""
+    def __init__(
+        self,
+        prepared: Prepared,
+        start: np.ndarray,
+        table: np.ndarray,
+        from_start: Bool[np.ndarray, " s"],
+    ) -> None:
+        """Take what the program returned for the long chain, and which loads began at the start."""
         self._prepared, self.first, self._table = prepared, start, table
+        self.from_start = from_start
 
     def _told(self, number: int) -> np.ndarray:
         return self._table[:, number - _TOLD]
@@ -81,6 +88,12 @@ class Run:
     def states(self) -> Float[np.ndarray, "s state"]:
         """The last solved state at each load, packed: its own, or as far as it was followed."""
         return self._own_state(0)
+
+    @cached_property
+    def states_before(self) -> Float[np.ndarray, "s state"]:
+        """The state before each load, packed."""
+        last = np.concatenate([self.first[None], self.states[:-1]])
+        return np.where(self.from_start[:, None], self.first, last)
 
     @cached_property
     def between(self) -> Float[np.ndarray, "s state"]:
@@ -136,7 +149,7 @@ def run(
     start: Solved | None,
     settings: Settings,
     *,
-    each_from_start: bool,
+    each_from_start: bool | Bool[np.ndarray, " s"],
 ) -> Run:
     """Follow loads, each from the state before or each from the same one.
 
@@ -145,12 +158,11 @@ def run(
         commands: The loads, as leading axis.
         start: The state before the first; rest where None.
         settings: How hard to try.
-        each_from_start: Whether every load starts from `start`.
+        each_from_start: Whether every load starts from `start`, or which loads do.
 
     Returns:
         One entry per load.
     """
-    options = _options(settings, each_from_start)
     long = prepared.long
     packed, form = prepared.long_commands(commands)
     forms = (long.known_form, form, long.state)
@@ -159,9 +171,11 @@ def run(
         first = np.asarray(prepared.state.pack(start))
         start_row = lengthen(first, prepared.state, long.state)
         carried = np.append(start_row, 1.0)
-    rows = (False, False, True, False, False)
-    table = _follow.along(rows, carried, long.known_vector, packed, start_row, options, *forms)
-    return Run(prepared, first, table)
+    from_start = np.broadcast_to(each_from_start, len(packed))
+    rows = (False, False, True, True, False, False)
+    given = (carried, long.known_vector, packed, from_start[:, None].astype(float), start_row)
+    table = _follow.along(rows, *given, _numbers(settings), *forms)
+    return Run(prepared, first, table, from_start)
 
 
 def lips(
@@ -207,31 +221,32 @@ def _lips(
 
 
 @lru_cache(maxsize=64)
-def _options(settings: Settings, each_from_start: bool) -> Float[np.ndarray, " options"]:
-    """The options of `_follow`, kept for the next time."""
-    return np.array([*settings.numbers, float(each_from_start)])
+def _numbers(settings: Settings) -> Float[np.ndarray, " settings"]:
+    """The settings as an array, kept for the next time."""
+    return np.array(settings.numbers)
 
 
-@native(5, lane_sizes)
+@native(6, lane_sizes)
 def _follow(
     carried: Float[Array, " state+1"],
     vector: Float[Array, " chain"],
     load: Float[Array, " command"],
+    from_start: Float[Array, " 1"],
     start: Float[Array, " state"],
-    options: Float[Array, " options"],
+    numbers: Float[Array, " settings"],
     chain_form: KnownForm,
     command_form: Form,
     state_form: Form,
 ) -> tuple[Float[Array, " state+1"], Float[Array, " told"]]:
     """The two states of a load, their shape, and how it went.
 
-    Carried from load to load is the last solved state, and whether all loads so far converged.
+    Carried from load to load is the last solved state, and whether all loads since the start
+    converged.
     """
     chain: Chain = chain_form.unpack(vector)
-    settings = Settings.of(options[:-1])
-    each_from_start = options[-1] > 0.0
-    alive = carried[-1] > 0.0
-    before = jnp.where(each_from_start, start, carried[:-1])
+    settings = Settings.of(numbers)
+    alive = (carried[-1] > 0.0) | (from_start[0] > 0.0)
+    before = jnp.where(from_start[0] > 0.0, start, carried[:-1])
 
     def try_it() -> tuple[Array, Array, Array]:
         came = advance(chain, command_form.unpack(load), state_form.unpack(before), settings)
@@ -251,7 +266,7 @@ def _follow(
         told = jnp.zeros(Shape.form(chain.flexures, chain.tendons).size + _TOLD)
         return before, jnp.concatenate([before, told.at[-_TOLD].set(jnp.nan)]), alive
 
-    solved, told, converged = jax.lax.cond(alive | each_from_start, try_it, skip)
+    solved, told, converged = jax.lax.cond(alive, try_it, skip)
     goes_on = jnp.where(alive & converged, 1.0, 0.0)
     return jnp.append(solved, goes_on), jnp.concatenate([solved, told])
 

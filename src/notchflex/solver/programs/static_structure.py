@@ -96,10 +96,15 @@ class KnownForm:
     def _fits(self, numbers: Float[np.ndarray, "k chain"]) -> bool:
         return bool((numbers[:, self._known] == self._numbers[self._known]).all())
 
-    def pack(self, numbers: Float[np.ndarray, "*k chain"]) -> Float[np.ndarray, "*k unknown"]:
-        """Vectors of chains that are packed whole."""
+    def pack(self, numbers: Any) -> Any:
+        """Vectors of chains that are packed whole (NumPy's or JAX's), with leading axes."""
+        xp = array_module(numbers)
         behind = np.zeros((*numbers.shape[:-1], _BEHIND))
-        return np.concatenate([numbers[..., self._taken], behind], axis=-1)
+        return xp.concatenate([numbers[..., self._taken], behind], axis=-1)
+
+    def places_of(self, places: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Where a vector holds numbers of the whole chain; its last place, a 0, if known."""
+        return np.where(self._known[places], self.size - 1, self._place[places])
 
     def unpack(self, vector: Any) -> Any:
         """The chain of a vector."""

@@ -31,7 +31,7 @@ MOST_BYTES = 256 * 2**20
 _DIGEST = 32  # bytes
 _PREFIX = "program-"
 # Folders of notchflex whose code no program is made from. All of `lanewise` makes programs.
-_NOT_COMPILED = {"bench", "cli", "plotting", "viewer"}
+_NOT_COMPILED = {"bench", "cli", "comparison", "fit", "plotting", "viewer"}
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _POSIX = hasattr(os, "geteuid") and os.open in os.supports_dir_fd
 

@@ -1,0 +1,188 @@
+"""The forward model: numbers of a robot and its loads in, solved states and derivatives out.
+
+All that differentiates results goes through it. States and derivatives are found by compiled
+programs along the path; the arrays of a robot are differentiated by its numbers where plain Python
+makes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from notchflex.analysis.derivatives.adjoint import gradient
+from notchflex.analysis.derivatives.numbers import slope
+from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.analysis.solve import prepared_for
+from notchflex.errors import InputError
+from notchflex.loads.command import command
+from notchflex.loads.load_path import LoadPath
+from notchflex.mechanics.chain import Shaped, laws, shape_of
+from notchflex.results.path import EquilibriumPath
+from notchflex.robot import Robot
+from notchflex.robot.value_names import number_at
+from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.prepare import Prepared, flat, prepared
+from notchflex.solver.programs.run import run
+
+# One gradient of a number takes about as long as derivatives along so many directions.
+_ADJOINT = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ForwardModel:
+    """A robot under loads as a function of its numbers and of the loads.
+
+    Attributes:
+        robot: The robot as it is.
+        load: The loads as they are.
+        settings: How hard the solver tries.
+        refinement: More strain modes, as for `simulate`.
+        from_rest: Which steps start from rest, (s,); the others from the step before.
+        any_load: Whether loads on the bodies may vary, and so may point anywhere.
+    """
+
+    robot: Robot
+    load: LoadPath
+    settings: Settings = DEFAULT
+    refinement: int = 0
+    from_rest: bool | Bool[np.ndarray, " s"] = False
+    any_load: bool = False
+
+    @cached_property
+    def ready(self) -> Prepared:
+        """The robot as it is, as arrays."""
+        return self._assembled(self.robot)
+
+    def solve(self, robot: Robot, load: LoadPath) -> EquilibriumPath:
+        """Follow loads with the robot that has some other numbers.
+
+        Args:
+            robot: The robot.
+            load: Loads of the same kind as those of the model.
+
+        Raises:
+            InputError: The arrays of the robot have another form than those of the model's.
+        """
+        ready = self._prepared(robot)
+        commands = command(load, robot, ready.chain)
+        came = run(ready, commands, None, self.settings, each_from_start=self.from_rest)
+        return EquilibriumPath(robot, load, ready, came, settings=self.settings)
+
+    def change(self, robot: Robot, load: LoadPath, name: str) -> Change:
+        """Differentiate arrays and loads by a number of the robot.
+
+        Args:
+            robot: The robot, with the value where.
+            load: The loads.
+            name: Which number.
+
+        Raises:
+            InputError: The number cannot be varied.
+        """
+        section, _, key = name.partition(".")
+        if section in ("material", "friction") and key != "density":
+            part, shape = getattr(robot, section), self._shape(robot)
+
+            def of_laws(value: float) -> np.ndarray:
+                return flat(laws(replace(part, **{key: value}), shape))
+
+            chain = np.zeros(self.ready.long.chain_form.size)
+            chain[self._places[section]] = slope(of_laws, getattr(part, key), order=2)
+            return Change(None, chain)
+
+        def packed(value: float) -> np.ndarray:
+            varied = robot.with_value(name, value)
+            ready = self._prepared(varied)
+            loads, _ = ready.long_commands(command(load, varied, ready.chain))
+            return np.concatenate([ready.long.vector, loads.ravel()])
+
+        size = self.ready.long.chain_form.size
+        found = slope(packed, number_at(robot, name))
+        return Change(found[size:].reshape(len(load), -1), found[:size])
+
+    def load_change(self, path: EquilibriumPath, load: LoadPath) -> Float[np.ndarray, "s command"]:
+        """Difference of other loads from those of a path, packed for the long chain."""
+        ready, robot = path.prepared, path.robot
+        here, _ = ready.long_commands(path.commands)
+        there, _ = ready.long_commands(command(load, robot, ready.chain))
+        return there - here
+
+    def derivatives(
+        self,
+        path: EquilibriumPath,
+        changes: Iterable[Change],
+        outputs: tuple[str, ...],
+        *,
+        remembers: bool = True,
+    ) -> dict[str, np.ndarray]:
+        """Differentiate a solved path.
+
+        Args:
+            path: As `solve` returns it.
+            changes: Directions, one or more.
+            outputs: Quantities that the solver reports as floats.
+            remembers: Whether changes pass from state to state through the memory of the contacts.
+
+        Returns:
+            By name, directions and then steps as leading axes, in the world. NaN from a step on
+            that did not converge, or was so hard that its derivatives are not known.
+        """
+        directions = tuple(changes)
+        shapes = {name: np.shape(path.quantity(name)) for name in outputs}
+        if not remembers or _ADJOINT * sum(map(math.prod, shapes.values())) > len(directions):
+            tangents = PathTangents(path, outputs, remembers)
+            columns = [tangents.along(one) for one in directions]
+            return {name: np.stack([one[name] for one in columns]) for name in outputs}
+        found = {name: np.empty((len(directions), *shape)) for name, shape in shapes.items()}
+        for name, shape in shapes.items():
+            for place in np.ndindex(shape):
+                weight = np.zeros(shape)
+                weight[place] = 1.0
+                by = gradient(path, {name: weight})
+                found[name][:, *place] = [by.along(one) for one in directions]
+        return found
+
+    def _assembled(self, robot: Robot) -> Prepared:
+        if self.any_load:
+            return prepared(robot, "space", loaded=True, refinement=self.refinement, flat=False)
+        return prepared_for(robot, self.load, None, self.refinement)
+
+    @cached_property
+    def _prepared(self) -> Callable[[Robot], Prepared]:
+        """Arrays of the robot with some other numbers; a control loop asks for the same again."""
+        return lru_cache(maxsize=4)(self._varied)
+
+    def _varied(self, robot: Robot) -> Prepared:
+        own, shape = self.robot, self._shape(robot)
+        if robot is own:
+            return self.ready
+        # A search for constants of the material and friction varies a few numbers of the chain.
+        if shape is self._shape(own) and robot.material.density == own.material.density:
+            fields = laws(robot.material, shape) | laws(robot.friction, shape)
+            return self.ready.with_fields(fields)
+        ready = self._assembled(robot)
+        if ready.chain_form is not self.ready.chain_form:
+            raise InputError.UNSUPPORTED(
+                "with these values the robot has another form; it must stay the same"
+            )
+        return ready
+
+    @cached_property
+    def _places(self) -> dict[str, np.ndarray]:
+        """Where the long chain's vector holds what follows from material and friction."""
+        shape = self._shape(self.robot)
+        parts = {"material": self.robot.material, "friction": self.robot.friction}
+        return {name: self.ready.places(laws(part, shape)) for name, part in parts.items()}
+
+    def _shape(self, robot: Robot) -> Shaped:
+        chain = self.ready.chain
+        return shape_of(robot, chain.level, chain.refinement)
+
+
+__all__ = ["Change", "ForwardModel"]
