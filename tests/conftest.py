@@ -5,10 +5,12 @@ import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
 
+import notchflex as nf
 from chromium import browser  # noqa: F401
 from margins import margin, pytest_terminal_summary  # noqa: F401
 from wordings import pytest_addoption, wording  # noqa: F401
@@ -43,6 +45,18 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Run all tests of a file in one process: they share programs and solved paths.
+
+    Files go out in the order of their names, which leaves short ones (viewer) for the end.
+    """
+    from xdist.scheduler import LoadFileScheduling
+
+    config.option.loadscopereorder = False
+    return LoadFileScheduling(config, log)
+
+
 # Compiled programs hold pieces of memory, of which Linux gives a process 65,530; the compiler
 # crashes where there are none left. A process that runs half of all tests comes near.
 _PIECES = 20_000
@@ -60,3 +74,15 @@ def room_for_compiled_code() -> Iterator[None]:
         if sum(1 for _ in lines) > _PIECES:
             jax.clear_caches()
             sys.modules["notchflex.solver.programs.compiled"].Native.made.clear()
+
+
+@pytest.fixture(scope="session")
+def wrist() -> nf.Robot:
+    """Wrist A of Pacheco 2021."""
+    return nf.load_robot("pacheco2021-a")
+
+
+@pytest.fixture(scope="session")
+def loop(wrist: nf.Robot) -> nf.EquilibriumPath:
+    """A pull of wrist A until all notches are closed, and back: 8 steps."""
+    return nf.simulate(wrist, nf.pull(0.0, 3.0, steps=4).release())

@@ -1,7 +1,6 @@
 """Examples in docstrings and in the README run, and print what they say."""
 
 import doctest
-import pkgutil
 import re
 from importlib import import_module
 from pathlib import Path
@@ -13,24 +12,36 @@ import notchflex
 
 DOCS = Path(__file__).parents[1] / "docs"
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-MODULES = sorted(
-    module.name
+FILES = {
+    ".".join((package.__name__, *file.relative_to(root).with_suffix("").parts)): file
     for package in (notchflex, lanewise)
-    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
-    if not module.name.endswith("__main__")
-)
+    for root in map(Path, package.__path__)
+    for file in sorted(root.rglob("*.py"))
+}
+WITH_EXAMPLES = [
+    name.removesuffix(".__init__")
+    for name, file in FILES.items()
+    if re.search(r">>> (?!.*\+SKIP)", file.read_text(encoding="utf-8"))
+]
 
 
-@pytest.mark.parametrize("name", MODULES)
+def test_every_module_can_be_imported():
+    names = [name.removesuffix(".__init__") for name in FILES if not name.endswith("__main__")]
+    assert {import_module(name).__name__ for name in names} == set(names)
+    assert len(WITH_EXAMPLES) > 20
+
+
+@pytest.mark.parametrize("name", WITH_EXAMPLES)
 def test_docstrings(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)  # an example may write a file
     module = import_module(name)
     # an example reads as after `import notchflex as nf`
     globs = vars(module) | {"nf": notchflex}
-    failed, _ = doctest.testmod(
+    failed, tried = doctest.testmod(
         module, extraglobs=globs, optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     )
     assert failed == 0
+    assert tried > 0
 
 
 def test_readme_examples(capsys: pytest.CaptureFixture[str]):

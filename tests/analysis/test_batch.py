@@ -12,11 +12,6 @@ from notchflex.analysis.outputs import OUTPUTS
 from notchflex.errors import InputError
 
 
-@pytest.fixture(scope="module")
-def wrist() -> nf.Robot:
-    return nf.load_robot("pacheco2021-a")
-
-
 def test_loads_of_one_robot(wrist, margin):
     loads = nf.pull(0.0, 2.5, steps=70)  # more than one piece
     told: list[tuple[int, int]] = []

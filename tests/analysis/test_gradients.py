@@ -67,7 +67,12 @@ def differences(of, value: float) -> float:
     return (4.0 * narrow - wide) / 3.0
 
 
-@pytest.mark.parametrize("case", CASES)
+LONG = ("links, loaded",)
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(one, marks=[pytest.mark.nightly] * (one in LONG)) for one in CASES]
+)
 def test_slopes_against_differences(case, margin):
     name, path, parameters = CASES[case]
     robot = nf.load_robot(name)
@@ -180,6 +185,7 @@ def test_what_loads_did_before_the_tendons_has_a_slope(margin):
     margin.within("tip force", float(mine["tip_force"][0, 0]) / along - 1.0, 1e-6)
 
 
+@pytest.mark.nightly
 def test_a_load_cut_into_many_parts_has_no_slope_with_friction():
     robot = nf.load_robot("pacheco2021-a").with_value("friction.coefficient", 0.4)
     # It is solved in three parts, see test_tip_response.py.

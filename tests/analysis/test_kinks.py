@@ -10,13 +10,9 @@ from notchflex.analysis.derivatives.kinks import kinks
 from notchflex.solver.programs.compiled import Native
 
 ARC = nf.ArcNotch("on-axis", depth=1.40, height=0.8, uncut_length=1.2, repeat=2)
-TWO = nf.Robot(
-    name="two notches",
-    tube=nf.Tube(1.62, 1.40),
-    notch=(ARC,),
-    tendon=(nf.Tendon(0.70),),
-    material=nf.Linear(10_000.0),
-    friction=nf.Capstan(0.2),
+# Of the form of wrist A, whose programs others need too; linear up to 0.9 N.
+TWO = nf.load_robot("pacheco2021-a").replace(
+    name="two notches", notch=(ARC,), tendon=(nf.Tendon(0.70),), friction=nf.Capstan(0.2)
 )
 TENSION = (0.4, 0.8, 0.8, 0.6)
 LOADS = [nf.Load(tension=value) for value in TENSION]

@@ -12,11 +12,6 @@ PATH = nf.pull(0.5, 1.6, steps=2).then(nf.pull(0.8, 0.8, steps=1)).loaded(tip_fo
 
 
 @pytest.fixture(scope="module")
-def wrist() -> nf.Robot:
-    return nf.load_robot("pacheco2021-a")
-
-
-@pytest.fixture(scope="module")
 def found(wrist) -> nf.TipResponse:
     return nf.tip_response(wrist, PATH)
 
@@ -83,8 +78,18 @@ def test_the_base_turns_it_all(wrist, found, margin):
     margin.within("jacobian", other.jacobian - quarter @ plain.jacobian, 1e-8)
 
 
-def test_what_is_not_solved_has_none(wrist):
-    response = nf.tip_response(wrist, nf.stroke_path(0.5, 50.0, steps=2))
+@pytest.mark.parametrize(
+    "path",
+    [
+        nf.pull(0.5, 0.5, steps=1)
+        .loaded(tip_force=LOAD)
+        .then(nf.pull(0.5, 0.5, steps=1).loaded(tip_force=(1000.0, 1.0, 0.0))),
+        pytest.param(nf.stroke_path(0.5, 50.0, steps=2), marks=pytest.mark.nightly),
+    ],
+    ids=["by tension", "by stroke"],
+)
+def test_what_is_not_solved_has_none(wrist, path):
+    response = nf.tip_response(wrist, path)
     assert np.isfinite(response.compliance[0]).all()
     assert np.isnan(response.compliance[1]).all()
     assert np.isnan(response.jacobian[1]).all()
@@ -127,6 +132,7 @@ def test_slopes_that_nobody_knows_are_not_told(wrist):
     assert np.isnan(response.compliance).all()
 
 
+@pytest.mark.nightly
 def test_without_friction_a_load_may_be_cut(wrist, margin):
     smooth = wrist.with_value("friction.kind", "frictionless")
     response = nf.tip_response(smooth, HARD)

@@ -21,6 +21,7 @@ def coverage():
     sys.path.remove(str(FOLDER))
 
 
+@pytest.mark.nightly
 def test_intervals_of_a_few_repetitions_hold_the_truth(coverage):
     names, truth, estimates, holds = coverage.covered(coverage.cases()["short"], COUNT)
     # 24 intervals of 95 %: 5 misses or more happen once in 140 draws, and the draw is fixed.

@@ -7,18 +7,8 @@ from pathlib import Path
 import pytest
 
 from notchflex import _canary
-from notchflex.cli import run
 from notchflex.cli.verbs.doctor import requirements
 from notchflex.solver.programs import store
-
-
-@pytest.fixture
-def call(capsys):
-    def runner(*arguments):
-        code = run(list(arguments))
-        return (code, *capsys.readouterr())
-
-    return runner
 
 
 def test_healthy_installation(call):

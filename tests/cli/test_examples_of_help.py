@@ -27,7 +27,7 @@ def test_help_shows_the_examples(verb, capsys):
         assert line.split()[-1] in shown
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("verb", [verb for verb in VERBS if script(verb)])
 def test_examples_run_as_written(verb, tmp_path):
     tool = tmp_path / "bin" / "notchflex"

@@ -27,7 +27,7 @@ def test_the_notebook_is_kept_without_outputs():
     assert all(not cell.outputs and cell.execution_count is None for cell in code)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_page_is_what_the_notebook_shows():
     made = generator()
     text, pictures = made.page(made.executed())

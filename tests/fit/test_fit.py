@@ -233,7 +233,6 @@ def test_what_does_not_belong_together_is_refused(change, says):
         calibrate(WRIST, measurements, fit, **given)
 
 
-@pytest.mark.slow
 def test_the_identification_of_pacheco_2021():
     robots = {name: nf.load_robot(f"pacheco2021-{name}-specimen") for name in "abc"}
     data = {

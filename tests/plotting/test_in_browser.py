@@ -5,7 +5,7 @@ import pytest
 from fitted import fitted
 from notchflex.plotting import calibration_picture
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
 
 @pytest.fixture

@@ -151,7 +151,7 @@ def test_long_headings_are_broken():
 
 
 @pytest.mark.browser
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_browser_shows_the_heading_letter_by_letter(browser, tmp_path):
     file = tmp_path / "a.html"
     path_picture(nasty_path()).save(file)

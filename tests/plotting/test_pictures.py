@@ -263,7 +263,9 @@ def test_animation_moves_and_ends_where_the_path_ends(tmp_path):
     assert [found.name for found in tmp_path.iterdir()] == ["x.gif"]
 
 
-@pytest.mark.parametrize("steps", [2, 9, 40])
+@pytest.mark.parametrize(
+    "steps", [2, *(pytest.param(one, marks=pytest.mark.nightly) for one in (9, 40))]
+)
 def test_animation_takes_its_time_and_stands_at_both_ends(tmp_path, monkeypatch, steps):
     from PIL import Image
 

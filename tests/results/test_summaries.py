@@ -11,16 +11,6 @@ from notchflex._summary import Summary, course
 
 
 @pytest.fixture(scope="module")
-def wrist():
-    return nf.load_robot("pacheco2021-a")
-
-
-@pytest.fixture(scope="module")
-def loop(wrist):
-    return nf.simulate(wrist, nf.pull(0.0, 3.0, steps=4).release())
-
-
-@pytest.fixture(scope="module")
 def failed(wrist):
     return nf.simulate(wrist, nf.stroke_path(0.0, 9.0, steps=4))
 

@@ -79,9 +79,11 @@ def test_going_on_with_loads_from_a_state_without(margin) -> None:
 )
 def test_loads_come_before_the_tendons(name, tension, force, margin) -> None:
     """The state in between, which is solved less exactly, leaves no trace in the friction."""
-    robot, both = nf.load_robot(name), nf.Load(tension=tension, tip_force=force)
+    robot, follows = nf.load_robot(name), len(tension) > 1  # as in test_balance.py
+    both = nf.Load(tension=tension, tip_force=force, following=follows)
     at_once = nf.solve(robot, both).raise_if_failed()
-    in_turn = nf.simulate(robot, [nf.Load(tip_force=force), both])[-1].raise_if_failed()
+    first = nf.Load(tip_force=force, following=follows)
+    in_turn = nf.simulate(robot, [first, both])[-1].raise_if_failed()
     margin.within("tip", at_once.tip_position - in_turn.tip_position, 1e-11, "mm")
     friction = at_once.contact_log_ratio - in_turn.contact_log_ratio
     margin.within("log ratios", friction[np.isfinite(friction)], 1e-11)
@@ -113,6 +115,7 @@ def test_opposite_tendon_is_the_mirror_image(margin) -> None:
     margin.within("tensions", one.span_tension - other.span_tension, 1e-9, "N")
 
 
+@pytest.mark.nightly
 def test_both_tendons_pulled_at_once() -> None:
     left = gao_robot()
     opposite = dataclasses.replace(left.tendon[0], direction_deg=180.0)

@@ -14,7 +14,7 @@ from visit import Visit, changed
 
 image = pytest.importorskip("matplotlib.image")
 pytest.importorskip("viser", reason="the extra `viewer` is not installed")
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import notchflex as nf
 from visit import Visit
 
 pytest.importorskip("viser", reason="the extra `viewer` is not installed")
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
 TENSION, STROKE = "tension [N]", "stroke [mm]"
 LOOP = "svg[aria-label='total angle against {}'] path title"

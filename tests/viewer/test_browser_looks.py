@@ -7,7 +7,7 @@ import notchflex as nf
 from visit import Visit
 
 pytest.importorskip("viser", reason="the extra `viewer` is not installed")
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
 WIDTH, HEIGHT = 1280, 720
 

@@ -7,8 +7,6 @@ import pytest
 
 import notchflex as nf
 
-pytestmark = [pytest.mark.slow]
-
 
 def test_thirty_updates_a_second_for_27_joints():
     pytest.importorskip("viser", reason="the extra `viewer` is not installed")

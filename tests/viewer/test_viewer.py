@@ -112,6 +112,7 @@ def test_a_law_that_is_refused_leaves_the_law_before_on_the_page_too(start, monk
     wait(lambda: viewer.session.robot.friction.kind == "frictionless" and not viewer.message)
 
 
+@pytest.mark.nightly
 def test_corner_friction_by_the_chord_on_arc_notches_never_spoils_the_viewer(start):
     """An arc notch has no strip, whose chord counts: the robot is refused or is solved."""
     robot = robot_from_text(TWO_ARCS)

@@ -98,7 +98,7 @@ def strip_errors(table: np.ndarray, shape: Rod, steps: int) -> np.ndarray:
     return np.abs(np.stack([slope, x, y, np.arctan2(y, x)], axis=-1) - table[:, 3:])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_strip_converges_with_its_modes(margin):
     table = reference("liu_single_beam.csv")
     worst = []
@@ -256,10 +256,12 @@ def flexibility(side: str, nodes: int = 60) -> np.ndarray:
 def test_link_is_flexible_in_all_directions_as_castigliano_has_it(side, margin):
     # Nodes enough for the modes to show that they are exact; the default ones give 4e-6.
     shape = u_link_rod(nf.ULink(0.275, 0.70, 2.0, side), GAO, nodes=(12, 8))
-    stiffness = jax.jacfwd(
-        lambda modes: flexure_state(shape, NITINOL, (), modes, with_pose=False).internal
-    )(jnp.zeros(9))
-    twist = flexure_state(shape, NITINOL, (), jnp.zeros(9), with_pose=True).twist
+
+    def internal(modes: jax.Array) -> tuple[jax.Array, jax.Array]:
+        state = flexure_state(shape, NITINOL, (), modes, with_pose=True)
+        return state.internal, state.twist
+
+    stiffness, twist = jax.jit(jax.jacfwd(internal, has_aux=True))(np.zeros(9))
     found, wanted = twist @ np.linalg.solve(stiffness, twist.T), flexibility(side)
     scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
     margin.within("relative", (found - wanted) / scale, 1e-6)

@@ -56,7 +56,7 @@ def test_sectionproperties(cut, margin):
     compare(cut, FEW, margin)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("cut", SECTIONS)
 def test_sectionproperties_everywhere(cut, margin):
     compare(cut, MANY, margin)

@@ -1,6 +1,7 @@
 """Corner friction that turns with chords, on notches that have none."""
 
 import numpy as np
+import pytest
 
 import notchflex as nf
 
@@ -28,6 +29,7 @@ def test_arcs_turn_with_the_body():
     assert nf.solve(changed, nf.Load(tension=1.0)).converged
 
 
+@pytest.mark.nightly
 def test_beside_strips_arcs_still_turn_with_the_body():
     """A tendon that ends before the strip meets arcs alone."""
     strip = nf.load_robot("liu2022").notch[0]

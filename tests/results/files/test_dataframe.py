@@ -14,8 +14,8 @@ from notchflex.results.quantities.registry import QUANTITIES
 
 
 @pytest.fixture(scope="module")
-def path():
-    return nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 3.0, steps=4).release())
+def path(loop):
+    return loop
 
 
 @pytest.mark.parametrize("library", ["polars", "pandas"])

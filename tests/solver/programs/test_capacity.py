@@ -13,7 +13,7 @@ NOTCH = nf.ArcNotch(cut="on-axis", depth=1.4, height=0.8, uncut_length=1.2)
 
 
 def _arcs(*paths: str) -> nf.Robot:
-    """Two notches, tendons on opposite sides, with friction."""
+    """Two notches, tendons on opposite sides in turn, with friction."""
     return nf.Robot(
         name="short",
         tube=nf.Tube(1.62, 1.40),
@@ -33,16 +33,14 @@ def _strips() -> nf.Robot:
 @pytest.mark.parametrize(
     "robot",
     [
-        _arcs("straight"),
-        _arcs("straight", "wall-arc"),
-        _arcs("straight-dead", "straight-follower"),
+        _arcs("straight", "wall-arc", "straight-dead", "straight-follower"),
         _strips(),
     ],
-    ids=["straight", "straight and on the wall", "dead and follower", "chords"],
+    ids=["tendons of every path", "chords"],
 )
 def test_a_short_robot_in_a_longer_program(robot: nf.Robot, margin, monkeypatch) -> None:
-    others = [0.0] * (robot.number_of_tendons - 1)
-    loads = [nf.Load(tension=[pull, *others]) for pull in (0.1, 0.3, 0.2)]
+    every = np.eye(robot.number_of_tendons)
+    loads = [nf.Load(tension=pull * alone) for alone in every for pull in (0.1, 0.3, 0.2)]
     usual = nf.simulate(robot, loads)
     assert usual.prepared.long.chain.flexures > usual.chain.flexures
     assert usual.converged.all(), usual.reason
@@ -53,6 +51,6 @@ def test_a_short_robot_in_a_longer_program(robot: nf.Robot, margin, monkeypatch)
     prepare.prepare.cache_clear()
     assert own.prepared.long.chain.flexures == own.chain.flexures
     assert own.converged.all(), own.reason
-    assert (np.abs(own.total_angle) > 1e-3).all(), "nothing bends"
+    assert (np.abs(own.total_angle) > 1e-4).all(), "nothing bends"
     margin.within("angles", usual.notch_angle - own.notch_angle, ANGLE, "rad")
     margin.within("strokes", usual.stroke - own.stroke, 1e-12, "mm")

@@ -37,6 +37,7 @@ def test_xla_finds_the_same(wrist, monkeypatch, margin):
     margin.within("XLA against our program", alone.total_angle - again.total_angle, 1e-12, "rad")
 
 
+@pytest.mark.nightly
 def test_it_runs_without_compiling(wrist):
     load = nf.Load(tension=0.2)
     with jax.disable_jit():
