@@ -257,7 +257,7 @@ def test_a_fit_makes_no_program_of_xla(monkeypatch):
     def refuse(*_):
         raise AssertionError("XLA compiles mechanics")
 
-    monkeypatch.setattr(Native, "_xla", refuse)
+    monkeypatch.setattr(Native, "_by_xla", refuse)
     load = nf.pull(0.4, 1.6, steps=3).release()
     observed = ("notch_angle", "tip_position", "axis_points", "tip_rotation", "tip_tension")
     seen = simulate_measurements(

@@ -128,7 +128,8 @@ def elastic_stiffness(
     elastic_modulus: float | Array, shear_modulus: float | Array, section: FibreSection
 ) -> Float[Array, "*shape 6 6"]:
     """Resultants per strain of a linear elastic section, or of many; see `elastic_resultants`."""
-    every = jax.tree.map(lambda leaf: leaf[..., None], section)
+    xp = array_module(*jax.tree.leaves(section))
+    every = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], section)
     by_strain = elastic_resultants(elastic_modulus, shear_modulus, every, constant(np.eye(6)))
     return by_strain.swapaxes(-1, -2)
 
