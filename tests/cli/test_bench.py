@@ -40,4 +40,4 @@ def test_nothing_of_that_name(capsys):
 
 
 def test_a_first_call_in_a_process_of_its_own():
-    assert 0.1 < first_call("pacheco2021-a") < 300.0
+    assert 0.01 < first_call("pacheco2021-a") < 300.0
