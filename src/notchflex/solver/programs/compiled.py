@@ -163,13 +163,13 @@ class Native:
         self, how: str, by_row: tuple[bool, ...] | None, arguments: tuple[Any, ...]
     ) -> CompiledFunction | None:
         """The program for these arguments; None where XLA must make it."""
-        if getattr(jax.config, "jax_disable_jit") or backend() == "xla":  # noqa: B009
+        if getattr(jax.config, "jax_disable_jit"):  # noqa: B009
             return None
         vectors, others = arguments[: self._vectors], arguments[self._vectors :]
-        shapes = tuple(
-            np.shape(one)[1:] if by_row is not None and by_row[number] else np.shape(one)
-            for number, one in enumerate(vectors)
-        )
+        shapes = [one.shape for one in vectors]
+        if by_row is not None:
+            shapes = [shape[rows:] for shape, rows in zip(shapes, by_row, strict=True)]
+        shapes = tuple(shapes)
         key = (self, how, by_row, shapes, others)
         try:
             program = Native.made[key]
@@ -192,6 +192,8 @@ class Native:
         others: tuple[Any, ...],
     ) -> CompiledFunction | None:
         """The program, from disk or compiled and put there; None where XLA must make it."""
+        if backend() == "xla":
+            return None
         key = repr((self._name, how, by_row, shapes, others))
         level = optimisation_level()
         on_processor = f"{key} {target()} {level}"

@@ -163,7 +163,8 @@ def run(
         first = np.asarray(prepared.state.pack(start))
         start_row = pad_rows(first, prepared.state, long.state)
         carried = np.append(start_row, 1.0)
-    from_start = np.broadcast_to(each_from_start, len(packed))
+    from_start = np.empty(len(packed), bool)
+    from_start[:] = each_from_start
     restarts = from_start[:, None].astype(float)
     vectors = (carried, long.dynamic_vector, packed, restarts, start_row, _numbers(settings))
     by_row = (False, False, True, True, False, False)
