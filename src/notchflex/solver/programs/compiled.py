@@ -25,7 +25,7 @@ _PIECES = (64, 256, 1024)
 # Programs that a process holds at once; those not used for longest are made or read again.
 _MOST = 96
 # JAX remembers what it traced; it forgets that after so many programs.
-_TRACES = 24
+_TRACES = 4
 _making = threading.RLock()
 
 
