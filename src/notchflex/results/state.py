@@ -90,7 +90,7 @@ class State(Displayed):
     def arrays(self) -> dict[str, np.ndarray]:
         """Its numbers by name."""
         leaves, _ = tree_util.tree_flatten_with_path(self.solved)
-        return {tree_util.keystr(key): np.asarray(leaf) for key, leaf in leaves}
+        return {leaf_name(key): np.asarray(leaf) for key, leaf in leaves}
 
     @classmethod
     def load(cls, path: str | FilePath) -> SavedState:
@@ -177,10 +177,21 @@ class SavedState:
                 raise _damaged(self.source, f"{name} holds what is no finite number")
             read[name] = array
         wanted, _ = tree_util.tree_flatten_with_path(at_rest(chain))
-        for name in (tree_util.keystr(key) for key, _ in wanted):
+        for name in (leaf_name(key) for key, _ in wanted):
             if name not in read and not name.startswith(_LOADS):
                 raise _damaged(self.source, f"{name} is missing")
         return _on_chain(read, chain, f"{self.source} holds a state of robot {self.robot!r}")
+
+
+def leaf_name(key: Any) -> str:
+    """Return the name that an array of a solved state has in files.
+
+    Files keep the names of their first version, whatever the fields of the solver are called.
+
+    Args:
+        key: Path of the array in the tree, as JAX gives it.
+    """
+    return tree_util.keystr(key).replace("contact_force", "lip_force")
 
 
 def _damaged(source: str | FilePath, what: str) -> InputError:
@@ -227,7 +238,7 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solver
     leaves, structure = tree_util.tree_flatten_with_path(rest)
     fitting = []
     for key, leaf in leaves:
-        name = tree_util.keystr(key)
+        name = leaf_name(key)
         array = arrays.get(name, np.asarray(leaf))
         if name == _MODES and array.ndim == leaf.ndim and array.shape[-1] < leaf.shape[-1]:
             # The modes of every level are the first ones of the next.

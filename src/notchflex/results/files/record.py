@@ -163,6 +163,7 @@ def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     import jax.tree_util as tree_util
 
     from notchflex.results.recorded import BEFORE, TOLD
+    from notchflex.results.state import leaf_name
 
     run = path.run
     turned = bool(path.load.base_rotation.any())
@@ -178,7 +179,7 @@ def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     for name in BEFORE:
         yield _START + name, run.before(name)
     for key, leaf in tree_util.tree_flatten_with_path(run.solved)[0]:
-        yield _STATE + tree_util.keystr(key), np.asarray(leaf)
+        yield _STATE + leaf_name(key), np.asarray(leaf)
 
 
 def _path_of(record: Record) -> EquilibriumPath:
@@ -187,6 +188,7 @@ def _path_of(record: Record) -> EquilibriumPath:
     from notchflex.loads import LoadPath
     from notchflex.results.path import EquilibriumPath
     from notchflex.results.recorded import BEFORE, TOLD, Recorded
+    from notchflex.results.state import leaf_name
     from notchflex.robot import robot_from_text
     from notchflex.solver.newton import Settings
     from notchflex.solver.programs.prepare import prepare
@@ -210,7 +212,7 @@ def _path_of(record: Record) -> EquilibriumPath:
     leaves, structure = tree_util.tree_flatten_with_path(ready.rest)
     state: list[NDArray[Any]] = []
     for key, leaf in leaves:
-        name = _STATE + tree_util.keystr(key)
+        name = _STATE + leaf_name(key)
         state.append(_of_shape(arrays[name], (steps, *np.shape(leaf)), name))
     turned = bool(load.base_rotation.any())
     told = {name: arrays[_key(name, turned)] for name in TOLD}
