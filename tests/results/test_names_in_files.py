@@ -1,4 +1,4 @@
-"""Names of arrays in files: those of earlier files, whatever the fields of the solver are called."""
+"""Arrays in files keep the names of earlier files, whatever the fields of the solver are called."""
 
 import notchflex as nf
 
