@@ -86,6 +86,17 @@ class Quantity:
         REGISTERED.update(entries)
         return formula
 
+    def turned(self, values: Any, rotation: Any) -> Any:
+        """Return values of it, or changes of them, turned by a rotation; numbers stay.
+
+        Args:
+            values: Vectors, or rotation matrices, with any leading axes, or other values.
+            rotation: Rotation matrix, such as that from the frame of the base to the world.
+        """
+        if not self.in_world:
+            return values
+        return rotation @ values if "row" in self.per else values @ rotation.T
+
     @property
     def scale(self) -> float:
         """The factor from the inside of the program to the edge (rad to deg)."""

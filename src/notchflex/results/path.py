@@ -102,9 +102,7 @@ class EquilibriumPath(PathQuantities, Displayed):
     def _in_world(self, quantity: Quantity) -> np.ndarray:
         """Vectors and rotations of the solver are in the frame of the base."""
         turn, values = self.base_to_world, self.solver_quantity(quantity.name)
-        if turn is None or not quantity.in_world:
-            return values
-        return turn @ values if "row" in quantity.per else values @ turn.T
+        return values if turn is None else quantity.turned(values, turn)
 
     def solver_quantity(self, name: str) -> np.ndarray:
         """Return what the solver reports of every step, by its name.

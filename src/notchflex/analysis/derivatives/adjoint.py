@@ -14,14 +14,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.analysis.derivatives.tangent import ROTATIONS, VECTORS, Change, PathTangents
+from notchflex._quantity import REGISTERED
+from notchflex.analysis.derivatives.tangent import Change, PathTangents, answer_of
 from notchflex.analysis.outputs import report_quantities
 from notchflex.results.path import EquilibriumPath
 from notchflex.solver.derived.quantities import unpad_quantity
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
 from notchflex.solver.programs.static_structure import StaticStructure
-from notchflex.solver.sensitivity import SubstepHistory, attach_derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +84,8 @@ def _packed(
     seeds: list[np.ndarray] = []
     turn = path.base_to_world
     for name, weight in weights.items():
-        if turn is not None and name in (*VECTORS, *ROTATIONS):
-            weight = weight @ turn if name in VECTORS else turn.T @ weight
+        if turn is not None:
+            weight = REGISTERED[name].turned(weight, turn.T)
         size = int(np.prod(shapes[name]))
         numbers = unpad_quantity(
             path.chain, name, np.arange(float(size)).reshape(1, *shapes[name])
@@ -131,18 +131,15 @@ def _adjoint(
     outputs: tuple[str, ...],
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
     """What a state counts, which is carried to the one before; what its load and chain count."""
-    solved, halfway = state_layout.unpack(state), state_layout.unpack(between)
-    way = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+    answer = answer_of(state, between, how, (command_layout, state_layout), outputs)
     leaves, structure = jax.tree.flatten(chain_layout.unpack(chain))
     varies = [jnp.issubdtype(leaf.dtype, jnp.floating) for leaf in leaves]
 
     def found(load: Array, before: Array, numbers: list[Array]) -> tuple[Array, Array]:
         rest = iter(numbers)
         every = [next(rest) if own else leaf for own, leaf in zip(varies, leaves, strict=True)]
-        robot, last = jax.tree.unflatten(structure, every), state_layout.unpack(before)
-        answer = attach_derivatives(robot, command_layout.unpack(load), last, solved, way)
-        values = report_quantities(robot, answer, outputs)
-        return state_layout.pack(answer), jnp.concatenate([values[one].ravel() for one in outputs])
+        solved, values = answer(jax.tree.unflatten(structure, every), load, before)
+        return solved, jnp.concatenate([values[one].ravel() for one in outputs])
 
     numbers = [jnp.asarray(leaf) for own, leaf in zip(varies, leaves, strict=True) if own]
     pull_back = jax.vjp(found, load, before, numbers)[1]

@@ -7,6 +7,7 @@ are such directions one after the other; so the program is compiled once, howeve
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,7 +15,9 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._jax import jax, jnp
+from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import report_quantities
+from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
 from notchflex.solver.derived.quantities import unpad_quantity
 from notchflex.solver.programs.capacity import pad_rows
@@ -23,9 +26,6 @@ from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
 from notchflex.solver.programs.run import SolverRun
 from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.sensitivity import SubstepHistory, attach_derivatives
-
-VECTORS = ("tip_position", "body_position", "base_force", "base_moment")
-ROTATIONS = ("tip_rotation", "body_rotation")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +111,39 @@ class PathTangents:
     def _own(self, name: str, values: np.ndarray) -> np.ndarray:
         own = unpad_quantity(self.path.chain, name, values)
         turn = self.path.base_to_world
-        if turn is None or name not in (*VECTORS, *ROTATIONS):
-            return own
-        return own @ turn.T if name in VECTORS else turn @ own
+        return own if turn is None else REGISTERED[name].turned(own, turn)
+
+
+def answer_of(
+    state: Float[Array, " state"],
+    between: Float[Array, " state"],
+    how: Float[Array, " 3"],
+    layouts: tuple[PytreeLayout, PytreeLayout],
+    outputs: tuple[str, ...],
+) -> Callable[[Chain, Array, Array], tuple[Array, dict[str, Array]]]:
+    """Return a solved step as a function that can be differentiated.
+
+    Args:
+        state: The solved state, packed.
+        between: The state before its last part, packed.
+        how: How it was found, as `PathTangents.steps` has it.
+        layouts: Of a load and of a state.
+        outputs: Names of what is reported.
+
+    Returns:
+        A function of a chain, a packed load and the packed state before; it returns the packed
+        state and the outputs.
+    """
+    command_layout, state_layout = layouts
+    solved, halfway = state_layout.unpack(state), state_layout.unpack(between)
+    history = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+
+    def answer(chain: Chain, load: Array, before: Array) -> tuple[Array, dict[str, Array]]:
+        command, last = command_layout.unpack(load), state_layout.unpack(before)
+        result = attach_derivatives(chain, command, last, solved, history)
+        return state_layout.pack(result), report_quantities(chain, result, outputs)
+
+    return answer
 
 
 @native(10, lane_sizes)
@@ -138,25 +168,16 @@ def _tangent(
 
     The program for loads alone, where the chain does not vary, is a fifth shorter.
     """
-    solved, halfway = state_layout.unpack(state), state_layout.unpack(between)
-    way = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
+    answer = answer_of(state, between, how, (command_layout, state_layout), outputs)
 
-    def told(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
-        own, last = chain_layout.unpack(varied), state_layout.unpack(before)
-        command = command_layout.unpack(load)
-        found = attach_derivatives(own, command, last, solved, way)
-        return state_layout.pack(found), report_quantities(own, found, outputs)
+    def step(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
+        return answer(chain_layout.unpack(varied), load, before)
 
-    at, changes = (
-        (load, before),
-        (
-            load_change,
-            jnp.where(remembers[0] > 0.0, last_change, 0.0),
-        ),
-    )
+    at = (load, before)
+    changes = (load_change, jnp.where(remembers[0] > 0.0, last_change, 0.0))
     if varies:
         at, changes = (*at, chain), (*changes, chain_change)
-    return jax.jvp(told, at, changes)[1]
+    return jax.jvp(step, at, changes)[1]
 
 
-__all__ = ["ROTATIONS", "VECTORS", "Change", "PathTangents"]
+__all__ = ["Change", "PathTangents", "answer_of"]

@@ -106,7 +106,7 @@ def tip_position(state: SolvedState) -> Array:
 
 
 @Quantity("derived", "tip rotation", "R", key="tip_rotation", per=("row", "axis"),
-          after="tip_position")  # fmt: skip
+          after="tip_position", in_world=True)  # fmt: skip
 def tip_rotation(state: SolvedState) -> Array:
     """Rotation matrix of the tip in the world."""
     return state.quantity("body_rotation")[..., -1, :, :]
