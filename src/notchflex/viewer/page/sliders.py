@@ -17,12 +17,19 @@ _DIGITS = 3  # of the smallest step that a field shows, at least
 
 
 class _Control:
-    """A control of the page; it calls `act` in the solver thread."""
+    """A control of the page; it calls `act` in the solver thread.
+
+    The event loop receives what a person sets, the solver thread shows the current value. A value
+    from the page is therefore first queued and then noted as shown: `_show`, which reads in the
+    opposite order, cannot overwrite a number while it is being typed. viser's own `handle.value`
+    changes earlier than that, so it is not compared.
+    """
 
     def __init__(
         self, viewer: Viewer, handle: Any, key: tuple[str, str], act: Callable[[float], None]
     ) -> None:
         self._viewer, self._handle, self._key, self._act = viewer, handle, key, act
+        self._shown = float(handle.value)
 
         @handle.on_update
         async def _(event: Any) -> None:
@@ -31,6 +38,13 @@ class _Control:
 
     def _changed(self, value: float) -> None:
         self._send(value, PAUSE)
+        self._shown = value
+
+    def _show(self, value: float) -> None:
+        """Show a value, unless one from the page waits."""
+        shown = self._shown
+        if not self._viewer.tasks.has(self._key) and abs(shown - value) > 1e-9:
+            self._handle.value = self._shown = value
 
     def _send(self, value: float, pause: float) -> None:
         self._viewer.tasks.add(lambda: self._act(value), self._key, pause)
@@ -65,18 +79,20 @@ class Slider(_Control):
         low, high = ends
         handle = viewer.server.gui.add_slider(label, low, high, (high - low) / _FINE, 0.0)
         handle.precision = _digits(high)
-        self._number, self._before = number, 0.0
+        self._number = number
         super().__init__(viewer, handle, ("slider", label), act)
 
     def _changed(self, value: float) -> None:
         low, high = float(self._handle.min), float(self._handle.max)
-        before, self._before = self._before, value
+        before = self._shown
         if value == min(max(before, low), high) != before:
+            self._shown = value
             return  # when it is left, the page itself resets what was typed beyond an end
         jump = abs(value - before) > _JUMP * (high - low)
+        self._send(value, PAUSE if jump else 0.0)
+        self._shown = value
         if jump:  # at once, though the new value may still be typed
             self._viewer.targets.hold(self._number)
-        self._send(value, PAUSE if jump else 0.0)
 
     def stretch(self, ends: tuple[float, float]) -> None:
         """Change its ends."""
@@ -87,13 +103,8 @@ class Slider(_Control):
             self._handle.precision = _digits(high)
 
     def put(self, value: float) -> None:
-        """Show a value, unless one that it sent waits."""
-        if self._viewer.tasks.has(self._key):
-            return
-        value = min(max(float(value), float(self._handle.min)), float(self._handle.max))
-        self._before = value
-        if abs(float(self._handle.value) - value) > 1e-9:
-            self._handle.value = value
+        """Show a value within its ends, unless one from the page waits."""
+        self._show(min(max(float(value), float(self._handle.min)), float(self._handle.max)))
 
 
 class NumberField(_Control):
@@ -123,8 +134,7 @@ class NumberField(_Control):
 
     def put(self, value: float) -> None:
         """Show a number, unless a typed one waits."""
-        if not self._viewer.tasks.has(self._key) and self._handle.value != value:
-            self._handle.value = float(value)
+        self._show(float(value))
 
 
 class Dropdown:
