@@ -14,6 +14,7 @@ __all__ = [
     "laws",
     "padded",
     "shape_of",
+    "sites_of",
     "structural",
     "tendons_in_plane",
 ]

@@ -56,7 +56,7 @@ def stack(rods: Sequence[Rod]) -> Rod:
     filled = [_filled(rod, modes, nodes, poses, levels) for rod in rods]
     unused: dict[str, Any] = {
         name: None
-        for name in ("linear_kinematics", "chord")
+        for name in ("linear_kinematics", "chord", "stop_flexibility")
         if not any(np.any(getattr(rod, name)) for rod in filled)
     }
     used = [dataclasses.replace(rod, **unused) if unused else rod for rod in filled]

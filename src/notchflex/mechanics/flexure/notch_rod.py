@@ -117,6 +117,7 @@ def build_rod(
     modes: StrainModes,
     closure: float | None = None,
     *,
+    stop_flexibility: float = 0.0,
     direction_deg: float = 0.0,
     linear_kinematics: bool = False,
     has_chord: bool = False,
@@ -130,6 +131,7 @@ def build_rod(
         closure: Distance across the section, from the neutral axis toward the cut, of the fibre
             that has no length left when the notch is closed, mm. None where the notch has no solid
             spine: then the edges of its openings (`Notch.openings`) meet.
+        stop_flexibility: Flexibility of the closed notch over that of the open one.
         direction_deg: Side toward which the notch bends, deg.
         linear_kinematics: Whether displacements are proportional to the strains.
         has_chord: Whether the angle of the chord from start to end is an output (Liu 2022).
@@ -164,6 +166,7 @@ def build_rod(
         section=jax.tree.map(at_nodes, section),
         closure=constant([closure or 0.0, 0.0]),
         has_closure=constant(float(closure is not None)),
+        stop_flexibility=constant(stop_flexibility),
         linear_kinematics=constant(float(linear_kinematics)),
         chord=constant(float(has_chord)),
         padding_mask=constant(np.zeros(modes.basis.shape[-1])),

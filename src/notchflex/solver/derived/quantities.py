@@ -257,15 +257,22 @@ def bend_possible(state: SolvedState) -> Array:
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",
           column="stored_energy_Nmm")  # fmt: skip
 def stored_energy(state: SolvedState) -> Array:
-    """Elastic energy held by flexures and stretched tendons."""
+    """Elastic energy held by flexures, lips that press and stretched tendons."""
     chain, base_tension = state.chain, state.solved.point.base_tension
     strain = in_space(state.at.flexure.strain)
     density = jax.vmap(jax.vmap(chain.law.energy))(strain, chain.rods.section, chain.memory)
     in_gap, beside_body = state.tensions
     in_tendons = in_gap**2 * state.by_tendon("natural_gap")
     in_tendons = in_tendons + beside_body**2 * state.by_tendon("body_length")
+    in_lips = jnp.zeros(())
+    if chain.contact_flexibility is not None:
+        forces = jnp.stack(
+            [jnp.sum(one**2, axis=-1) for one in state.solved.point.unknowns.contact_force]
+        )
+        in_lips = 0.5 * jnp.sum(chain.contact_flexibility * forces)
     return (
-        jnp.sum(chain.rods.length * density)
+        in_lips
+        + jnp.sum(chain.rods.length * density)
         + 0.5 * jnp.sum(in_tendons * state.by_tendon("visits") * state.compliance)
         + 0.5 * jnp.sum(base_tension**2 * chain.free_length / chain.axial_stiffness)
     )
