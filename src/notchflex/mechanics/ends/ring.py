@@ -1,0 +1,165 @@
+r"""Edge compliance of an uncut ring: a thin cylindrical shell under edge loads in harmonics.
+
+The displacements $u\cos n\varphi$ (along the tube), $v\sin n\varphi$ (around) and
+$w\cos n\varphi$ (outward) are polynomials of degree 18 of the distance z from the loaded edge. The
+strains are those of Sanders' shell,
+
+$$\varepsilon_z = u',\quad \varepsilon_\varphi = \frac{nv + w}{r},\quad \gamma = v' - \frac{nu}{r},
+\quad \kappa_z = -w'',\quad \kappa_\varphi = \frac{nv + n^2 w}{r^2},\quad
+\kappa_{z\varphi} = \frac{nu}{2r^2} + \frac{3v'}{2r} + \frac{2nw'}{r}$$
+
+with the stiffnesses $t/(1-\nu^2)$ and $t^3/12(1-\nu^2)$, those of γ and κ_zφ times (1 − ν)/2.
+
+The polynomials are integrals of Legendre's from the far edge: the derivatives in the energy are
+then nearly orthogonal, and a condition at the far edge leaves out one polynomial.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from notchflex._jax import array_module, jax
+from notchflex.mechanics.ends.side import BOUNDARIES
+
+HARMONICS = 41  # n = 0 ... 40
+_DEGREE = 18
+_COUNT = _DEGREE + 1  # polynomials of each displacement
+
+
+def _polynomials(integrals: int) -> np.ndarray:
+    """Integrate Legendre polynomials of x = z / length from the far edge, x = 1.
+
+    Args:
+        integrals: How many times; as many Taylor terms at the far edge come first.
+
+    Returns:
+        Values and two derivatives at the loaded edge x = 0 and at the points of a Gauss rule, shape
+        (3, 1 + points, polynomials).
+    """
+    legendre = np.polynomial.legendre
+    at = np.concatenate([[-1.0], _GAUSS[0]])
+    series = [np.array([1.0]), np.array([-0.5, 0.5])][:integrals]
+    for k in range(_COUNT - integrals):
+        unit = np.sqrt(2.0 * k + 1.0) * np.eye(k + 1)[k]
+        series.append(legendre.legint(unit, integrals, lbnd=1.0, scl=0.5))
+    return np.array(
+        [[legendre.legval(at, legendre.legder(s, d, 2.0)) for s in series] for d in range(3)]
+    ).transpose(0, 2, 1)
+
+
+_GAUSS = np.polynomial.legendre.leggauss(_COUNT)  # exact for products of two polynomials
+_IN_SURFACE, _OUTWARD = _polynomials(1), _polynomials(2)
+
+
+def _strains() -> np.ndarray:
+    """Write strains as sums over powers: of n (0 to 2), and of the derivative (0 to 2).
+
+    Returns:
+        Array (power of n, derivative, strain, displacement) of factors, for r = 1.
+    """
+    factors = np.zeros((3, 3, 6, 3))
+    u, v, w = range(3)
+    axial, around, shear, along, across, twist = range(6)
+    for power, derivative, strain, displacement, factor in (
+        (0, 1, axial, u, 1.0),
+        (1, 0, around, v, 1.0),
+        (0, 0, around, w, 1.0),
+        (0, 1, shear, v, 1.0),
+        (1, 0, shear, u, -1.0),
+        (0, 2, along, w, -1.0),
+        (1, 0, across, v, 1.0),
+        (2, 0, across, w, 1.0),
+        (1, 0, twist, u, 0.5),
+        (0, 1, twist, v, 1.5),
+        (1, 1, twist, w, 2.0),
+    ):
+        factors[power, derivative, strain, displacement] = factor
+    return factors
+
+
+def _operator() -> np.ndarray:
+    """Strains at the Gauss points of every polynomial, for r = 1 and z / r = x.
+
+    Returns:
+        Array (derivative, harmonic, strain, point, displacement × polynomial), to be divided by
+        the power `derivative` of length / radius.
+    """
+    n = np.arange(HARMONICS, dtype=float)
+    by_harmonic = np.einsum("pn,pdsk->dnsk", n ** np.arange(3.0)[:, None], _strains())
+    tables = np.stack([_IN_SURFACE, _IN_SURFACE, _OUTWARD])[:, :, 1:]
+    shape = (3, HARMONICS, 6, _COUNT, 3 * _COUNT)
+    return np.einsum("dnsk,kdgi->dnsgki", by_harmonic, tables).reshape(shape)
+
+
+def _held(boundary: str) -> np.ndarray:
+    """Say which polynomials are left out of each harmonic, shape (harmonics, 3 × polynomials)."""
+    held = np.zeros((HARMONICS, 3, _COUNT), dtype=bool)
+    held[0, 1] = True  # no torsion
+    if boundary == "clamped":
+        held[:, :, 0] = held[:, 2, 1] = True
+    elif boundary == "between":
+        held[:, 0, 0] = held[:, 2, 1] = held[1, 1, 0] = True
+    else:  # free, but for the motions of a rigid ring
+        held[:2, 0, 0] = held[1, 2, 0] = True
+    return held.reshape(HARMONICS, -1)
+
+
+_OPERATOR = _operator()
+_HELD = {boundary: _held(boundary) for boundary in BOUNDARIES}
+# Axial displacement and slope at the loaded edge of every polynomial, shape (3 × polynomials, 2).
+_EDGE = np.zeros((3, _COUNT, 2))
+_EDGE[0, :, 0] = _IN_SURFACE[0, 0]
+_EDGE[2, :, 1] = _OUTWARD[1, 0]
+_EDGE = _EDGE.reshape(-1, 2)
+
+
+def edge_compliance(
+    radius: jax.Array, wall: jax.Array, length: jax.Array, poisson_ratio: jax.Array, boundary: str
+) -> jax.Array:
+    """Compute how edge loads of each harmonic move the edge that they act on.
+
+    Args:
+        radius: Mean radius r, mm.
+        wall: Wall t, mm.
+        length: From the loaded edge to the plane of symmetry, clamp or free end, mm.
+        poisson_ratio: Poisson's ratio ν.
+        boundary: "between" (the plane of symmetry between two notches), "clamped" or "free"
+            (the motions of a rigid ring held at the far edge).
+
+    Returns:
+        Displacement away from the ring and slope of the outward displacement along z, per unit of
+        tension and of moment in N/mm and N with a Young's modulus of 1, shape (harmonics, 2, 2).
+    """
+    xp = array_module(radius, wall, length, poisson_ratio)
+    ratio = radius / length
+    rows = _OPERATOR[0] + ratio * _OPERATOR[1] + ratio**2 * _OPERATOR[2]
+    # Strains of the membrane come per 1/r, those of bending per 1/r².
+    shear = 0.5 * (1.0 - poisson_ratio)
+    one, nought = xp.ones_like(shear), xp.zeros_like(shear)
+    plane = xp.stack(
+        [
+            xp.stack([one, poisson_ratio, nought]),
+            xp.stack([poisson_ratio, one, nought]),
+            xp.stack([nought, nought, shear]),
+        ]
+    )
+    membrane, bending = rows[:, :3], rows[:, 3:]
+    thin = wall**2 / (12.0 * radius**2)
+    weight = 0.5 * _GAUSS[1]
+
+    def energy(strain: jax.Array) -> jax.Array:
+        stress = xp.einsum("st,g,ntgj->nsgj", plane, weight, strain)
+        flat = (HARMONICS, -1, 3 * _COUNT)
+        return xp.swapaxes(strain.reshape(flat), 1, 2) @ stress.reshape(flat)
+
+    stiffness = energy(membrane) + thin * energy(bending)
+    held = _HELD[boundary]
+    free = ~held[:, :, None] & ~held[:, None, :]
+    stiffness = xp.where(free, stiffness, np.eye(3 * _COUNT) * held[:, :, None])
+    edge = _EDGE * xp.stack([one, ratio])
+    loads = xp.where(held[:, :, None], 0.0, edge[None])
+    flexibility = xp.swapaxes(loads, 1, 2) @ xp.linalg.solve(stiffness, loads)
+    # Displacements are of order r² per N/mm over E t length; slopes have one r less.
+    unit = xp.stack([radius, one])
+    scale = (1.0 - poisson_ratio**2) / (wall * length)
+    return flexibility * scale * unit[:, None] * unit[None, :]
