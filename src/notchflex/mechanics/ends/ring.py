@@ -107,10 +107,9 @@ def _held(boundary: str) -> np.ndarray:
 _OPERATOR = _operator()
 _HELD = {boundary: _held(boundary) for boundary in BOUNDARIES}
 # Axial displacement and slope at the loaded edge of every polynomial, shape (3 × polynomials, 2).
-_EDGE = np.zeros((3, _COUNT, 2))
-_EDGE[0, :, 0] = _IN_SURFACE[0, 0]
-_EDGE[2, :, 1] = _OUTWARD[1, 0]
-_EDGE = _EDGE.reshape(-1, 2)
+_EDGE = np.zeros((3 * _COUNT, 2))
+_EDGE[:_COUNT, 0] = _IN_SURFACE[0, 0]
+_EDGE[2 * _COUNT :, 1] = _OUTWARD[1, 0]
 
 
 def edge_compliance(
