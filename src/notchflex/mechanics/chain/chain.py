@@ -203,11 +203,12 @@ def laws(part: Material | Friction, shaped: Shaped) -> dict[str, Any]:
     law = section_law(part)
     elastic = _elastic(shaped.alike, law)[shaped.which]
     stiffness = np.einsum("nmm->nm", elastic)
+    linear = law.is_linear and not shaped.alike.section.softens
     contact_stiffness = 1.0 / np.sum(shaped.lip_slope / stiffness, axis=-1)
     return {
         "law": law,
         "stiffness": constant(stiffness),
-        "elastic": constant(elastic) if law.is_linear else None,
+        "elastic": constant(elastic) if linear else None,
         "contact_stiffness": constant(contact_stiffness),
         "closing_force": constant(contact_stiffness @ shaped.height / len(contact_stiffness)),
         "stroke_stiffness": constant(contact_stiffness.sum() / len(contact_stiffness) ** 2),
