@@ -3,6 +3,7 @@
 from notchflex.mechanics.chain.chain import Chain, Shaped, assemble, flexure_states, laws, shape_of
 from notchflex.mechanics.chain.pad import padded
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
+from notchflex.mechanics.chain.sites import sites_of
 from notchflex.mechanics.chain.structure import structural
 
 __all__ = [

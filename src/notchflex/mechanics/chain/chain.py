@@ -209,11 +209,12 @@ def laws(part: Material | Friction, shaped: Shaped) -> dict[str, Any]:
     elastic = _elastic(shaped.alike, law)[shaped.which]
     stiffness = np.einsum("nmm->nm", elastic)
     stop = shaped.rods.stop_flexibility
+    linear = law.is_linear and not shaped.alike.section.softens
     contact_stiffness = 1.0 / np.sum(shaped.lip_slope / stiffness, axis=-1)
     return {
         "law": law,
         "stiffness": constant(stiffness),
-        "elastic": constant(elastic) if law.is_linear else None,
+        "elastic": constant(elastic) if linear else None,
         "contact_stiffness": constant(contact_stiffness),
         "contact_flexibility": None if stop is None else constant(stop / contact_stiffness),
         "closing_force": constant(contact_stiffness @ shaped.height / len(contact_stiffness)),

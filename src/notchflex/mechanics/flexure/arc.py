@@ -17,7 +17,6 @@ import dataclasses
 import numpy as np
 
 from notchflex._jax import constant
-
 from notchflex.mechanics.ends import NotchStiffness, notch_stiffness
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
@@ -33,7 +32,6 @@ from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import SECTION_OF_CUT
 from notchflex.robot import ArcNotch, Tube
-
 
 # Part of the end compliance that follows the material beyond its elastic limit (finite elements).
 MATERIAL_SHARE = 0.25

@@ -7,6 +7,8 @@ to the notch's direction and fills the arrays of a `Rod`.
 
 from __future__ import annotations
 
+import dataclasses
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -150,9 +152,10 @@ def build_rod(
         curve, curve_end = (Motion(*(part[at] for part in axis.curve)) for at in (slice(-1), -1))
         beside = None
 
-    def at_nodes(values: Array) -> Array:
+    def at_nodes(values: Array, own_axes: int = 0) -> Array:
         each = np.asarray(values)
-        return constant(np.full(nodes, each) if each.ndim == 0 else each[:nodes])
+        alike = each.ndim == own_axes
+        return constant(np.broadcast_to(each, (nodes, *each.shape)) if alike else each[:nodes])
 
     return Rod(
         start_rotation=constant(turned @ axis.start.rotation),
@@ -163,7 +166,10 @@ def build_rod(
         end_offset=constant(axis.end.translation),
         **points.fields(curve, modes.basis, beside),
         reference_strain=constant(strain[:nodes]),
-        section=jax.tree.map(at_nodes, section),
+        section=dataclasses.replace(
+            jax.tree.map(at_nodes, dataclasses.replace(section, fibres=None)),
+            fibres=jax.tree.map(partial(at_nodes, own_axes=1), section.fibres),
+        ),
         closure=constant([closure or 0.0, 0.0]),
         has_closure=constant(float(closure is not None)),
         stop_flexibility=constant(stop_flexibility),

@@ -15,7 +15,7 @@ from __future__ import annotations
 from jaxtyping import Array, Float, Int
 
 from notchflex._pytree import Pytree, static
-from notchflex.mechanics.material.law import FibreSection
+from notchflex.mechanics.material.fibre_section import FibreSection
 
 
 class Rod(Pytree):
