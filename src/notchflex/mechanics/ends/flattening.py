@@ -22,9 +22,9 @@ from notchflex.mechanics.section import Section
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
-# Fitted: what a ring imposes at the edge, k = k0 (1 - exp(-(c / (c1 r))²)); factor on Brazier.
-_EDGE = {"between": (0.207, 1.69), "clamped": (0.45, 1.25)}
-_FREE_EDGE = 0.40
+# Fitted between notches: what a ring imposes at the edge, k = k0 (1 - exp(-(c / (c1 r))²)), and a
+# factor on Brazier. First and last notches of wrists are met by the same numbers (6 % to closing).
+_EDGE = (0.207, 1.69)
 _BRAZIER = 0.97
 # One notch alone between two clamped rings, as test specimens are.
 _EDGE_OF_SPECIMEN, _BRAZIER_OF_SPECIMEN = (0.465, 1.51), 0.74
@@ -33,22 +33,6 @@ _EDGE_OF_SPECIMEN, _BRAZIER_OF_SPECIMEN = (0.465, 1.51), 0.74
 def _imposed(factor: float, decay: float, length: jax.Array, radius: jax.Array) -> jax.Array:
     """What a ring of some length imposes at the edge of the notch, k."""
     return -factor * array_module(length, radius).expm1(-((length / (decay * radius)) ** 2))
-
-
-def edge_factor(length: jax.Array, radius: jax.Array, boundary: str) -> jax.Array:
-    """Compute k, what the ring beside a notch imposes on the curvature of the arc.
-
-    Args:
-        length: Uncut length c of the ring, mm.
-        radius: Mean radius r, mm.
-        boundary: "between", "clamped" or "free".
-
-    Returns:
-        k, without unit.
-    """
-    if boundary == "free":
-        return _FREE_EDGE + 0.0 * length
-    return _imposed(*_EDGE[boundary], length, radius)
 
 
 def edge_and_brazier(
@@ -65,12 +49,8 @@ def edge_and_brazier(
         k and c_b.
     """
     specimen = boundaries == ("clamped", "clamped")
-    both = [
-        _imposed(*_EDGE_OF_SPECIMEN, length, radius)
-        if specimen
-        else edge_factor(length, radius, boundary)
-        for length, boundary in zip(lengths, boundaries, strict=True)
-    ]
+    edge = _EDGE_OF_SPECIMEN if specimen else _EDGE
+    both = [_imposed(*edge, length, radius) for length in lengths]
     return 0.5 * (both[0] + both[1]), _BRAZIER_OF_SPECIMEN if specimen else _BRAZIER
 
 
