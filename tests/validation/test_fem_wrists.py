@@ -101,3 +101,15 @@ def test_the_papers_law_is_far_off():
     rigid = replace(path.robot, notch=(replace(path.robot.notch[0], ends="rigid"),))
     found = nf.simulate(rigid, path.load)
     assert (np.degrees(found.total_angle) < 0.7 * theta.sum(1)).all()
+
+
+@pytest.mark.parametrize("case", ["A_lin_mu0_medium", "B_lin_mu0_medium"])
+def test_faces_turn_less_than_rings(case, margin):
+    path, tips, theta = solved(case, nf.Linear(60_000.0))
+    angles = rows("fem_wrist_angles.csv")
+    faces = np.array(
+        [[float(row["theta_edge_deg"]) for row in angles[case, float(tip["F_N"])]] for tip in tips]
+    )
+    ratio = path.edge_angle / path.notch_angle
+    margin.within("middle notches, face over ring angle", (ratio / (faces / theta) - 1)[:, :4], 3e-3)
+    margin.within("last notch, face over ring angle", (ratio / (faces / theta) - 1)[:, 4], 1.5e-2)

@@ -22,7 +22,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     legendre_modes,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import Site, rod
+from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
@@ -35,8 +35,7 @@ _LYING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
 @rod.register
-def _(notch: StripNotch, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
-    del site
+def _(notch: StripNotch, tube: Tube, refinement: int = 0) -> Rod:
     return strip_rod(notch, tube, 5 + refinement, 10 + 3 * refinement, refinement)
 
 

@@ -20,7 +20,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     shifted,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import Site, rod
+from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.u_link_geometry import Course, Link
 from notchflex.mechanics.flexure.wrench_modes import wrench_modes
@@ -35,8 +35,7 @@ POISSON_RATIO = 0.33
 
 
 @rod.register
-def _(notch: ULink, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
-    del site
+def _(notch: ULink, tube: Tube, refinement: int = 0) -> Rod:
     more = (3 + 3 * refinement, 1 + 2 * refinement, (6 + 3 * refinement, 6 + 3 * refinement))
     return u_link_rod(notch, tube, *more)
 
