@@ -144,11 +144,15 @@ def edge_compliance(
     material = xp.stack([one, one * poisson_ratio])
     slopes = xp.stack([one, ratio, ratio**2, ratio**3, ratio**4])
     factors = xp.einsum("a,b,c->abc", parts, material, slopes).ravel()
-    by_power = (factors @ _ENERGIES.reshape(20, -1)).reshape(5, -1)
-    stiffness = (_POWERS @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
     held = _HELD[boundary]
-    free = ~held[:, :, None] & ~held[:, None, :]
-    stiffness = xp.where(free, stiffness, np.eye(3 * _COUNT) * held[:, :, None])
+    free = (~held[:, :, None] & ~held[:, None, :]).astype(float)
+    tables = (_ENERGIES, _POWERS, free, np.eye(3 * _COUNT) * held[:, :, None])
+    if xp is not np:  # else XLA computes with them while it compiles, for minutes
+        tables = jax.lax.optimization_barrier(tables)
+    energies, powers, free, on_held = tables
+    by_power = (factors @ energies.reshape(20, -1)).reshape(5, -1)
+    stiffness = (powers @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
+    stiffness = free * stiffness + on_held
     edge = xp.stack([_EDGE[:, 0] * one, _EDGE[:, 1] * ratio], axis=-1)
     loads = xp.where(held[:, :, None], 0.0, edge[None])
     flexibility = xp.swapaxes(loads, 1, 2) @ xp.linalg.solve(stiffness, loads)
