@@ -73,10 +73,15 @@ class EndCompliance(NamedTuple):
     coupling: jax.Array
 
 
-def _harmonics(arc: Arc) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Fourier coefficients of (N, −M) for bending, bending sideways, tension: (harmonics, 2).
+def arc_harmonics(arc: Arc) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Expand the edge loads of the arc's stress in harmonics.
 
-    Each is for a unit moment or force. `_NORM` holds what the harmonics integrate to.
+    Args:
+        arc: The arc of the notch.
+
+    Returns:
+        Coefficients of (N, −M), shape (harmonics, 2), for a unit moment, a unit moment sideways
+        and a unit tension: in cos nφ, sin nφ, cos nφ.
     """
     xp = array_module(arc.radius)
     r, t, a = arc.radius, arc.wall, arc.half_angle
@@ -127,7 +132,7 @@ def end_compliance(
         The added lengths.
     """
     xp = array_module(outer, inner, ring_length, poisson_ratio)
-    weak, strong, axial = _harmonics(arc)
+    weak, strong, axial = arc_harmonics(arc)
     flexibility = edge_compliance(arc.radius, arc.wall, ring_length, poisson_ratio, boundary)
     weights = _NORM * relaxation
 

@@ -85,8 +85,7 @@ def notch_stiffness(
     """
     numbers = (outer_radius, inner_radius, depth, height, poisson_ratio)
     plain = all(isinstance(value, Real) for value in (*numbers, proximal.length, distal.length))
-    compute: Callable[..., NotchStiffness] = _of_plain_numbers if plain else _compute
-    return compute(*numbers, cut, proximal, distal)
+    return (_of_plain_numbers if plain else _compute)(*numbers, cut, proximal, distal)
 
 
 def _compute(
@@ -138,4 +137,4 @@ def _compute(
 
 
 # Plain numbers are computed by NumPy, once for each set of them.
-_of_plain_numbers = lru_cache(maxsize=1024)(_compute)
+_of_plain_numbers: Callable[..., NotchStiffness] = lru_cache(maxsize=1024)(_compute)

@@ -77,18 +77,24 @@ def _strains() -> np.ndarray:
     return factors
 
 
-def _operator() -> np.ndarray:
-    """Strains at the Gauss points of every polynomial, for r = 1 and z / r = x.
+def _energies() -> np.ndarray:
+    """Integrate the products of strains that the energy is made of, for r = 1.
 
     Returns:
-        Array (derivative, harmonic, strain, point, displacement × polynomial), to be divided by
-        the power `derivative` of length / radius.
+        Array (part, power of ν, power of radius / length, power of n, row, column): the stiffness
+        of displacements × polynomials. Parts are the membrane and bending.
     """
-    n = np.arange(HARMONICS, dtype=float)
-    by_harmonic = np.einsum("pn,pdsk->dnsk", n ** np.arange(3.0)[:, None], _strains())
+    size = 3 * _COUNT
     tables = np.stack([_IN_SURFACE, _IN_SURFACE, _OUTWARD])[:, :, 1:]
-    shape = (3, HARMONICS, 6, _COUNT, 3 * _COUNT)
-    return np.einsum("dnsk,kdgi->dnsgki", by_harmonic, tables).reshape(shape)
+    strains = np.einsum("pdsk,kdgi->pdsgki", _strains(), tables).reshape(3, 3, 6, _COUNT, size)
+    plane = np.array([np.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
+    found = np.zeros((2, 2, 5, 5, size, size))
+    for part, of in enumerate((strains[:, :, :3], strains[:, :, 3:])):
+        stresses = np.einsum("mst,g,pdtgj->mpdsgj", plane, 0.5 * _GAUSS[1], of)
+        for p, d, q, e in np.ndindex(3, 3, 3, 3):
+            product = np.einsum("sgi,msgj->mij", of[p, d], stresses[:, q, e])
+            found[part, :, d + e, p + q] += product
+    return found
 
 
 def _held(boundary: str) -> np.ndarray:
@@ -104,7 +110,8 @@ def _held(boundary: str) -> np.ndarray:
     return held.reshape(HARMONICS, -1)
 
 
-_OPERATOR = _operator()
+_ENERGIES = _energies()
+_POWERS = np.arange(HARMONICS, dtype=float)[:, None] ** np.arange(5)
 _HELD = {boundary: _held(boundary) for boundary in BOUNDARIES}
 # Axial displacement and slope at the loaded edge of every polynomial, shape (3 × polynomials, 2).
 _EDGE = np.zeros((3 * _COUNT, 2))
@@ -131,34 +138,25 @@ def edge_compliance(
     """
     xp = array_module(radius, wall, length, poisson_ratio)
     ratio = radius / length
-    rows = _OPERATOR[0] + ratio * _OPERATOR[1] + ratio**2 * _OPERATOR[2]
+    one = xp.ones_like(ratio)
     # Strains of the membrane come per 1/r, those of bending per 1/r².
-    shear = 0.5 * (1.0 - poisson_ratio)
-    one, nought = xp.ones_like(shear), xp.zeros_like(shear)
-    plane = xp.stack(
-        [
-            xp.stack([one, poisson_ratio, nought]),
-            xp.stack([poisson_ratio, one, nought]),
-            xp.stack([nought, nought, shear]),
-        ]
-    )
-    membrane, bending = rows[:, :3], rows[:, 3:]
-    thin = wall**2 / (12.0 * radius**2)
-    weight = 0.5 * _GAUSS[1]
-
-    def energy(strain: jax.Array) -> jax.Array:
-        stress = xp.einsum("st,g,ntgj->nsgj", plane, weight, strain)
-        flat = (HARMONICS, -1, 3 * _COUNT)
-        return xp.swapaxes(strain.reshape(flat), 1, 2) @ stress.reshape(flat)
-
-    stiffness = energy(membrane) + thin * energy(bending)
+    parts = xp.stack([one, wall**2 / (12.0 * radius**2)])
+    material = xp.stack([one, one * poisson_ratio])
+    slopes = xp.stack([one, ratio, ratio**2, ratio**3, ratio**4])
+    factors = xp.einsum("a,b,c->abc", parts, material, slopes).ravel()
     held = _HELD[boundary]
-    free = ~held[:, :, None] & ~held[:, None, :]
-    stiffness = xp.where(free, stiffness, np.eye(3 * _COUNT) * held[:, :, None])
-    edge = _EDGE * xp.stack([one, ratio])
+    free = (~held[:, :, None] & ~held[:, None, :]).astype(float)
+    tables = (_ENERGIES, _POWERS, free, np.eye(3 * _COUNT) * held[:, :, None])
+    if xp is not np:  # else XLA computes with them while it compiles, for minutes
+        tables = jax.lax.optimization_barrier(tables)
+    energies, powers, free, on_held = tables
+    by_power = (factors @ energies.reshape(20, -1)).reshape(5, -1)
+    stiffness = (powers @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
+    stiffness = free * stiffness + on_held
+    edge = xp.stack([_EDGE[:, 0] * one, _EDGE[:, 1] * ratio], axis=-1)
     loads = xp.where(held[:, :, None], 0.0, edge[None])
     flexibility = xp.swapaxes(loads, 1, 2) @ xp.linalg.solve(stiffness, loads)
     # Displacements are of order r² per N/mm over E t length; slopes have one r less.
     unit = xp.stack([radius, one])
     scale = (1.0 - poisson_ratio**2) / (wall * length)
-    return flexibility * scale * unit[:, None] * unit[None, :]
+    return flexibility * (scale * xp.outer(unit, unit)[None])
