@@ -111,5 +111,6 @@ def test_faces_turn_less_than_rings(case, margin):
         [[float(row["theta_edge_deg"]) for row in angles[case, float(tip["F_N"])]] for tip in tips]
     )
     ratio = path.edge_angle / path.notch_angle
-    margin.within("middle notches, face over ring angle", (ratio / (faces / theta) - 1)[:, :4], 3e-3)
-    margin.within("last notch, face over ring angle", (ratio / (faces / theta) - 1)[:, 4], 1.5e-2)
+    error = ratio / (faces / theta) - 1
+    margin.within("face over ring angle, middle notches", error[:, :4], 3e-3)
+    margin.within("face over ring angle, last notch", error[:, 4], 1.5e-2)

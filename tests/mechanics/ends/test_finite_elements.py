@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from notchflex.mechanics.ends import Side, flattening, notch_stiffness, validity
+from notchflex.mechanics.ends import Side, notch_stiffness, validity
 from notchflex.mechanics.section import SECTION_OF_CUT
 from reference_data import named_rows
 
@@ -100,7 +100,8 @@ def test_moment_to_closing(depth, allowed, margin):
         second = SECTION_OF_CUT["off-axis"](0.81, 0.7, depth).second_moment_weak
         tube = 2 * row["ring"] / (np.pi / 4 * (0.81**4 - 0.7**4))  # the two rings as beams
         angle = np.radians(row["theta_deg"]) - row["moment"] / YOUNG * tube
-        found = YOUNG * second / law.weak * flattening.moment(angle, law.alpha, law.beta)
+        flattening = 1.0 + law.alpha * angle / 2 + law.beta * angle**2 / 2
+        found = YOUNG * second / law.weak * angle / flattening**2
         error.append(found / row["moment"] - 1)
     margin.within(
         f"moment of a notch {depth} mm deep, relative", 100 * np.array(error), allowed, "%"
@@ -129,7 +130,7 @@ def test_validity_names_what_is_left():
         "solid strip": (0.58, 0.43, "off-axis", 1.044, 0.5),
         "between notches": (0.81, 0.7, "on-axis", 1.05, 0.8),
         "moment": (0.81, 0.75, "on-axis", 1.4, 0.8),
-        "0.16": (0.81, 0.7, "on-axis", 1.4, 0.12),
+        "0.159": (0.81, 0.7, "on-axis", 1.4, 0.12),
     }
     for word, notch in said.items():
         assert any(word in text for text in validity(*notch, ring, ring)), word

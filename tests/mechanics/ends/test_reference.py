@@ -26,13 +26,13 @@ def test_every_row(margin):
     errors = {}
     for row in ROWS:
         outer, inner, section, arc, boundary = parts(row)
-        side = (outer, inner, arc, row["shell_length"], row["nu"], boundary)
+        gap = row["shell_length"] * (2.0 if boundary == "between" else 1.0)
+        side = (outer, inner, arc, Side(boundary, gap), row["nu"])
         relaxed, bound = end_compliance(*side), end_compliance(*side, UPPER_BOUND)
         low = end_compliance(*side, np.where(np.arange(ring.HARMONICS) < 2, 1.0, 0.0))
         outer_angle, phi, brazier = flattening.flattening_numbers(
             outer, inner, row["cut"], row["depth"], row["nu"], section
         )
-        gap = row["shell_length"] * (2.0 if boundary == "between" else 1.0)
         found = {
             "a": arc.half_angle,
             "d_01": low.weak,
@@ -45,7 +45,7 @@ def test_every_row(margin):
             "phi": phi,
             # φ and B are over I, in that file by quadrature (1e-5 for segments).
             "B / phi": brazier / phi,
-            "k": flattening.edge_factor(gap, arc.radius, "between"),
+            "k": flattening.edge_and_brazier(arc.radius, (Side("between", gap),) * 2)[0],
         }
         for name, value in found.items():
             wanted = row["B"] / row["phi"] if name == "B / phi" else row[name]

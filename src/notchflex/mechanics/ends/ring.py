@@ -18,9 +18,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex._jax import array_module, jax
-from notchflex.mechanics.ends.side import BOUNDARIES
-
 HARMONICS = 41  # n = 0 ... 40
 _DEGREE = 18
 _COUNT = _DEGREE + 1  # polynomials of each displacement
@@ -112,7 +109,7 @@ def _held(boundary: str) -> np.ndarray:
 
 _ENERGIES = _energies()
 _POWERS = np.arange(HARMONICS, dtype=float)[:, None] ** np.arange(5)
-_HELD = {boundary: _held(boundary) for boundary in BOUNDARIES}
+_HELD = {boundary: _held(boundary) for boundary in ("between", "clamped", "free")}
 # Axial displacement and slope at the loaded edge of every polynomial, shape (3 × polynomials, 2).
 _EDGE = np.zeros((3 * _COUNT, 2))
 _EDGE[:_COUNT, 0] = _IN_SURFACE[0, 0]
@@ -120,8 +117,8 @@ _EDGE[2 * _COUNT :, 1] = _OUTWARD[1, 0]
 
 
 def edge_compliance(
-    radius: jax.Array, wall: jax.Array, length: jax.Array, poisson_ratio: jax.Array, boundary: str
-) -> jax.Array:
+    radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
+) -> np.ndarray:
     """Compute how edge loads of each harmonic move the edge that they act on.
 
     Args:
@@ -136,27 +133,22 @@ def edge_compliance(
         Displacement away from the ring and slope of the outward displacement along z, per unit of
         tension and of moment in N/mm and N with a Young's modulus of 1, shape (harmonics, 2, 2).
     """
-    xp = array_module(radius, wall, length, poisson_ratio)
     ratio = radius / length
-    one = xp.ones_like(ratio)
+    one = 1.0
     # Strains of the membrane come per 1/r, those of bending per 1/r².
-    parts = xp.stack([one, wall**2 / (12.0 * radius**2)])
-    material = xp.stack([one, one * poisson_ratio])
-    slopes = xp.stack([one, ratio, ratio**2, ratio**3, ratio**4])
-    factors = xp.einsum("a,b,c->abc", parts, material, slopes).ravel()
+    parts = np.stack([one, wall**2 / (12.0 * radius**2)])
+    material = np.stack([one, one * poisson_ratio])
+    slopes = np.stack([one, ratio, ratio**2, ratio**3, ratio**4])
+    factors = np.einsum("a,b,c->abc", parts, material, slopes).ravel()
     held = _HELD[boundary]
     free = (~held[:, :, None] & ~held[:, None, :]).astype(float)
-    tables = (_ENERGIES, _POWERS, free, np.eye(3 * _COUNT) * held[:, :, None])
-    if xp is not np:  # else XLA computes with them while it compiles, for minutes
-        tables = jax.lax.optimization_barrier(tables)
-    energies, powers, free, on_held = tables
-    by_power = (factors @ energies.reshape(20, -1)).reshape(5, -1)
-    stiffness = (powers @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
-    stiffness = free * stiffness + on_held
-    edge = xp.stack([_EDGE[:, 0] * one, _EDGE[:, 1] * ratio], axis=-1)
-    loads = xp.where(held[:, :, None], 0.0, edge[None])
-    flexibility = xp.swapaxes(loads, 1, 2) @ xp.linalg.solve(stiffness, loads)
+    by_power = (factors @ _ENERGIES.reshape(20, -1)).reshape(5, -1)
+    stiffness = (_POWERS @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
+    stiffness = free * stiffness + np.eye(3 * _COUNT) * held[:, :, None]
+    edge = np.stack([_EDGE[:, 0] * one, _EDGE[:, 1] * ratio], axis=-1)
+    loads = np.where(held[:, :, None], 0.0, edge[None])
+    flexibility = np.swapaxes(loads, 1, 2) @ np.linalg.solve(stiffness, loads)
     # Displacements are of order r² per N/mm over E t length; slopes have one r less.
-    unit = xp.stack([radius, one])
+    unit = np.stack([radius, one])
     scale = (1.0 - poisson_ratio**2) / (wall * length)
-    return flexibility * (scale * xp.outer(unit, unit)[None])
+    return flexibility * (scale * np.outer(unit, unit)[None])
