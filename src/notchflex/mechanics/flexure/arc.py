@@ -45,20 +45,17 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
     closure, stop = tube.outer_radius + centroid, 0.0
     if site is not None:
         outer, inner, depth = shape
-        stiffness = notch_stiffness(
+        law = notch_stiffness(
             outer, inner, notch.cut, depth, notch.height,
             site.poisson_ratio, site.proximal, site.distal,
         )  # fmt: skip
         if notch.closing == "elastic":
-            closure /= float(stiffness.closing_factor)
-            stop = 1.0 / float(stiffness.closed_ratio)
-    if site is not None and notch.ends == "shell":
-        centroid -= float(stiffness.coupling / stiffness.weak)
-        section = dataclasses.replace(
-            section,
-            shear_centre=constant(stiffness.shear_centre - centroid),
-            ends=_ends(stiffness, notch.height),
-        )
+            closure, stop = closure / law.closing_factor, 1.0 / law.closed_ratio
+        if notch.ends == "shell":
+            centroid -= law.coupling / law.weak
+            centre = constant(law.shear_centre - centroid)
+            ends = _ends(law, notch.height)
+            section = dataclasses.replace(section, shear_centre=centre, ends=ends)
     # Smooth all along: one piece, with a node in its middle. With six nodes a notch that bends by a
     # radian in its plane is right to 1e-15; the turns of one that also bends sideways and twists
     # need ten for 3e-8.
