@@ -17,9 +17,8 @@ from notchflex.fit.estimation.intervals import Interval
 from notchflex.fit.estimation.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
 from notchflex.fit.fitted_robots import write_fitted
 from notchflex.fit.friction_rig.constancy import Constancy, constancy
-from notchflex.fit.friction_rig.documents import friction_document
 from notchflex.fit.friction_rig.readings import FrictionReadings, read_friction_rig
-from notchflex.fit.friction_rig.rig import FrictionRig, friction_rig
+from notchflex.fit.friction_rig.rig import FrictionRig, friction_document, friction_rig
 from notchflex.fit.friction_rig.two_weights import coefficient_from_weights, weight_held
 from notchflex.fit.measurements.csv import read_measurements
 from notchflex.fit.measurements.measurements import Measurements
