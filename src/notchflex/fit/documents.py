@@ -271,12 +271,9 @@ def _errors(found: Calibration) -> list[dict[str, Any]]:
 def _searches(found: Calibration) -> list[dict[str, Any]]:
     return [
         {
+            **one._asdict(),
             "values": dict(zip(found.names, one.values.tolist(), strict=True)),
             "cost": None if one.cost is None else one.cost.value,
-            "converged": one.converged,
-            "reason": one.reason,
-            "iterations": one.iterations,
-            "calls": one.calls,
         }
         for one in found.searches
     ]

@@ -85,9 +85,6 @@ def next_measurement(
         observed: Quantities that would be measured; as so far by default.
         deviation: Their noise (rad, mm, N) by quantity; as so far by default.
 
-    Returns:
-        Interval widths after over before, for each candidate.
-
     Raises:
         InputError: There is no such robot, constant or quantity, its noise is not known, or no
             candidate has a solution.

@@ -84,9 +84,6 @@ def sample_posterior(
         seed: Seed of the draws.
         progress: Called with the name of the task, how much of it is done, and how much there is.
 
-    Returns:
-        The draws, and how far to trust them.
-
     Raises:
         InputError: The objective is no likelihood, the data do not determine a constant or the
             noise, the numbers are too small, or numpyro is not installed (extra `bayes`).

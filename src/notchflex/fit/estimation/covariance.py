@@ -48,13 +48,9 @@ def by_pulls(
     pull: Int[np.ndarray, " r"],
     by_rows: Float[np.ndarray, "k k"],
 ) -> ByPulls:
-    """Estimate the uncertainty of constants from the scatter between pulls.
+    """Estimate the uncertainty of constants at a minimum from the scatter between pulls.
 
-    Args:
-        cost: The objective at its minimum.
-        slopes: Derivatives of the residuals by the constants.
-        pull: Pull of every residual.
-        by_rows: Covariance of the constants if all rows were independent.
+    `by_rows` is their covariance if all rows were independent.
     """
     labels, which = np.unique(pull, return_inverse=True)
     count, size = len(labels), slopes.shape[1]

@@ -47,11 +47,9 @@ class Interval:
 
 
 def allowed_rise(freedom: int | None, level: float = LEVEL) -> float:
-    """Return the rise of twice the misfit that chance allows, by chi squared or F.
+    """Return the rise of twice the misfit that chance allows.
 
-    Args:
-        freedom: Degrees of freedom that the noise was estimated with; None if it is known.
-        level: Confidence.
+    By chi squared if the noise is known, else by F with the degrees of freedom of its estimate.
     """
     return float(chi2.ppf(level, 1) if freedom is None else f.ppf(level, 1, max(freedom, 1)))
 
@@ -77,11 +75,9 @@ class Profile:
     upper: Vector
 
     def interval(self, *, rise: float, scale: float) -> Interval:
-        """Return the interval of the constant.
+        """Return the interval for an allowed rise of twice the misfit.
 
-        Args:
-            rise: Allowed rise of twice the misfit.
-            scale: Typical size of the constant's changes, if its curvature gives none.
+        `scale` is a typical size of the constant's changes, if its curvature gives none.
         """
         points: dict[float, float] = {float(self.best[self.number]): 0.0}
         ends: list[float | None] = []

@@ -67,14 +67,9 @@ Objective = Callable[[Vector], Cost | None]
 def minimise(
     objective: Objective, start: Vector, lower: Vector, upper: Vector, *, tolerance: float = 1e-10
 ) -> Minimum:
-    """Search for a minimum from a start.
+    """Search for a minimum from a start, within limits; equal limits hold a value.
 
-    Args:
-        objective: The function.
-        start: Values to begin with.
-        lower: Least values allowed.
-        upper: Greatest values allowed; equal to the least for a value that is held.
-        tolerance: Stop if a step lowers the objective by less than this part of it.
+    The search stops if a step lowers the objective by less than `tolerance` of it.
 
     Example:
         >>> def bowl(at):

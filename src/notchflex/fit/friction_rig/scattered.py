@@ -107,16 +107,7 @@ def outliers(x: Design, y: Vector, known: Vector, level: float = 0.05) -> tuple[
 
     The farthest is removed and the others are fitted again, repeatedly, so that several outliers do
     not hide each other. Up to a quarter of the numbers can be found; of fewer than 15 one, for
-    which the test is exact.
-
-    Args:
-        x: Columns of the model.
-        y: The numbers.
-        known: Their known variances.
-        level: Probability to find any if there is none.
-
-    Returns:
-        Their indices, rising.
+    which the test is exact. `level` is the probability to find any if there is none.
     """
     left = np.arange(len(y))
     removed: list[int] = []

@@ -71,14 +71,10 @@ class MeasuredColumn:
         return self.name.endswith("_deg")
 
 
-def columns(notches: int, tendons: int, axis_at: Sequence[float]) -> Iterator[MeasuredColumn]:
-    """Yield all columns that measurements of a robot may have.
-
-    Args:
-        notches: Number of notches.
-        tendons: Number of tendons; a single one goes without its number.
-        axis_at: Distances of the points on the axis from the base, mm.
-    """
+def measured_columns(
+    notches: int, tendons: int, axis_at: Sequence[float]
+) -> Iterator[MeasuredColumn]:
+    """Yield all columns that measurements of a robot may have; a single tendon has no number."""
     for notch in range(notches):
         name = QUANTITIES["notch_angle"].header(notch=notch + 1)
         yield MeasuredColumn(name, "notch_angle", (notch,))

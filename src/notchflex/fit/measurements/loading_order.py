@@ -83,12 +83,7 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
 
     A command that only rises within its pull is a pull from rest. One that falls step by step is
     unloading: the rows of each pull are one path. One that rises step by step and falls in one step
-    to where it began is the next pull from rest.
-
-    Args:
-        commands: Commands, P values each.
-        pull: Label of the pull of every row; None if the table has none.
-        rows: P.
+    to where it began is the next pull from rest. `pull` holds the labels of the rows, if known.
 
     Example:
         >>> up, loop = np.array([0.0, 1.0, 2.0, 0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0, 1.0, 0.0])
@@ -133,12 +128,7 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
 def branches(commands: Sequence[Command], pull: Sequence[str]) -> Int[np.ndarray, " p"]:
     """Distinguish loading rows (1) and unloading rows (-1) of every pull, in their order.
 
-    Args:
-        commands: As for `loading_order`.
-        pull: Label of the pull of every row.
-
-    Returns:
-        P numbers; 0 where one tendon is loaded while another one is unloaded.
+    0 stands where one tendon is loaded while another one is unloaded.
 
     Example:
         >>> loop = np.array([0.0, 1.0, 2.0, 1.0, 0.0])

@@ -62,12 +62,7 @@ def repeats(measurements: Measurements, *, step: float | None = None) -> dict[st
 def repeats_of_each(measurements: Measurements, *, step: float | None = None) -> dict[str, Numbers]:
     """Estimate as `repeats` does, for every notch, coordinate or tendon by itself.
 
-    Args:
-        measurements: The rows.
-        step: As for `repeats`.
-
-    Returns:
-        By name, in the shape of a row of the quantity.
+    Arguments are those of `repeats`; the arrays have the shape of a row of the quantity.
     """
     commands = _commands(measurements)
     histories = _histories(measurements, commands)
@@ -200,16 +195,15 @@ def _between(values: Numbers, comparable: list[list[Curve]]) -> float:
         if len(means) < 2:
             continue
         knots = np.unique(np.concatenate([loads for loads, _ in means]))
-        for low, high in pairwise(knots):
+        for low, high in pairwise(knots.tolist()):
             covering = [one for one in means if one[0][0] <= low and high <= one[0][-1]]
             if len(covering) < 2:
                 continue
             # Between knots every pull is a straight line: Simpson's rule is exact for the squares.
             at = np.array([low, 0.5 * (low + high), high])
-            table = np.stack([np.interp(at, *one) for one in covering])
-            squares = np.sum((table - table.mean(axis=0)) ** 2, axis=0)
-            total += float(high - low) * float(squares @ [1.0, 4.0, 1.0]) / 6.0
-            freedom += float(high - low) * (len(covering) - 1)
+            squares = np.var([np.interp(at, *one) for one in covering], axis=0) * len(covering)
+            total += (high - low) * float(squares @ [1.0, 4.0, 1.0]) / 6.0
+            freedom += (high - low) * (len(covering) - 1)
     return total / freedom if freedom else float("nan")
 
 

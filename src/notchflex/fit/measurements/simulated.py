@@ -45,15 +45,11 @@ def simulate_measurements(
         robot: The robot.
         load: The loads, P steps.
         observed: What is measured, by the names of `Measurements.observed`.
-        deviation: Standard deviation of the noise, rad, mm or N, by the same names; the other
-            quantities have no noise, and no deviation in the result.
+        deviation: Standard deviation of the noise, rad, mm or N, by the same names; 0 by default.
         seed: Seed of the noise, or a random generator.
         axis_at: Distances of the points on the axis from the base, mm; for "axis_points".
         pull: Label of the pull of every step; one pull by default.
         from_rest: True if every step is a pull from rest, False if each pull is one path.
-
-    Returns:
-        The measurements.
 
     Raises:
         InputError: An unknown name, a deviation that is not positive, a point beyond the robot.
@@ -69,7 +65,7 @@ def simulate_measurements(
     noise = dict(deviation or {})
     _check_noise(observed, noise)
     path = load_path(load, robot.number_of_tendons)
-    labels = ("1",) * len(path) if pull is None else tuple(str(label) for label in pull)
+    labels = ("1",) * len(path) if pull is None else tuple(map(str, pull))
     check_labels(labels, len(path), "steps")
     random = np.random.default_rng(seed)
 
@@ -100,18 +96,9 @@ def solved_rows(
     from_rest: bool,
     read: Callable[[EquilibriumPath], Mapping[str, NDArray[Any]]],
 ) -> dict[str, NDArray[Any]]:
-    """Solve every row, from rest or as a step of the path of its pull.
+    """Solve P rows, from rest or as steps of the paths of their pulls, and read arrays by name.
 
-    Args:
-        robot: The robot.
-        load: P steps.
-        pull: Label of the pull of every step.
-        from_rest: True if every step is loaded from rest, False if each pull is one path.
-        read: Returns arrays by name, steps as leading axis, of solved states; some of these may
-            not have converged.
-
-    Returns:
-        What `read` returns, P rows as leading axis.
+    `read` returns arrays of solved states, steps as leading axis; some may not have converged.
     """
     if from_rest:
         return dict(read(solve_each(robot, load)))
@@ -128,16 +115,7 @@ def solved_rows(
 def modelled(
     path: EquilibriumPath, observed: Sequence[str], axis_at: ArrayLike = ()
 ) -> dict[str, NDArray[np.float64]]:
-    """Return what would be measured on solved states, by the names of `Measurements.observed`.
-
-    Args:
-        path: The states, s steps.
-        observed: Names of the quantities.
-        axis_at: Distances of the points on the axis from the base, mm.
-
-    Returns:
-        By name, steps as leading axis, in the shapes of `Measurements.observed`.
-    """
+    """Return what would be measured on solved states, as in `Measurements.observed`."""
     derived: dict[str, Callable[[], Any]] = {
         "tip_rotation": lambda: Rotation.from_matrix(path.tip_rotation).as_rotvec(),
         "tip_tension": lambda: _tip_tension(path),

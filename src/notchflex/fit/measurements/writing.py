@@ -10,17 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.errors import InputError
-from notchflex.fit.measurements.columns import (
-    BASE_TURN,
-    BODY_FOLLOWING,
-    BODY_VECTORS,
-    FOLLOWING,
-    FROM_REST,
-    PULL,
-    TIP_MASS,
-    TIP_VECTORS,
-    columns,
-)
+from notchflex.fit.measurements import columns
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.loads import BodyForce
 from notchflex.results.files.csv import write_csv
@@ -41,9 +31,9 @@ def write_measurements(measurements: Measurements, target: str | Path) -> None:
         InputError: The file cannot be written, or a table cannot hold the loads: several forces on
             one body, gravity or a commanded tendon in some rows only.
     """
-    table = {PULL[0]: list(measurements.pull)} | _commands(measurements)
+    table = {columns.PULL[0]: list(measurements.pull)} | _commands(measurements)
     table |= _external(measurements) | _observed(measurements)
-    table[FROM_REST] = [measurements.from_rest] * len(measurements)
+    table[columns.FROM_REST] = [measurements.from_rest] * len(measurements)
     write_csv(target, list(table), zip(*table.values(), strict=True))
 
 
@@ -87,7 +77,7 @@ def _observed(measurements: Measurements) -> dict[str, Any]:
     notches = observed["notch_angle"].shape[1] if "notch_angle" in observed else 0
     tendons = measurements.measured_tension.shape[1]
     table: dict[str, Any] = {}
-    for column in columns(notches, tendons, measurements.axis_at.tolist()):
+    for column in columns.measured_columns(notches, tendons, measurements.axis_at.tolist()):
         for tables, name in ((observed, column.name), (deviation, column.deviation)):
             if column.quantity not in tables:
                 continue
@@ -107,15 +97,15 @@ def _external(measurements: Measurements) -> dict[str, Any]:
         raise InputError.UNSUPPORTED(
             "gravity is given in some rows only; give it in all or in none"
         )
-    for name, pattern in TIP_VECTORS.items():
+    for name, pattern in columns.TIP_VECTORS.items():
         rows = [getattr(one, name) for one in loads]
         # Gravity of 0 differs from no gravity given, with which a mass hangs.
         if rows[0] is not None and (name == "gravity" or np.any(rows)):
             table |= _vector(pattern, rows)
     if any(one.following for one in loads):
-        table[FOLLOWING] = [one.following for one in loads]
+        table[columns.FOLLOWING] = [one.following for one in loads]
     if any(one.tip_mass for one in loads):
-        table[TIP_MASS] = [one.tip_mass for one in loads]
+        table[columns.TIP_MASS] = [one.tip_mass for one in loads]
     for body in sorted({force.body for one in loads for force in one.body_forces}):
         of_body = [[force for force in one.body_forces if force.body == body] for one in loads]
         if max(map(len, of_body)) > 1:
@@ -123,15 +113,15 @@ def _external(measurements: Measurements) -> dict[str, Any]:
                 f"several forces act on body {body}; a table has room for one"
             )
         forces = [one[0] if one else BodyForce(body, (0.0, 0.0, 0.0)) for one in of_body]
-        for name, pattern in BODY_VECTORS.items():
+        for name, pattern in columns.BODY_VECTORS.items():
             rows = [getattr(force, name) for force in forces]
             if np.any(rows):
                 table |= _vector(pattern, rows, b=body)
         if any(force.following for force in forces):
-            table[BODY_FOLLOWING.format(b=body)] = [force.following for force in forces]
+            table[columns.BODY_FOLLOWING.format(b=body)] = [force.following for force in forces]
     turn = measurements.load.base_rotation
     if turn.any():
-        table |= _vector(BASE_TURN, [exactly_in_degrees(turn)] * len(loads))
+        table |= _vector(columns.BASE_TURN, [exactly_in_degrees(turn)] * len(loads))
     return table
 
 

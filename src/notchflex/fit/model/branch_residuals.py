@@ -22,19 +22,12 @@ _EXACT, _SHARE = 1e-9, 0.5
 def branch_difference(
     off: Float[np.ndarray, " p"], branch: Int[np.ndarray, " p"]
 ) -> tuple[float, float] | None:
-    """Compare the means of both branches.
+    """Compare measurement less model on loading rows (1) and unloading rows (-1).
 
-    They differ if neighbouring rows scatter by much less (Student's t with the scatter of second
-    differences, von Neumann 1941), or if ranks say so (Mann and Whitney 1947) where the hysteresis
-    is large in some rows only; and by no less than half of what the model misses in all.
-
-    Args:
-        off: Measurement less model of every row; NaN where nothing was measured.
-        branch: 1 for loading rows, -1 for unloading rows, as `Measurements.branches`.
-
-    Returns:
-        Means of the loading and of the unloading rows; None if they differ by no more than chance,
-        or a branch has too few rows.
+    The means differ if neighbouring rows scatter by much less (Student's t with the scatter of
+    second differences, von Neumann 1941), or by ranks (Mann and Whitney 1947) if the hysteresis is
+    large in some rows only; and by no less than half of what the model misses in all. Return both
+    means; None if they do not differ, or a branch has too few rows.
 
     Example:
         >>> off = np.array([-1.0, -1.1, -0.9, -1.0, -1.1, 1.0, 1.2, 0.9, 1.0, 1.1])
@@ -60,13 +53,7 @@ def branch_difference(
 def branch_words(
     off: Float[np.ndarray, " p"], quantity: str, measured: Measurements
 ) -> tuple[str, ...]:
-    """Say how the branches differ, and what to do; nothing if they do not.
-
-    Args:
-        off: Measurement less model of every row, rad.
-        quantity: Name of the quantity.
-        measured: The measurements.
-    """
+    """Say how measurement less model (rad) differs between the branches, and what to do."""
     means = branch_difference(off, measured.branches)
     if means is None:
         return ()

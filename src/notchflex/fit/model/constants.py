@@ -129,11 +129,7 @@ class Unknown:
 def unknowns(
     robots: Mapping[str, Robot], fit: Sequence[str | Constant] | str
 ) -> tuple[Unknown, ...]:
-    """Return the constants of a fit.
-
-    Args:
-        robots: The robots by label.
-        fit: Names or constants.
+    """Return the constants of a fit of robots by label.
 
     Raises:
         InputError: A name is unknown, is given twice, or belongs to no robot.

@@ -30,12 +30,9 @@ _BODIES = ("body_position", "body_rotation")
 
 
 class Predicted(NamedTuple):
-    """Outputs at every row, in the world.
+    """Outputs at every row, in the world, by name; rows are the leading axis.
 
-    Attributes:
-        values: By name, rows as leading axis.
-        converged: Whether each row was solved, (P,).
-        slopes: By name, numbers and then rows as leading axes; empty if a row was not solved.
+    `slopes` are derivatives, with the numbers in front; empty if a row was not solved.
     """
 
     values: dict[str, np.ndarray]
@@ -76,10 +73,7 @@ class Sample:
         return self.robot.with_values(of_robot) if of_robot else self.robot
 
     def predict(self, values: Float[np.ndarray, " k"]) -> Predicted:
-        """Return outputs at every row, and their derivatives by the numbers that vary.
-
-        Args:
-            values: Values of all constants.
+        """Return outputs at every row for values of all constants.
 
         Raises:
             InputError: The robot cannot have them.

@@ -74,11 +74,7 @@ class Samples:
         return tuple(dict.fromkeys(name for one in self.every for name in one.measured.observed))
 
     def residuals(self, values: Float[np.ndarray, " k"]) -> Residuals | None:
-        """Return model less measurement; None if no robot has these values, or a row is unsolved.
-
-        Args:
-            values: Values of the constants.
-        """
+        """Return model less measurement; None if no robot has the values, or a row is unsolved."""
         self.failed, self.refused = [], ""
         residuals: list[np.ndarray] = []
         slopes: list[np.ndarray] = []
