@@ -244,6 +244,14 @@ def test_angles_read_from_a_file_are_written_as_they_were(degrees):
     np.testing.assert_array_equal(np.radians(exactly_in_degrees(angle)), angle)
 
 
+def test_points_near_the_base_are_written_without_an_exponent(tmp_path, robot):
+    load = nf.pull(0.5, 0.5, steps=1)
+    data = simulate_measurements(robot, load, observed=["axis_points"], axis_at=[1e-5, 2.5])
+    write_measurements(data, tmp_path / "x.csv")
+    assert "axis_0.00001_x_mm" in (tmp_path / "x.csv").read_text(encoding="utf-8")
+    assert read_measurements(tmp_path / "x.csv", robot) == data
+
+
 def test_weightless_is_not_the_same_as_hanging(tmp_path, robot):
     path = nf.pull(0.5, 0.5, steps=1).loaded(tip_mass=1.0, gravity=(0.0, 0.0, 0.0))
     data = Measurements("x", path, ("1",), True, {"total_angle": np.array([0.5])})

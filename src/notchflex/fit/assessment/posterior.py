@@ -85,8 +85,8 @@ def sample_posterior(
         progress: Called with the name of the task, how much of it is done, and how much there is.
 
     Raises:
-        InputError: The objective is no likelihood, the data do not determine a constant or the
-            noise, the numbers are too small, or numpyro is not installed (extra `bayes`).
+        InputError: The objective is no likelihood, the data are too few, a number is too small, or
+            numpyro is not installed (extra `bayes`).
     """
     _check(found)
     if draws < LEAST_DRAWS or chains < 1 or warm_up < 0:
@@ -116,10 +116,9 @@ def sample_posterior(
         if progress is not None:
             progress("drawing", chain + 1, chains)
     drawn = np.stack(every)
-    effective, unlike = (
-        {name: float(of(drawn[..., number])) for number, name in enumerate(found.names)}
-        for of in (diagnostics.effective_sample_size, diagnostics.split_gelman_rubin)
-    )
+    by_name = list(zip(found.names, np.moveaxis(drawn, -1, 0), strict=True))
+    effective = {name: float(diagnostics.effective_sample_size(one)) for name, one in by_name}
+    unlike = {name: float(diagnostics.split_gelman_rubin(one)) for name, one in by_name}
     return Posterior(found.names, drawn, effective, unlike, divergent)
 
 

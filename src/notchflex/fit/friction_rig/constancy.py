@@ -72,11 +72,10 @@ def constancy(readings: FrictionReadings) -> Constancy:
         (False, -0.01)
     """
     x = design(readings)
-    turns, loads = (bool(np.ptp(column) > _VARIES) for column in x.T[1:])
-    used = [0, *([1] if turns else []), *([2] if loads else [])]
+    used = [0, *np.flatnonzero(np.ptp(x, axis=0) > _VARIES).tolist()]
     if len(used) == 3 and np.linalg.matrix_rank(x, tol=_VARIES * np.sqrt(len(x))) < 3:
         # Turn and load go together: what depends on both shows in one of them.
-        used, loads = [0, 1], False
+        used = [0, 1]
     freedom = len(used) - 1
     y, known = readings.coefficient, known_variance(readings)
     plain = fit_line(x[:, :1], y, known)

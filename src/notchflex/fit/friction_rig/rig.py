@@ -73,9 +73,9 @@ class FrictionRig:
             )
         if self.coefficient > _RARE:
             said.append("So large a coefficient is rare: are the turns in degrees?")
-        given = np.isfinite(self.readings.coefficient_deviation)
-        if given.all() and count > 1:
-            typical = float(np.sqrt(np.mean(self.readings.coefficient_deviation**2)))
+        deviation = self.readings.coefficient_deviation
+        if np.isfinite(deviation).all() and count > 1:
+            typical = float(np.sqrt(np.mean(deviation**2)))
             more = (
                 "which explain the spread"
                 if self.scatter < 0.5 * typical

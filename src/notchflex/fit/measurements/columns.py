@@ -42,13 +42,7 @@ _NUMBERED = re.compile(
 
 @dataclass(frozen=True)
 class MeasuredColumn:
-    """One column of a measured quantity.
-
-    Attributes:
-        name: Its name, which ends in `_` and the unit.
-        quantity: The quantity, by the names of `Measurements.observed`.
-        index: Index of its component, behind the axis of the rows.
-    """
+    """One column: its name, ending in the unit, its quantity and the index of its component."""
 
     name: str
     quantity: str

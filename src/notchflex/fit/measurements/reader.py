@@ -22,13 +22,7 @@ Numbers = NDArray[np.float64]
 
 @dataclass
 class MeasurementReader:
-    """A table of measurements of a robot; it remembers which columns were used.
-
-    Attributes:
-        table: The table.
-        robot: The robot.
-        used: Names of the columns read so far.
-    """
+    """A table of measurements of a robot; `used` are the columns read so far."""
 
     table: Table
     robot: Robot
