@@ -7,7 +7,7 @@ import pytest
 
 import notchflex as nf
 from notchflex import InputError
-from notchflex.viewer.server.origin import refusal
+from notchflex.viewer.server.serving import refusal
 
 viser = pytest.importorskip("viser", reason="the extra `viewer` is not installed")
 
