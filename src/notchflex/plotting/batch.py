@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
-from notchflex.plotting.output import Picture
+from notchflex.plotting.picture import Picture
 from notchflex.plotting.sheet import BESIDE, Line, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
@@ -40,9 +40,6 @@ def batch_picture(
         against: Values for the horizontal axis, (rows,), such as tensions; row numbers if None.
         label: Label of this axis, with its unit.
         title: Heading.
-
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
 
     Raises:
         InputError: The number of values is not that of the rows, or there is nothing to draw.

@@ -11,7 +11,7 @@ from notchflex.errors import InputError
 from notchflex.plotting.branches import LOADING, UNLOADING, abscissa, steps_by_branch
 from notchflex.plotting.curves import LINE, branch_lines, converged_only, failures
 from notchflex.plotting.fits.comparison import MODEL_COLOURS
-from notchflex.plotting.output import Picture
+from notchflex.plotting.picture import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BELOW, Cell, Colour, Line, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import GREY, rgb
@@ -37,9 +37,6 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
     Args:
         paths: Label to path, two to five of them.
         title: Heading.
-
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
 
     Raises:
         InputError: Too few or too many paths.

@@ -43,14 +43,10 @@ def branch_lines(
     name: str | None = None,
     **look: Any,
 ) -> Iterator[Line]:
-    """Yield the branches of a curve: loading solid, unloading dashed.
+    """Yield the branches of a curve (S, 2): loading solid, unloading dashed; converged steps only.
 
-    Args:
-        path: Solved path.
-        points: A point for each step, (S, 2); steps that did not converge are left out.
-        colour: Colour of all branches; None for one colour each for loading and unloading.
-        name: Legend entry of all branches together; None to name loading and unloading.
-        look: Further options of `Line`; `group` is the name if not given.
+    Without a colour, loading and unloading have one each; without a name, each has its own. `look`
+    are further options of `Line`; `group` is the name if not given.
     """
     points = converged_only(path, points)
     named: set[str] = set()

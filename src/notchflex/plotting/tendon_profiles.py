@@ -115,15 +115,12 @@ def reverses_step_by_step(path: EquilibriumPath) -> bool:
     if not tendons or not (bound[:, tendons] > 0.0).any():
         return False
     counts = reversed_contacts(path)
-    partial = [
-        {
-            round(float(one), 6)
-            for one in counts[:, tendon]
-            if 0.0 < one < spans_of(path, tendon) - 1
-        }
-        for tendon in tendons
-    ]
-    return max(map(len, partial)) >= _FEWEST
+    for tendon in tendons:
+        count = counts[:, tendon]
+        partial = count[(count > 0.0) & (count < spans_of(path, tendon) - 1)]
+        if len(np.unique(partial.round(6))) >= _FEWEST:
+            return True
+    return False
 
 
 def _spread(path: EquilibriumPath, steps: list[int], tendon: int) -> list[int]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex._quantity import DEGREES
-from notchflex.plotting.output import Picture
+from notchflex.plotting.picture import Picture
 from notchflex.plotting.sheet import BESIDE, Line, Mark, Panel, Span, dots, grid
 from notchflex.plotting.style import BLUE, GREY, ORANGE, VERMILLION
 
@@ -27,9 +27,6 @@ def friction_picture(rig: FrictionRig) -> Picture:
 
     Args:
         rig: The estimate.
-
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
 
     Example:
         >>> import notchflex as nf
