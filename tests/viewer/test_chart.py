@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.sheet import Line, Panel
+from notchflex.plotting.sheet import Curve, Panel
 from notchflex.viewer import Session
 from notchflex.viewer.page.chart import chart, ticks
 from robots import ready
@@ -31,7 +31,7 @@ def test_ticks_take_in_zero_and_all_values_in_round_steps(values):
 
 
 def test_a_chart_puts_points_where_its_ticks_say():
-    line = Line([[0.0, 0.0], [1.0, 50.0], [2.0, 100.0]], "#123456", marker="o")
+    line = Curve([[0.0, 0.0], [1.0, 50.0], [2.0, 100.0]], "#123456", marker="o")
     text = chart(Panel([line], "T < 3 [N]", "angle [deg]"), "loop")
     labels = {one.text: one.attrib for one in elements(text, "text")}
     assert "T < 3 [N]" in labels
@@ -43,7 +43,7 @@ def test_a_chart_puts_points_where_its_ticks_say():
 
 def test_many_points_are_thinned_but_not_their_ends():
     x = np.linspace(0.0, 1.0, 20_000)
-    text = chart(Panel([Line(np.stack([x, x], axis=1), "#123456")], "x", "y"), "many")
+    text = chart(Panel([Curve(np.stack([x, x], axis=1), "#123456")], "x", "y"), "many")
     way = next(one for one in elements(text, "path") if one.attrib.get("fill") == "none")
     points = way.attrib["d"].lstrip("M").split("L")
     assert len(points) == 1500

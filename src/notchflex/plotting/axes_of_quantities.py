@@ -17,7 +17,7 @@ from notchflex.plotting.branches import LOADING, UNLOADING, branches, load_param
 from notchflex.plotting.curves import LINE, NEUTRAL, branch_lines, failures
 from notchflex.plotting.path import robot_shape, state_shape
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
-from notchflex.plotting.sheet import BESIDE, INSIDE, Line, Mark, Panel
+from notchflex.plotting.sheet import BESIDE, INSIDE, Curve, Mark, Panel
 from notchflex.plotting.style import house_style, sequence_colours
 from notchflex.results.files.csv import Entry, entries_of, is_listed
 from notchflex.results.quantities.registry import QUANTITIES
@@ -98,7 +98,7 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
         else:
             items += branch_lines(path, points, name=None if both else "")
     if several and both:
-        items += [Line([], NEUTRAL, LINE[way], name=way) for way in (LOADING, UNLOADING)]
+        items += [Curve([], NEUTRAL, LINE[way], name=way) for way in (LOADING, UNLOADING)]
     if len({column for column, _ in pairs}) == 1:
         items += failures(path, across.values[:, pairs[0][0]])
     named = both or not np.all(path.converged)

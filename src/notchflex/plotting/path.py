@@ -11,7 +11,7 @@ from notchflex.plotting.branches import LOADING, UNLOADING, driven_by_stroke, st
 from notchflex.plotting.curves import notches_panel, strain_panel, stroke_panel, total_panel
 from notchflex.plotting.picture import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
-from notchflex.plotting.sheet import BESIDE, Line, Mark, Note, Panel, dots, stack
+from notchflex.plotting.sheet import BESIDE, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.plotting.tendon_profiles import (
     SLACK,
@@ -139,7 +139,7 @@ def notch_angles(path: EquilibriumPath, step: int) -> Panel:
         return Panel([Note("not converged")], *labels)
     angle = path.notch_angle[step] * quantity.scale
     points = np.stack([np.arange(1, len(angle) + 1), angle], axis=1)
-    items: list[Mark] = [Line(points, BLUE, marker="o", size=4.0, hover=True)]
+    items: list[Mark] = [Curve(points, BLUE, marker="o", size=4.0, hover=True)]
     closed = np.asarray(path.closed[step])
     if closed.any():
         name = "closed notch"

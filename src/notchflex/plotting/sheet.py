@@ -41,7 +41,7 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Line(Mark):
+class Curve(Mark):
     """Points that are connected, marked or both, (k, 2) in the plane or (k, 3) in space.
 
     A row of NaN is a gap; without points it is a legend entry only. Without `dash` it has markers
@@ -65,10 +65,10 @@ class Line(Mark):
         return points if points.size else np.zeros((0, 2))
 
 
-def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Line:
-    """Return round markers without a line; `options` are those of `Line`."""
+def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Curve:
+    """Return round markers without a line; `options` are those of `Curve`."""
     look: dict[str, Any] = {"dash": None, "marker": "o", "size": size}
-    return Line(points, colour, **(look | options))
+    return Curve(points, colour, **(look | options))
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ class Sheet:
     width: float
     height: float
     cells: Sequence[Cell]
-    legend: Sequence[Line | Area] = ()
+    legend: Sequence[Curve | Area] = ()
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -22,7 +22,7 @@ from notchflex.plotting.sheet import (
     DOTTED,
     Area,
     Correlations,
-    Line,
+    Curve,
     Mark,
     Note,
     Panel,
@@ -66,14 +66,14 @@ def calibration_picture(fit: Calibration) -> Picture:
     return Picture(title, 3.0 * columns, 2.6 * rows + 0.4, cells, _legend(fit, panels))
 
 
-def _legend(fit: Calibration, panels: Sequence[Panel]) -> list[Line | Area]:
+def _legend(fit: Calibration, panels: Sequence[Panel]) -> list[Curve | Area]:
     """Return the legend entries of what the panels show."""
     measured = "measured, a kind of marker for each pull"
-    entries: list[Line | Area] = [
+    entries: list[Curve | Area] = [
         dots([], GREY, 4.0, hollow=True, name=measured, group=MEASURED),
-        Line([], BLUE, name=MODEL, group=MODEL),
+        Curve([], BLUE, name=MODEL, group=MODEL),
         band([], "95 % band of the model"),
-        Line([], VERMILLION, DASHED, 1.0, name="end of the 95 % interval", group=END),
+        Curve([], VERMILLION, DASHED, 1.0, name="end of the 95 % interval", group=END),
         *residual_entries(fit),
     ]
     shown = {item.group for panel in panels for item in panel.items}
@@ -87,7 +87,7 @@ def profile_panel(fit: Calibration, name: str) -> Panel:
     line = fit.allowed_rise(name)
     items: list[Mark] = [
         Span("y", line, line, GREY, DOTTED, 1.2),
-        Line(_smooth(value, rise, fit.values[name]), BLUE),
+        Curve(_smooth(value, rise, fit.values[name]), BLUE),
         dots(interval.profile, BLUE, group="profile", layer=3, hover=True),
     ]
     ends = [end for end in (interval.lower, interval.upper) if end is not None]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.sheet import MARKERS, Area, Line, Mark, Panel, Span, dots
+from notchflex.plotting.sheet import MARKERS, Area, Curve, Mark, Panel, Span, dots
 from notchflex.plotting.style import BLUE, GREY, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
 
@@ -62,7 +62,7 @@ def data_panel(fit: Calibration, label: str, quantity: str, component: int) -> P
             ends = [np.stack([x[rows], model + way * half[rows]], axis=1) for way in (-1.0, 1.0)]
             items.append(band([np.concatenate([ends[0], ends[1][::-1]])]))
         curve = np.stack([x[rows], model], axis=1)
-        items.append(Line(curve, BLUE, group=MODEL, layer=3, hover=True))
+        items.append(Curve(curve, BLUE, group=MODEL, layer=3, hover=True))
         for pull in dict.fromkeys(residuals.pull[rows].tolist()):
             there = residuals.pull[rows] == pull
             points = np.stack([x[rows][there], measured[there] * scale], axis=1)
@@ -104,17 +104,17 @@ def residual_panel(fit: Calibration, label: str) -> Panel:
     return Panel(items, x_label, "residual / its noise [-]", title=title)
 
 
-def residual_entries(fit: Calibration) -> list[Line]:
+def residual_entries(fit: Calibration) -> list[Curve]:
     """Return the legend entries of the residuals: colours of notches, marks of all others."""
     notches = list(_notch_entries(fit).values())
     return [*(notches if len(notches) < MOST_NAMED else [notches[0], notches[-1]]), _OTHERS]
 
 
-def _notch_entries(fit: Calibration) -> dict[int, Line]:
+def _notch_entries(fit: Calibration) -> dict[int, Curve]:
     """Return the marker of every notch (from 0), the same for all robots."""
     angles = np.any([_rows_of(fit, label, "notch_angle") for label in fit.given], axis=0)
     notches = np.unique(fit.residuals.part[angles]).tolist()
-    entries: dict[int, Line] = {}
+    entries: dict[int, Curve] = {}
     for notch, colour in zip(notches, sequence_colours(len(notches)), strict=True):
         name = f"residuals of notch {notch + 1}"
         entries[notch] = dots([], colour, name=name, group=name)

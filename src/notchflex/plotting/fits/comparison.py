@@ -21,7 +21,7 @@ from notchflex.plotting.sheet import (
     MIXED,
     SOLID,
     Bars,
-    Line,
+    Curve,
     Mark,
     Note,
     Panel,
@@ -77,7 +77,9 @@ def comparison_picture(
     if math.isnan(comparison.tip_rmse):
         error = f"total {comparison.rmse_total * DEGREES:.2f}°"
     legend = list(_trials(comparison).values())[: len(MARKERS)]
-    legend += [Line([], colour, dash, name=one, group=one) for one, colour, dash in _styles(models)]
+    legend += [
+        Curve([], colour, dash, name=one, group=one) for one, colour, dash in _styles(models)
+    ]
     title = f"{comparison.robot.name}: {error} rms over {comparison.points} points"
     size = 2.9 * columns, 2.7 * math.ceil(len(panels) / columns)
     return Picture(title, *size, grid(panels, columns), legend)
@@ -106,7 +108,7 @@ def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> I
             angles = _computed(models[label], notch) * DEGREES
             for part in _lines(models[label], x):
                 line = np.stack([x[part], angles[part]], axis=1)
-                items.append(Line(line, colour, dash, group=label, layer=3, hover=True))
+                items.append(Curve(line, colour, dash, group=label, layer=3, hover=True))
         drawn = np.concatenate([measured, *(_computed(one, notch) for one in models.values())])
         error = comparison.rmse_total if notch is None else comparison.rmse_notches[notch]
         title = "total" if notch is None else f"notch {notch + 1}"
@@ -150,10 +152,10 @@ def _lines(comparison: Comparison, x: NDArray[np.float64]) -> list[NDArray[np.in
     return [good[trial[good] == label] for label in comparison.measured.pulls]
 
 
-def _trials(comparison: Comparison) -> dict[str, Line]:
+def _trials(comparison: Comparison) -> dict[str, Curve]:
     """Return the legend entry of every trial."""
     labels = list(dict.fromkeys(comparison.measured.pull))
-    entries: dict[str, Line] = {}
+    entries: dict[str, Curve] = {}
     for index, label in enumerate(labels):
         name = f"measured, trial {label}" if len(labels) > 1 else "measured"
         marker = MARKERS[index % len(MARKERS)]
@@ -175,7 +177,7 @@ def _centre_lines(comparison: Comparison) -> Panel:
             if np.isnan(row).any():
                 continue
             line = outline(shape_from_angles(robot, row), view).centre_line
-            items.append(Line(line, colour, dash, width))
+            items.append(Curve(line, colour, dash, width))
             if dash:
                 items.append(dots(line[-1:], colour, 4.0))
     return Panel(

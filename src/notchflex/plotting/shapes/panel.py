@@ -23,8 +23,8 @@ from notchflex.plotting.sheet import (
     Area,
     Arrow,
     Colour,
+    Curve,
     Faces,
-    Line,
     Mark,
     Note,
     Panel,
@@ -171,9 +171,9 @@ def _from_the_side(
     yield Area(polygons, pale, colour, name=label, layer=2 + level, **look)
     gap = np.full((1, 2), np.nan)
     bores = np.concatenate([part for line in drawn.bores for part in (line, gap)])
-    yield Line(bores, colour, FINE, 0.5, layer=3 + level, **look)
+    yield Curve(bores, colour, FINE, 0.5, layer=3 + level, **look)
     for line in drawn.tendons:
-        yield Line(line, ORANGE, width=1.0, layer=4 + level, **look)
+        yield Curve(line, ORANGE, width=1.0, layer=4 + level, **look)
 
 
 def _in_space(shape: RobotShape, colour: Colour, label: str, first: bool) -> Iterator[Mark]:
@@ -183,7 +183,7 @@ def _in_space(shape: RobotShape, colour: Colour, label: str, first: bool) -> Ite
     faces = np.concatenate([*bodies, *flexure_faces(shape)])
     yield Faces(faces, shaded(faces, colour), colour, name=label, group=label)
     for number in range(len(shape.robot.tendon)):
-        yield Line(shape.tendon(number), ORANGE, width=0.9, group=label, layer=5)
+        yield Curve(shape.tendon(number), ORANGE, width=0.9, group=label, layer=5)
 
 
 def _load_arrows(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from notchflex.plotting.branches import branches
 from notchflex.plotting.curves import COLOUR
-from notchflex.plotting.sheet import Line, Mark, Panel, dots
+from notchflex.plotting.sheet import Curve, Mark, Panel, dots
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.viewer.scene.colours import TENDON, contact_colours, css
 from notchflex.viewer.session import Session
@@ -45,10 +45,10 @@ def loop(session: Session, tendon: int) -> Panel:
     items: list[Mark] = []
     if session.before is not None:
         points = session.before.loop(tendon, by) * units
-        items.append(Line(points, BEFORE, width=2.0, name="before the change"))
+        items.append(Curve(points, BEFORE, width=2.0, name="before the change"))
     points = session.history.loop(tendon, by) * units
     for part, way in branches(points[:, 0]) if len(points) > 1 else ():
-        items.append(Line(points[part], COLOUR[way], width=2.0, name=way))
+        items.append(Curve(points[part], COLOUR[way], width=2.0, name=way))
     items.append(dots(points[-1:], "#111111", 9.0, name="now"))
     x_label = axis(by)
     if session.robot.number_of_tendons > 1:
@@ -68,7 +68,7 @@ def tendon_chart(session: Session, tendon: int) -> str:
     # The tension is constant in a span; the contact at its end changes it.
     edges = np.arange(len(spans) + 1.0)
     steps = np.stack([np.repeat(edges, 2)[1:-1], np.repeat(spans, 2)], axis=1)
-    items: list[Mark] = [Line(steps, css(TENDON), width=2.0, name="tension")]
+    items: list[Mark] = [Curve(steps, css(TENDON), width=2.0, name="tension")]
     colours = np.array(contact_colours(session.state, tendon))
     contacts = np.stack([edges[1:-1], spans[1:]], axis=1)
     for colour in dict.fromkeys(colours.tolist()):
@@ -82,11 +82,11 @@ def chart(panel: Panel, name: str) -> str:
     """Draw the lines of a panel over axes that include 0 as an SVG element with a name.
 
     Example:
-        >>> rise = Line([[0.0, 0.0], [2.0, 90.0]], "#0072B2")
+        >>> rise = Curve([[0.0, 0.0], [2.0, 90.0]], "#0072B2")
         >>> chart(Panel([rise], "tension [N]", "angle [deg]"), "loop")[:4]
         '<svg'
     """
-    lines = [item for item in panel.items if isinstance(item, Line)]
+    lines = [item for item in panel.items if isinstance(item, Curve)]
     points = np.concatenate([line.rows for line in lines])
     x_ticks, y_ticks = ticks(points[:, 0]), ticks(points[:, 1])
     low, end = HEIGHT - BOTTOM, WIDTH - RIGHT
@@ -137,7 +137,7 @@ def ticks(values: Sequence[float] | NDArray[np.float64]) -> list[float]:
     return [float(f"{value:.10g}") for value in round_numbers]
 
 
-def _drawn(line: Line, points: list[list[float]]) -> str:
+def _drawn(line: Curve, points: list[list[float]]) -> str:
     """Return a line, and its markers as circles, at points [pixels]."""
     text = ""
     if line.dash is not None and len(points) > 1:
