@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex.errors import InputError
-from notchflex.plotting.branches import abscissa
-from notchflex.plotting.curves import notches_panel, total_panel
+from notchflex.plotting.curves import abscissa, notches_panel, total_panel
 from notchflex.plotting.picture import Picture
 from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel

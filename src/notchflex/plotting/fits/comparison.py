@@ -28,15 +28,7 @@ from notchflex.plotting.sheet import (
     dots,
     grid,
 )
-from notchflex.plotting.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    VERMILLION,
-    sequence_colours,
-)
+from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import DEGREES, QUANTITIES
 
 if TYPE_CHECKING:

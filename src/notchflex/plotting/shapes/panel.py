@@ -8,13 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.branches import by_stroke, driven_by_stroke
-from notchflex.plotting.shapes.applied_loads import (
-    COLOUR,
-    AppliedLoad,
-    applied_loads,
-    out_of_plane,
-)
+from notchflex.plotting.curves import by_stroke, driven_by_stroke
+from notchflex.plotting.shapes.applied_loads import COLOUR, AppliedLoad, applied_loads, out_of_plane
 from notchflex.plotting.shapes.outline import bending_plane, outline, project
 from notchflex.plotting.shapes.robot_shape import FlexureShape, RobotShape, shape_at
 from notchflex.plotting.sheet import (

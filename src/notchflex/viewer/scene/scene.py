@@ -15,11 +15,9 @@ from notchflex.plotting.shapes.interpolation import rotation_of
 from notchflex.plotting.shapes.robot_shape import HELD, RobotShape, shape_at
 from notchflex.results import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.viewer.controls import POINTING, Controls
-from notchflex.viewer.reach import GRAVITY, Reach, round_up
+from notchflex.viewer.controls import GRAVITY, POINTING, Controls, Reach, round_up
 from notchflex.viewer.scene.camera import CameraPose, first_eye, framed, quaternions
-from notchflex.viewer.scene.colours import LOAD, METAL, linear, strain_colour
-from notchflex.viewer.scene.marks import Marks, Shown
+from notchflex.viewer.scene.marks import LOAD, METAL, Marks, Shown, linear, strain_colour
 from notchflex.viewer.scene.solids import PIECES, FlexureSurface, at_rest, body_solids, skins
 
 if TYPE_CHECKING:
