@@ -68,7 +68,9 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
     cells: list[Cell] = []
     for column, (label, path) in enumerate(paths.items()):
         steps = representative_steps(path, most=_SHAPES)
-        shades = [_pale(colours[label], part) for part in np.linspace(0.55, 0.0, len(steps))]
+        shades: list[Colour] = []
+        for pale in np.linspace(0.55, 0.0, len(steps)):
+            shades.append(tuple(one + pale * (1.0 - one) for one in rgb(colours[label])))
         panel = shape_panel(path, steps, plane_of(path), title=label, colours=shades, legend=BELOW)
         cells.append(Cell(panel, 0, column, 2))
     notches, tensions = _most_bent_states(paths, colours)
@@ -84,10 +86,6 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
 def _most_bent(path: EquilibriumPath) -> int | None:
     """Return the converged step with the most bent notches; None if there is none."""
     return next(reversed(representative_steps(path)), None)
-
-
-def _pale(colour: Colour, part: float) -> Colour:
-    return tuple(one + part * (1.0 - one) for one in rgb(colour))
 
 
 def _angles(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:

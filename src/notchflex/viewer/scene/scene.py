@@ -47,13 +47,18 @@ class Scene:
 
     def _build(self) -> None:
         """Add all nodes."""
+        import trimesh
+
         scene, rest, outer = self.server.scene, self.rest, self.robot.tube.outer_radius
         self._add_lights()
         self._root = scene.add_frame(ROOT, show_axes=False)
-        self._bodies = [
-            _solid(scene, f"{ROOT}/body_{number}", *mesh)
-            for number, mesh in enumerate(body_solids(rest))
-        ]
+        self._bodies: list[Any] = []
+        for number, mesh in enumerate(body_solids(rest)):
+            solid = trimesh.Trimesh(*mesh, process=False)
+            shaded = trimesh.graph.smooth_shade(solid, angle=_SMOOTH)
+            name = f"{ROOT}/body_{number}"
+            node = scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
+            self._bodies.append(node)
         self._skins: list[FlexureSurface] = skins(rest)
         self._skins_of: dict[str, list[FlexureSurface]] = {}
         look: dict[str, Any] = {"color": METAL, "flat_shading": True}
@@ -190,12 +195,3 @@ class Scene:
         """Remove all nodes."""
         self._root.remove()
         self._grid.remove()
-
-
-def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
-    """Add a solid with sharp edges and smooth round faces."""
-    import trimesh
-
-    whole = trimesh.Trimesh(vertices, faces, process=False)
-    shaded = trimesh.graph.smooth_shade(whole, angle=_SMOOTH)
-    return scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
