@@ -12,7 +12,7 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.plotting.curves import abscissa, notches_panel, total_panel
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import Area, Faces, Panel, stack

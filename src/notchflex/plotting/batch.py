@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
 from notchflex.plotting.curves import TIP_LABELS
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES

@@ -21,7 +21,7 @@ from notchflex.plotting.curves import (
     steps_by_branch,
 )
 from notchflex.plotting.fits.comparison import MODEL_COLOURS
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BELOW, Cell, Colour, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import GREY, rgb

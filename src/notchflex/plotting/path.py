@@ -18,7 +18,7 @@ from notchflex.plotting.curves import (
     stroke_panel,
     total_panel,
 )
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
