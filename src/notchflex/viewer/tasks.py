@@ -34,15 +34,20 @@ class Tasks:
         self._changed = Condition()
         self._waiting: deque[tuple[Task, Hashable, float]] = deque()  # task, key, due time [s]
 
-    def add(self, task: Task, key: Hashable = None, pause: float = 0.0) -> None:
+    def add(
+        self, task: Task, key: Hashable = None, pause: float = 0.0, now: Task | None = None
+    ) -> None:
         """Append a task that waits for a pause [s].
 
-        The last task that waits is dropped if it has the same key, its origin.
+        The last task that waits is dropped if it has the same key, its origin. What is to be done
+        `now` is done before the task can be taken, however long that lasts.
         """
         with self._changed:
             if key is not None and self._waiting and self._waiting[-1][1] == key:
                 self._waiting.pop()
             self._waiting.append((task, key, time.monotonic() + pause))
+            if now is not None:
+                now()
             self._changed.notify()
 
     def has(self, key: Hashable) -> bool:
