@@ -44,11 +44,10 @@ def save_animation(
 ) -> None:
     """Write a path as a GIF: the robot moves, and dots run along its curves.
 
-    It takes four seconds or more; the first and the last frame are shown longer. Of a long path an
-    even selection of steps is shown.
+    It takes four seconds or more; the first and the last frame are shown longer.
 
     Args:
-        path: Solved path.
+        path: Solved path; of a long one an even selection of steps is shown.
         target: Name of a file that ends in .gif; it is written completely or not at all.
         title: Heading; the name of the robot if None.
         progress: Called with the number of finished frames and of all frames.
