@@ -75,9 +75,8 @@ def save_animation(
     figure.draw_without_rendering()  # arranges the axes, once for all frames
     figure.set_layout_engine("none")
     robot, *curves = figure.axes
-    names = "xyz" if robot.name == "3d" else "xy"
+    view, names = plane_of(path), "xyz"[: 3 if robot.name == "3d" else 2]
     limits = {name: getattr(robot, f"get_{name}lim")() for name in names}
-    view = plane_of(path)
     dots = [axes.plot([], [], "o", color=BLACK, markersize=5.0, zorder=9)[0] for axes in curves]
     frame, standing = _durations(len(steps))
     writer = PillowWriter(fps=1.0 / frame)  # pyright: ignore[reportArgumentType]
@@ -94,7 +93,7 @@ def save_animation(
                 dot.set_data(*points)
             for _ in range(standing if number in (0, len(steps) - 1) else 1):
                 writer.grab_frame()
-            if progress is not None:
+            if progress:
                 progress(number + 1, len(steps))
 
 
