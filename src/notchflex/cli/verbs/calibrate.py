@@ -18,8 +18,8 @@ from notchflex.cli.arguments.fit import (
 from notchflex.cli.arguments.loads import load_columns
 from notchflex.cli.arguments.measured import OnePath, from_rest, note_table
 from notchflex.cli.arguments.robots import Settings
-from notchflex.cli.exit_codes import BAD_INPUT, DONE, NOT_CONVERGED
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
+from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED
 from notchflex.errors import InputError
 from notchflex.results.files.writing import check_folder
 
@@ -63,9 +63,7 @@ def calibrate(
         candidates = load_columns(beyond.next, (), robot.number_of_tendons)
 
     with terminal.working("loading the solver"):
-        from notchflex.cli.compile_cache import use_compile_cache
-
-        use_compile_cache()
+        terminal.use_compile_cache()
         import notchflex.fit as fitting
         from notchflex.loads import LoadPath
 

@@ -10,8 +10,8 @@ from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import texts
 from notchflex.cli.arguments.measured import OnePath, from_rest, note_table
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files, variant
-from notchflex.cli.exit_codes import DONE, NOT_CONVERGED
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
+from notchflex.cli.terminal import DONE, NOT_CONVERGED
 
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison
@@ -62,9 +62,7 @@ def compare(
     measured = read_measurements(data, chosen, from_rest=from_rest(path))
     robots = {label: chosen.with_values(one) for label, one in values.items() if one is not None}
     with terminal.counting(f"solving {len(measured)} rows of {chosen.name}") as counted:
-        from notchflex.cli.compile_cache import use_compile_cache
-
-        use_compile_cache()
+        terminal.use_compile_cache()
         from notchflex import comparison as comparing
 
         comparison = comparing.compare(chosen, measured)

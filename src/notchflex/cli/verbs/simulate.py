@@ -24,7 +24,6 @@ from notchflex.cli.arguments.robots import (
     chosen_robot,
     robot_files,
 )
-from notchflex.cli.exit_codes import DONE, NOT_CONVERGED
 from notchflex.cli.outputs import (
     OUTPUT,
     CsvFile,
@@ -34,6 +33,7 @@ from notchflex.cli.outputs import (
     Quiet,
     output_file,
 )
+from notchflex.cli.terminal import DONE, NOT_CONVERGED
 
 if TYPE_CHECKING:
     from notchflex.loads import LoadPath
@@ -165,10 +165,9 @@ def simulate(
     )
     simulate_files.check(outputs, steps=len(tensions))
     with terminal.counting(f"solving {len(tensions)} steps of {chosen.name}") as counted:
-        from notchflex.cli.compile_cache import use_compile_cache
         from notchflex.loads import LoadPath
 
-        use_compile_cache()
+        terminal.use_compile_cache()
         start = None if from_state is None else _start(from_state)
         turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
         load = external.on(LoadPath(tension=tensions, stroke=strokes, base_rotation=turn))
