@@ -62,6 +62,3 @@ class Recorded:
         """Whether each state is stable."""
         del commands
         return (self.held[0] > 0.0) & (self.held[1] > 0.0)
-
-
-__all__ = ["BEFORE", "TOLD", "Recorded"]

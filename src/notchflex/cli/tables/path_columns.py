@@ -10,8 +10,7 @@ import numpy as np
 
 from notchflex._quantity import Quantity
 from notchflex.errors import InputError
-from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES
-from notchflex.results.quantities.spans import holds
+from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES, holds
 from notchflex.robot.error_messages import nearest
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ import numpy as np
 from notchflex import __version__
 from notchflex._quantity import Quantity
 from notchflex.results.files.writing import write_text
-from notchflex.results.quantities.registry import CONTACT_STATES, QUANTITIES, units
-from notchflex.results.quantities.spans import holds, spans_of
+from notchflex.results.quantities.registry import CONTACT_STATES, QUANTITIES, holds, spans_of, units
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
