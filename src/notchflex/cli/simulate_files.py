@@ -23,8 +23,8 @@ def write(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str) ->
         title: The heading of the picture.
     """
     from notchflex.results.files.csv import write_path_csv
-    from notchflex.results.files.io import write_netcdf
-    from notchflex.results.files.parquet import write_parquet
+    from notchflex.results.files.dataframe import write_parquet
+    from notchflex.results.files.dataset import write_netcdf
 
     path = next(iter(paths.values()))
     outputs.write_json(lambda: _document(paths))
