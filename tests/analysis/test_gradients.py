@@ -8,6 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex._jax import jax, jnp
 from notchflex.analysis.derivatives.numbers import slope
+from notchflex.errors import ErrorCode
 
 # A pull to 1.66 N, let go and pulled again by a little: contacts slide both ways and stick, and
 # what that pull was is remembered to the end.
@@ -290,3 +291,29 @@ def test_values_come_by_name(values):
     bend = nf.differentiable(nf.load_robot("pacheco2021-a"), nf.pull(1.0, 1.0, steps=1), "tension")
     with pytest.raises(nf.InputError, match="by name"):
         bend(values)
+
+
+def test_an_output_that_was_not_asked_for_is_an_input_error():
+    bend = nf.differentiable(nf.load_robot("pacheco2021-a"), nf.pull(1.0, 1.0, steps=1), "tension")
+    for outputs in (bend(), jax.jit(bend)(bend.start)):
+        with pytest.raises(nf.InputError) as problem:
+            outputs["gap"]
+        assert problem.value.code is ErrorCode.UNKNOWN_NAME
+        assert isinstance(problem.value, KeyError)
+        assert outputs.get("gap") is None
+
+
+@pytest.mark.parametrize("text", ["1.0", ["1.0"], np.array([["1.0"]])])
+def test_text_is_not_a_number(text):
+    bend = nf.differentiable(nf.load_robot("pacheco2021-a"), nf.pull(1.0, 1.0, steps=1), "tension")
+    with pytest.raises(nf.InputError) as problem:
+        bend({"tension": text})
+    assert problem.value.code is ErrorCode.WRONG_SHAPE
+
+
+def test_second_derivatives_are_refused_with_a_sentence():
+    bend = nf.differentiable(nf.load_robot("pacheco2021-a"), nf.pull(1.0, 1.0, steps=1), "tension")
+    with pytest.raises(nf.InputError) as problem:
+        jax.hessian(lambda values: bend(values)["total_angle"][0])(bend.start)
+    assert problem.value.code is ErrorCode.UNSUPPORTED
+    assert "differentiated once" in str(problem.value)

@@ -14,6 +14,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
+from notchflex.analysis.outputs import OutputTable
 from notchflex.errors import InputError
 
 
@@ -33,7 +34,7 @@ class Solver(Protocol):
 
 def outputs_function(
     solver: Solver, start: Float[np.ndarray, " k"]
-) -> Callable[[Array], dict[str, Array]]:
+) -> Callable[[Array], OutputTable]:
     """Make a solver a function of JAX.
 
     Values that the solver refuses give NaN for numbers and false for truth values, as a program of
@@ -46,62 +47,87 @@ def outputs_function(
     Returns:
         A function of a vector of values, differentiable once, forward and reverse.
     """
-    first = solver.values(start)
-    floats = tuple(name for name, value in first.items() if value.dtype.kind == "f")
-    others = tuple(name for name in first if name not in floats)
+    shapes = {
+        name: jax.ShapeDtypeStruct(value.shape, value.dtype)
+        for name, value in solver.values(start).items()
+    }
+    floats = {name: shape for name, shape in shapes.items() if shape.dtype.kind == "f"}
+    others = {name: shape for name, shape in shapes.items() if name not in floats}
+    values_of_others = _callback(solver.values, others)
+    values_of_floats = _differentiable_once(solver, start, floats)
 
-    def shapes(names: tuple[str, ...], *more: int) -> dict[str, Any]:
-        own = {name: (*first[name].shape, *more) for name in names}
-        return {name: jax.ShapeDtypeStruct(own[name], first[name].dtype) for name in names}
-
-    def called(function: Callable[[np.ndarray], Any], result: dict[str, Any]) -> Any:
-        def safe(at: Any) -> dict[str, np.ndarray]:
-            try:
-                found = function(np.asarray(at))
-                return {name: np.asarray(found[name], one.dtype) for name, one in result.items()}
-            except InputError:
-                return {name: _nothing(one) for name, one in result.items()}
-
-        # Compiled once: a callback on its own is compiled at every call.
-        compiled = jax.jit(lambda at: jax.pure_callback(safe, result, at, vmap_method="sequential"))
-
-        def call(at: Array) -> dict[str, Array]:
-            return compiled(at) if isinstance(at, Tracer) else jax.tree.map(jnp.asarray, safe(at))
-
-        return call
-
-    values_of_floats = called(solver.values, shapes(floats))
-    values_of_others = called(solver.values, shapes(others))
-    slopes_of_floats = called(lambda at: solver.jacobian(at, floats), shapes(floats, len(start)))
-
-    compiled: list[bool] = []
-
-    @jax.custom_jvp
-    def of_floats(at: Array) -> dict[str, Array]:
-        return values_of_floats(at)
-
-    @of_floats.defjvp
-    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Any, Any]:
-        (at,), (change,) = primals, tangents
-        # Compiled now: within a program of JAX nothing may be traced.
-        if not compiled:
-            solver.jacobian(start, floats)
-            compiled.append(True)
-        slopes = slopes_of_floats(at)
-        return of_floats(at), {name: slopes[name] @ change for name in floats}
-
-    def function(at: Array) -> dict[str, Array]:
+    def function(at: Array) -> OutputTable:
         if not isinstance(at, Tracer):
-            return {
-                name: jnp.asarray(value) for name, value in solver.values(np.asarray(at)).items()
-            }
-        found = dict(of_floats(at)) if floats else {}
+            values = solver.values(np.asarray(at))
+            return OutputTable({name: jnp.asarray(value) for name, value in values.items()})
+        outputs = dict(values_of_floats(at)) if floats else {}
         if others:
-            found |= values_of_others(jax.lax.stop_gradient(at))
-        return {name: found[name] for name in first}
+            outputs |= values_of_others(jax.lax.stop_gradient(at))
+        return OutputTable({name: outputs[name] for name in shapes})
 
     return function
 
 
-def _nothing(of: Any) -> np.ndarray:
-    return np.full(of.shape, np.nan if of.dtype.kind == "f" else 0).astype(of.dtype)
+def _differentiable_once(
+    solver: Solver, start: np.ndarray, shapes: dict[str, Any]
+) -> Callable[[Array], dict[str, Array]]:
+    """Return the outputs of some shapes as a function with a first derivative."""
+    names = tuple(shapes)
+    slope_shapes = {
+        name: jax.ShapeDtypeStruct((*shape.shape, len(start)), shape.dtype)
+        for name, shape in shapes.items()
+    }
+    values_of = _callback(solver.values, shapes)
+    slopes_of = _callback(lambda at: solver.jacobian(at, names), slope_shapes)
+    compiled: list[bool] = []
+
+    @jax.custom_jvp
+    def slopes(at: Array) -> dict[str, Array]:
+        return slopes_of(at)
+
+    @slopes.defjvp
+    def _(primals: Any, tangents: Any) -> Any:
+        raise InputError.UNSUPPORTED(
+            "a robot under loads can be differentiated once, not twice: take differences of its "
+            "gradients, or minimise by a method that needs first derivatives only"
+        )
+
+    @jax.custom_jvp
+    def values(at: Array) -> dict[str, Array]:
+        return values_of(at)
+
+    @values.defjvp
+    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Any, Any]:
+        (at,), (change,) = primals, tangents
+        # Compiled now: within a program of JAX nothing may be traced.
+        if not compiled:
+            solver.jacobian(start, names)
+            compiled.append(True)
+        by = slopes(at)
+        return values(at), {name: by[name] @ change for name in names}
+
+    return values
+
+
+def _callback(
+    function: Callable[[np.ndarray], Any], shapes: dict[str, Any]
+) -> Callable[[Array], dict[str, Array]]:
+    """Return a plain function as one that JAX can trace; NaN or 0 where it refuses its values."""
+
+    def safe(at: Any) -> dict[str, np.ndarray]:
+        try:
+            values = function(np.asarray(at))
+            return {name: np.asarray(values[name], one.dtype) for name, one in shapes.items()}
+        except InputError:
+            return {
+                name: np.full(one.shape, np.nan if one.dtype.kind == "f" else 0, one.dtype)
+                for name, one in shapes.items()
+            }
+
+    # Compiled once: a callback on its own is compiled at every call.
+    compiled = jax.jit(lambda at: jax.pure_callback(safe, shapes, at, vmap_method="sequential"))
+
+    def call(at: Array) -> dict[str, Array]:
+        return compiled(at) if isinstance(at, Tracer) else jax.tree.map(jnp.asarray, safe(at))
+
+    return call
