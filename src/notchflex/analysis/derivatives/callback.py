@@ -6,34 +6,121 @@ again for what users write around it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
+from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
 from notchflex.analysis.outputs import OutputTable
 from notchflex.errors import InputError
+from notchflex.loads import LoadPath
+from notchflex.results.path import EquilibriumPath
+
+TENDONS = ("tension", "stroke")
+TIP = ("tip_force", "tip_moment")
+# Derivatives by numbers of the robot that are kept.
+_REMEMBERED = 256
 
 
-class Solver(Protocol):
-    """Outputs by name, and the derivatives of those that are floats."""
+@dataclass(frozen=True, eq=False)
+class VectorSolver:
+    """Outputs and their Jacobian by compiled programs, for plain vectors of values.
+
+    Attributes:
+        model: The forward model.
+        start: Present values of the parameters, by name.
+        outputs: Names of what is returned.
+        numbers: Names of the parameters that are numbers of the robot.
+        solve: Solves the path at named values; raises `InputError` for values that cannot be.
+        load: Returns the loads at named values.
+    """
+
+    model: ForwardModel
+    start: Mapping[str, Array]
+    outputs: tuple[str, ...]
+    numbers: tuple[str, ...]
+    solve: Callable[[Mapping[str, Any]], EquilibriumPath]
+    load: Callable[[Mapping[str, Any]], LoadPath]
 
     def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        """Return the outputs at some values; raise `InputError` where there are none."""
-        ...
+        """Return the outputs; raise `InputError` where no robot or load can have these values."""
+        path = self._path(flat)
+        return {name: np.asarray(getattr(path, name)) for name in self.outputs}
 
     def jacobian(
         self, flat: Float[np.ndarray, " k"], outputs: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
-        """Return derivatives of some outputs by every value, as last axis."""
-        ...
+        """Return the derivatives of some outputs by every value, as last axis."""
+        path = self._path(flat)
+        changes = self._changes(path, self._named(flat))
+        names = tuple(name for name in outputs if name != "residual")
+        by_change = self.model.derivatives(path, changes, names)
+        slopes = {name: np.moveaxis(one, 0, -1) for name, one in by_change.items()}
+        if "residual" in outputs:  # the residual left by the solver does not depend on the values
+            slopes["residual"] = np.zeros((len(path), len(flat)))
+        return slopes
+
+    def _named(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
+        shapes = {name: np.shape(at) for name, at in self.start.items()}
+        ends = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])[:-1]
+        parts = zip(shapes.items(), np.split(flat, ends), strict=True)
+        return {name: part.reshape(shape) for (name, shape), part in parts}
+
+    def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
+        """The path at some values; the last one is kept, as its derivatives are asked for next."""
+        if not np.isfinite(flat).all():  # a tension that is no number would mean a slack tendon
+            raise InputError.NOT_FINITE("values must be finite numbers")
+        key = flat.tobytes()
+        if key not in self._last:
+            path = self.solve(self._named(flat))
+            self._last.clear()
+            self._last[key] = path
+        return self._last[key]
+
+    @cached_property
+    def _last(self) -> dict[bytes, EquilibriumPath]:
+        return {}
+
+    @cached_property
+    def _kept(self) -> dict[Any, Change]:
+        return {}
+
+    def _changes(self, path: EquilibriumPath, values: Mapping[str, np.ndarray]) -> Iterator[Change]:
+        """Change of loads and chain per unit of every value."""
+        # One program for all: with a change of the chain where any value changes it.
+        still = np.zeros(self.model.ready.long.chain_layout.size) if self.numbers else None
+        for name, value in values.items():
+            if name in self.numbers:
+                yield self._by_number(path, values, name)
+                continue
+            for place in np.ndindex(value.shape):
+                varied = np.array(value)
+                varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
+                more = self.load({**values, name: varied})
+                yield Change(self.model.load_change(path, more), still)
+
+    def _by_number(
+        self, path: EquilibriumPath, values: Mapping[str, np.ndarray], name: str
+    ) -> Change:
+        """Change by a number of the robot, kept for the next tensions and strokes."""
+        numbers = [float(values[one]) for one in self.numbers]
+        tip = [values[one].tobytes() for one in values if one in TIP]
+        key = (name, *numbers, *tip)
+        if key not in self._kept:
+            if len(self._kept) >= _REMEMBERED:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = self.model.change(path.robot, path.load, name)
+        return self._kept[key]
 
 
 def outputs_function(
-    solver: Solver, start: Float[np.ndarray, " k"]
+    solver: VectorSolver, start: Float[np.ndarray, " k"]
 ) -> Callable[[Array], OutputTable]:
     """Make a solver a function of JAX.
 
@@ -69,7 +156,7 @@ def outputs_function(
 
 
 def _differentiable_once(
-    solver: Solver, start: np.ndarray, shapes: dict[str, Any]
+    solver: VectorSolver, start: np.ndarray, shapes: dict[str, Any]
 ) -> Callable[[Array], dict[str, Array]]:
     """Return the outputs of some shapes as a function with a first derivative."""
     names = tuple(shapes)

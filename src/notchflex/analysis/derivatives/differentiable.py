@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from notchflex._jax import jax, jnp
-from notchflex.analysis.derivatives.callback import outputs_function
-from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
+from notchflex.analysis.derivatives.callback import TENDONS, TIP, VectorSolver, outputs_function
+from notchflex.analysis.derivatives.forward_model import ForwardModel
 from notchflex.analysis.derivatives.kinks import Kink, kinks
 from notchflex.analysis.outputs import OutputTable, check_outputs
 from notchflex.analysis.solve import check_refinement
@@ -27,12 +27,8 @@ from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
 from notchflex.solver.newton import DEFAULT, Settings
 
-_TENDONS = ("tension", "stroke")
-_TIP = ("tip_force", "tip_moment")
 # Largest change of a parameter in one-sided differences.
 _ASIDE = 1e-5
-# Derivatives by numbers of the robot that are kept.
-_REMEMBERED = 256
 
 
 def differentiable(
@@ -92,9 +88,9 @@ def differentiable(
 
 def _present(robot: Robot, path: LoadPath, name: str) -> Any:
     """Return the present value of a parameter."""
-    if name in _TIP:
+    if name in TIP:
         return np.array([getattr(one, name) for one in path.external])
-    if name not in _TENDONS:
+    if name not in TENDONS:
         return number_at(robot, name)
     commanded = getattr(path, name)
     if np.isnan(commanded).all():
@@ -206,7 +202,7 @@ class Differentiable:
 
     def _load(self, values: Mapping[str, Any]) -> LoadPath:
         load = self.load
-        for name in _TENDONS:
+        for name in TENDONS:
             if name in values:
                 commanded = getattr(load, name)
                 value = np.where(np.isnan(commanded), np.nan, np.asarray(values[name]))
@@ -258,11 +254,11 @@ class Differentiable:
     @cached_property
     def numbers(self) -> tuple[str, ...]:
         """Names of the parameters that are numbers of the robot."""
-        return tuple(name for name in self.start if name not in (*_TENDONS, *_TIP))
+        return tuple(name for name in self.start if name not in (*TENDONS, *TIP))
 
     @cached_property
     def _tip(self) -> tuple[str, ...]:
-        return tuple(name for name in _TIP if name in self.start)
+        return tuple(name for name in TIP if name in self.start)
 
     @cached_property
     def model(self) -> ForwardModel:
@@ -282,79 +278,11 @@ class Differentiable:
     def _function(self) -> Callable[[Array], OutputTable]:
         """All values as one vector to the outputs, as a function of JAX."""
         start = np.concatenate([np.ravel(self.start[name]) for name in self.start])
-        return outputs_function(_Solver(self), start)
+        solver = VectorSolver(
+            self.model, self.start, self.outputs, self.numbers, self._path, self._load
+        )
+        return outputs_function(solver, start)
 
 
 def _is_text(value: object) -> bool:
     return not isinstance(value, Tracer) and np.asarray(value).dtype.kind in "USO"
-
-
-class _Solver:
-    """Outputs and their Jacobian by compiled programs, for plain vectors of values."""
-
-    def __init__(self, function: Differentiable) -> None:
-        self._of = function
-        self.last: tuple[bytes, EquilibriumPath] | None = None
-        self._kept: dict[Any, Change] = {}
-
-    def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        """Return the outputs; raise `InputError` where no robot or load can have these values."""
-        path = self._path(flat)
-        return {name: np.asarray(getattr(path, name)) for name in self._of.outputs}
-
-    def jacobian(
-        self, flat: Float[np.ndarray, " k"], outputs: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
-        """Return the derivatives of some outputs by every value, as last axis."""
-        path = self._path(flat)
-        changes = self._changes(path, self._named(flat))
-        names = tuple(name for name in outputs if name != "residual")
-        by_change = self._of.model.derivatives(path, changes, names)
-        slopes = {name: np.moveaxis(one, 0, -1) for name, one in by_change.items()}
-        if "residual" in outputs:  # the residual left by the solver does not depend on the values
-            slopes["residual"] = np.zeros((len(self._of.load), len(flat)))
-        return slopes
-
-    def _named(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        shapes = {name: np.shape(at) for name, at in self._of.start.items()}
-        ends = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])[:-1]
-        parts = zip(shapes.items(), np.split(flat, ends), strict=True)
-        return {name: part.reshape(shape) for (name, shape), part in parts}
-
-    def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
-        """The path at some values; the last one is kept, as its derivatives are asked for next."""
-        if not np.isfinite(flat).all():  # a tension that is no number would mean a slack tendon
-            raise InputError.NOT_FINITE("values must be finite numbers")
-        key = flat.tobytes()
-        if self.last is None or self.last[0] != key:
-            self.last = key, self._of._path(self._named(flat))  # pyright: ignore[reportPrivateUsage]
-        return self.last[1]
-
-    def _changes(self, path: EquilibriumPath, values: Mapping[str, np.ndarray]) -> Iterator[Change]:
-        """Change of loads and chain per unit of every value."""
-        of = self._of
-        # One program for all: with a change of the chain where any value changes it.
-        still = np.zeros(of.model.ready.long.chain_layout.size) if of.numbers else None
-        for name, value in values.items():
-            if name in of.numbers:
-                yield self._by_number(path, values, name)
-                continue
-            for place in np.ndindex(value.shape):
-                varied = np.array(value)
-                varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
-                more = of._load({**values, name: varied})  # pyright: ignore[reportPrivateUsage]
-                yield Change(of.model.load_change(path, more), still)
-
-    def _by_number(
-        self, path: EquilibriumPath, values: Mapping[str, np.ndarray], name: str
-    ) -> Change:
-        """Change by a number of the robot, kept for the next tensions and strokes."""
-        of = self._of
-        numbers = [float(values[one]) for one in of.numbers]
-        tip = [values[one].tobytes() for one in values if one in _TIP]
-        key = (name, *numbers, *tip)
-        if key not in self._kept:
-            if len(self._kept) >= _REMEMBERED:
-                del self._kept[next(iter(self._kept))]
-            self._kept[key] = of.model.change(path.robot, path.load, name)
-        return self._kept[key]
