@@ -15,13 +15,7 @@ if TYPE_CHECKING:
 
 
 def write(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str) -> None:
-    """Write what was asked for: JSON and picture of all paths, other files of the first.
-
-    Args:
-        paths: Label to path.
-        outputs: What was asked for.
-        title: The heading of the picture.
-    """
+    """Write what was asked for: JSON and picture of all paths, other files of the first."""
     from notchflex.results.files.csv import write_path_csv
     from notchflex.results.files.dataframe import write_parquet
     from notchflex.results.files.dataset import write_netcdf

@@ -110,12 +110,7 @@ class DataSources(NamedTuple):
         return {label: chosen_robot(name, of_robot[label]) for label, name in self.robots.items()}
 
     def check_label(self, label: str, source: str) -> None:
-        """Raise if no robot has a label.
-
-        Args:
-            label: The label.
-            source: Where it was given, for the message.
-        """
+        """Raise if no robot has a label."""
         if label not in self.robots:
             labels = ", ".join(self.robots)
             raise InputError.UNKNOWN_NAME(

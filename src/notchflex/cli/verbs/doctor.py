@@ -115,9 +115,6 @@ def examination() -> dict[str, Any]:
 def requirements(lines: Iterable[str] | None = None) -> dict[str, list[str]]:
     """Return the packages that each extra asks for; "" has what every installation needs.
 
-    Args:
-        lines: Requirements as a wheel states them; those of the installed program if None.
-
     Example:
         >>> lines = ["numpy>=2", "h5py>=3; extra == 'data'", "notchflex[data]; extra == 'all'"]
         >>> requirements(lines)
