@@ -19,7 +19,7 @@ _ROWS = 16
 
 
 def print_calibration(fit: Calibration) -> None:
-    """Print constants, their intervals, problems fit, and the errors of every part."""
+    """Print constants, their intervals, problems found, and the errors of every part."""
     from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose
     from notchflex.fit.documents import data_of
 
