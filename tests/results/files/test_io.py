@@ -158,7 +158,7 @@ def _without(document, *keys):
     [
         (("read_back",), "holds no path that can be read back"),
         (("read_back", "arrays"), "damaged"),
-        (("read_back", "facts", "format"), "laid out as None"),
+        (("read_back", "facts", "format"), "has the format None"),
         (("read_back", "arrays", "notch_angle"), "notch_angle is missing"),
         (("read_back", "arrays", "tension", "base64"), "damaged"),
         (("read_back", "facts", "settings"), "settings is missing"),
