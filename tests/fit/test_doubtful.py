@@ -22,14 +22,9 @@ from notchflex.fit import (
 from notchflex.fit.documents import calibration_document
 from notchflex.fit.estimation.problem import Problem
 from notchflex.fit.model.samples import Samples
-<<<<<<< HEAD
-from notchflex.plotting.fits.calibration_rows import MeasuredPart, data_panel, residual_panel
-from notchflex.plotting.sheet import Line
-from refusals import refused
-=======
 from notchflex.plotting.fits.calibration_rows import data_panel, residual_panel
 from notchflex.plotting.sheet import Curve
->>>>>>> drawcut
+from refusals import refused
 
 WRIST = nf.load_robot(ROBOT)
 FRICTION, MODULUS = NAMES

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from notchflex.plotting.curves import LINE, NEUTRAL, abscissa, branch_lines, steps_by_branch
 from notchflex.plotting.sheet import BESIDE, Colour, Curve, Mark, Panel
 from notchflex.plotting.style import sequence_colours
-from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.results.quantities.spans import spans_of
+from notchflex.results.quantities.registry import QUANTITIES, spans_of
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
