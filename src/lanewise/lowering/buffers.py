@@ -45,6 +45,21 @@ class BufferLayout:
         rest = [length for a, length in enumerate(shape) if a != axis]
         return others * padded, np.moveaxis(positions.reshape(*rest, size), -1, axis)
 
+    def stacked(self, shape: tuple[int, ...], length: int) -> tuple[int, np.ndarray]:
+        """Return the same for arrays of one shape, one for each step of a loop.
+
+        Steps along a lane axis are rows, so that what reads or writes all steps takes vectors.
+
+        Args:
+            shape: Shape of the array of one step.
+            length: Number of steps, the leading axis of the positions that are returned.
+        """
+        if self.arrays.lane_axis((length,)) is not None and self.arrays.lane_axis(shape) is None:
+            return self.positions((length, *shape))
+        size, positions = self.positions(shape)
+        starts = np.arange(length).reshape(-1, *(1,) * positions.ndim) * size
+        return size * length, starts + positions
+
     def allocate(self, shape: tuple[int, ...], kind: str) -> Layout:
         """Return a new buffer in the arena for an array."""
         size, positions = self.positions(shape)
