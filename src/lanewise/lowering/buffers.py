@@ -82,10 +82,12 @@ class BufferLayout:
         """Return the store of an array to a buffer, in rows as the buffer has them."""
         buffer, positions = layout
         refs = np.broadcast_to(refs, positions.shape)
+        row = 0
         if self._has_rows(positions.shape):
             axis = self.arrays.lane_axis(positions.shape)
             refs = self.arrays.rows(self.arrays.loaded(refs), axis)
-        return Store(refs.ravel(), buffer, positions.ravel())
+            row = positions.shape[axis or 0]
+        return Store(refs.ravel(), buffer, positions.ravel(), row)
 
     def store_results(
         self, results: Sequence[References], buffer: Callable[[int, int], Buffer]

@@ -80,7 +80,8 @@ class ScanInputs:
         kind, batched = graph.kind[int(refs[0, 0]) >> LANE_BITS], self.buffers.batched
         size, positions = self.buffers.stacked((refs.shape[1],), self.length)
         whole = Buffer("arena", size, batched=batched, kind=kind)
-        self.initial.append(Store(refs.T.ravel(), whole, positions.T.ravel()))
+        row = self.length if size > positions.size else 0
+        self.initial.append(Store(refs.T.ravel(), whole, positions.T.ravel(), row))
         own = slice_of(whole, positions)
         self.slices.append(own)
         return reference(graph.add_buffer(own, self.body)) + positions[0]
