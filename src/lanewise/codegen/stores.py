@@ -65,9 +65,7 @@ class StoreWriter:
             storage.copy(address, saved, length, storage.graph.kind[node])
             storage.address[node] = saved
 
-    def _write_run(
-        self, run: Run, kind: str, target: Address, mask: str | None, row: int
-    ) -> None:
+    def _write_run(self, run: Run, kind: str, target: Address, mask: str | None, row: int) -> None:
         storage, builder = self.storage, self.builder
         if storage.in_memory(run.node):
             self._copy_run(self.values.run_address(run), run.count, kind, target, mask)

@@ -89,7 +89,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         Args:
             name: Name of a property, such as "notch_angle".
         """
-        kept = self._kept
+        kept = vars(self).setdefault("_kept", {})
         if name not in kept:
             own = QUANTITIES.get(name)
             if own is None:
@@ -101,7 +101,8 @@ class EquilibriumPath(PathQuantities, Displayed):
 
     def _in_world(self, quantity: Quantity) -> np.ndarray:
         """Vectors and rotations of the solver are in the frame of the base."""
-        turn, values = self.base_to_world, self.solver_quantity(quantity.name)
+        values = self.solver_quantity(quantity.name)
+        turn = self.base_to_world if quantity.in_world else None
         return values if turn is None else quantity.turned(values, turn)
 
     def solver_quantity(self, name: str) -> np.ndarray:
@@ -116,10 +117,6 @@ class EquilibriumPath(PathQuantities, Displayed):
         if tried.all():
             return values
         return values[np.maximum.accumulate(np.where(tried, np.arange(len(tried)), 0))]
-
-    @cached_property
-    def _kept(self) -> dict[str, Any]:
-        return {}
 
     @cached_property
     def base_to_world(self) -> Float[np.ndarray, "3 3"] | None:
