@@ -48,13 +48,15 @@ class BufferLayout:
     def stacked(self, shape: tuple[int, ...], length: int) -> tuple[int, np.ndarray]:
         """Return the same for arrays of one shape, one for each step of a loop.
 
-        Steps along a lane axis are rows, so that what reads or writes all steps takes vectors.
+        Steps along a lane axis are rows, so that what reads or writes all steps takes vectors. In a
+        batch, where vectors are those of its rows anyway, each step's array is contiguous.
 
         Args:
             shape: Shape of the array of one step.
             length: Number of steps, the leading axis of the positions that are returned.
         """
-        if self.arrays.lane_axis((length,)) is not None and self.arrays.lane_axis(shape) is None:
+        along_lanes = not self.batched and length in self.arrays.lane_sizes
+        if along_lanes and self.arrays.lane_axis(shape) is None:
             return self.positions((length, *shape))
         size, positions = self.positions(shape)
         starts = np.arange(length).reshape(-1, *(1,) * positions.ndim) * size
