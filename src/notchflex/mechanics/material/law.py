@@ -59,8 +59,8 @@ _WEAK = np.arange(6) == 1
 _POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
 NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
 """Gauss's rule on 0 ... 1."""
-# When the search for the curvature between the ends stops: its last step, as a part, and tries.
-_CURVATURE_ERROR, _MOST_TRIES = 1e-12, 60
+# A bilinear law takes three iterations, one with a plastic branch more.
+_ITERATIONS = 20
 
 
 class SectionLaw(Pytree, ABC):
@@ -161,37 +161,37 @@ def _imbalance(law: SectionLaw, section: FibreSection, reduced: Array, curvature
 
 
 def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Float[Array, ""]:
-    """Curvature of a section between its ends: Newton's method, kept within bounds.
+    """Curvature of a section between its ends: Newton's method within bounds that close in.
 
     The last step alone is differentiated, from a point that is held still.
     """
     still = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced))
     ends, aim = still[1].ends, still[2]
 
-    def slope(curvature: Array) -> tuple[Array, Array]:
+    def at(curvature: Array) -> tuple[Array, Array]:
         return jax.jvp(partial(_imbalance, *still), (curvature,), (jnp.ones_like(curvature),))
 
-    def proceed(search: tuple[Array, ...]) -> Array:
-        curvature, _, _, step, tries = search
-        return (jnp.abs(step) > _CURVATURE_ERROR * jnp.abs(curvature)) & (tries < _MOST_TRIES)
-
-    def iterate(search: tuple[Array, ...]) -> tuple[Array, ...]:
-        curvature, least, most, _, tries = search
-        beyond, by = slope(curvature)
-        least, most = (
-            jnp.where(beyond < 0.0, curvature, least),
-            jnp.where(beyond > 0.0, curvature, most),
-        )
-        new = curvature - beyond / by
-        new = jnp.where((new >= least) & (new <= most), new, 0.5 * (least + most))
-        return new, least, most, new - curvature, tries + 1
+    def improve(_: int, search: tuple[Array, ...]) -> tuple[Array, ...]:
+        curvature, least, most, last = search
+        beyond, slope = at(curvature)
+        least = jnp.where(beyond <= 0.0, curvature, least)
+        most = jnp.where(beyond >= 0.0, curvature, most)
+        step = -beyond / slope
+        new = curvature + step
+        good = (new >= least) & (new <= most) & (jnp.abs(step) <= 0.5 * last)
+        new = jnp.where(good, new, 0.5 * (least + most))
+        return new, least, most, jnp.abs(new - curvature)
 
     # A section that carries nothing leaves the whole curvature to the part that follows it.
-    far, none = aim / (1.0 + ends.material_share * ends.weak), jnp.zeros_like(aim)
-    start = aim / (1.0 + ends.weak)
-    begin = start, jnp.minimum(far, none), jnp.maximum(far, none), start, jnp.zeros((), int)
-    found = jax.lax.while_loop(proceed, iterate, begin)[0]
-    return found - _imbalance(law, section, reduced, found) / slope(found)[1]
+    far = aim / (1.0 + ends.material_share * ends.weak)
+    start = (
+        aim / (1.0 + ends.weak),
+        jnp.minimum(far, 0.0),
+        jnp.maximum(far, 0.0),
+        2.0 * jnp.abs(far),
+    )
+    found = jax.lax.fori_loop(0, _ITERATIONS, improve, start)[0]
+    return found - _imbalance(law, section, reduced, found) / at(found)[1]
 
 
 def elastic_resultants(
