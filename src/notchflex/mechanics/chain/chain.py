@@ -23,6 +23,7 @@ from notchflex.mechanics.flexure import (
     free_pose,
     rod,
     stack,
+    with_fibres,
     with_level,
 )
 from notchflex.mechanics.flexure.plane import planar_points
@@ -46,7 +47,6 @@ class Chain(Pytree):
     Attributes:
         rods: The flexures, each from the frame of body j - 1 to that of body j. A body's frame
             lies on the tube axis at its proximal face.
-        memory: Memory of the material at every node of every flexure.
         law: The material.
         friction: The friction between tendons and tube.
         groups: The tendons, by the way they run.
@@ -77,7 +77,6 @@ class Chain(Pytree):
     """
 
     rods: Rod
-    memory: Any
     law: SectionLaw
     friction: FrictionLaw
     groups: tuple[TendonGroup, ...]
@@ -116,6 +115,11 @@ class Chain(Pytree):
     def tendon_order(self) -> Int[np.ndarray, " t"]:
         """Numbers of the tendons, group by group."""
         return np.array([number for group in self.groups for number in group.numbers], int)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether a solved state depends on the one before, by friction or by the material."""
+        return self.friction.remembers or self.law.remembers
 
     @property
     def forces_on_bodies(self) -> bool:
@@ -163,7 +167,6 @@ def assemble(
     tendons = robot.tendon
     chain = Chain(
         rods=rods,
-        memory=(),
         groups=laid.groups,
         contact_pairs=shaped.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
@@ -243,8 +246,8 @@ class Shaped(NamedTuple):
 
 def shape_of(robot: Robot, level: str, refinement: int) -> Shaped:
     """What of a robot's chain follows from its shape alone."""
-    chord = robot.friction.turns_with_chord
-    return _shaped(robot.tube, robot.notches, robot.tendon, level, refinement, chord)
+    chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
+    return _shaped(robot.tube, robot.notches, robot.tendon, level, refinement, chord, fibres)
 
 
 # A search for constants of the material or of friction assembles one shape hundreds of times.
@@ -256,9 +259,11 @@ def _shaped(
     level: str,
     refinement: int,
     turns_with_chord: bool,
+    by_fibres: bool,
 ) -> Shaped:
     # Notches that are alike are worked out once.
-    unlike = {notch: _flexure(notch, tube, level, refinement) for notch in dict.fromkeys(notches)}
+    alike = dict.fromkeys(notches)
+    unlike = {notch: _flexure(notch, tube, level, refinement, by_fibres) for notch in alike}
     own_rods, free_poses = zip(*unlike.values(), strict=True)
     alike = stack(own_rods)
     number = {notch: index for index, notch in enumerate(unlike)}
@@ -287,9 +292,12 @@ def _shaped(
 
 
 @lru_cache(maxsize=512)
-def _flexure(notch: Notch, tube: Tube, level: str, refinement: int) -> tuple[Rod, Motion]:
+def _flexure(
+    notch: Notch, tube: Tube, level: str, refinement: int, by_fibres: bool
+) -> tuple[Rod, Motion]:
     """A flexure and its pose in the free robot."""
     made = with_level(rod(notch, tube, refinement), level)
+    made = with_fibres(made, notch, tube) if by_fibres else made
     return made, free_pose(made)
 
 
@@ -311,11 +319,11 @@ def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
 
 
 def flexure_states(
-    chain: Chain, modes: Float[Array, "n modes"], *, with_pose: bool
+    chain: Chain, modes: Float[Array, "n modes"], memory: Any, *, with_pose: bool
 ) -> FlexureState:
-    """State of all flexures at once."""
+    """State of all flexures at once, after a memory of the material at every node."""
     state = partial(flexure_state, with_pose=with_pose)
-    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, chain.memory, modes)
+    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, memory, modes)
 
 
 def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:

@@ -34,10 +34,13 @@ class Response(NamedTuple):
     Attributes:
         resultants: Moments about x, y, z (N mm) and forces along x, y, z (N).
         memory: The memory after these strains.
+        slope: Change of the moment about y with the curvature about y, where the law knows it:
+            all else is elastic. None to differentiate.
     """
 
     resultants: Float[Array, " 6"]
     memory: Any
+    slope: Float[Array, ""] | None = None
 
 
 class Bending(NamedTuple):
@@ -47,11 +50,15 @@ class Bending(NamedTuple):
         curvature: Curvature of the section itself, beyond that of the free tube, 1/mm.
         moment: Its moment, N mm.
         memory: The memory after it.
+        slope: Change of the moment with s, where the law knows it; None to differentiate.
+        strain: Strain of the neutral axis, for laws of fibres.
     """
 
     curvature: Float[Array, ""]
     moment: Float[Array, ""]
     memory: Any
+    slope: Array | None = None
+    strain: Array | float = 0.0
 
 
 # Of all strains and resultants those of weak-axis bending.
@@ -76,6 +83,21 @@ class SectionLaw(Pytree, ABC):
     elastic_modulus: Float[Array, ""]
     shear_modulus: Float[Array, ""]
 
+    @property
+    def remembers(self) -> bool:
+        """Whether the moment depends on the past."""
+        return False
+
+    def rest(self, section: FibreSection) -> Any:
+        """Return the memory of a free section, or of many; () where nothing is remembered."""
+        del section
+        return ()
+
+    def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
+        """Energy per length turned to heat between two memories, N mm/mm; for plain arrays."""
+        del before, after
+        return np.zeros(np.shape(section.area))
+
     @abstractmethod
     def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
         """Moment of a section without ends at a curvature about its weak axis, N mm."""
@@ -98,11 +120,19 @@ class SectionLaw(Pytree, ABC):
 
     def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
         """Resultants of a cross-section under given strains (beyond those of the free tube)."""
-        elastic = elastic_resultants(self.elastic_modulus, self.shear_modulus, section, strain)
-        q = 1.0 if section.ends is None else section.ends.flattening(strain[1])
-        bending = self.bent(strain[1] if section.ends is None else strain[1] / q, section, memory)
-        moment = bending.moment if section.ends is None else bending.moment / q
-        return Response(jnp.where(_WEAK, moment, elastic), bending.memory)
+        elastic = self.elastic(strain, section)
+        ends, curvature = section.ends, strain[1]
+        if ends is None:
+            bending = self.bent(curvature, section, memory)
+            moment, slope = bending.moment, bending.slope
+        else:
+            q = ends.flattening(curvature)
+            bending = self.bent(curvature / q, section, memory)
+            moment, slope = bending.moment / q, bending.slope
+            if slope is not None:
+                by_q = (ends.odd + 2.0 * ends.even * curvature) / q
+                slope = (slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
+        return Response(jnp.where(_WEAK, moment, elastic), bending.memory, slope)
 
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
@@ -112,8 +142,7 @@ class SectionLaw(Pytree, ABC):
         The area under the moment over the curvature, and the elastic rest. Of a law with
         hysteresis it is what fibres, ends and flattening hold; the rest of the area is dissipated.
         """
-        elastic = elastic_resultants(self.elastic_modulus, self.shear_modulus, section, strain)
-        others = 0.5 * jnp.where(_WEAK, 0.0, elastic) @ strain
+        others = 0.5 * jnp.where(_WEAK, 0.0, self.elastic(strain, section)) @ strain
         ends, curvature = section.ends, strain[1]
         if ends is None:
             return others + self.bending_energy(curvature, section, memory)
@@ -139,6 +168,11 @@ class SectionLaw(Pytree, ABC):
         return jax.lax.scan(
             add, jnp.zeros_like(curvature), constant(np.stack([NODES, WEIGHTS], -1))
         )[0]
+
+    def elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Float[Array, " 6"]:
+        """Resultants by the moduli of the free robot."""
+        plain = dataclasses.replace(section, fibres=None)
+        return elastic_resultants(self.elastic_modulus, self.shear_modulus, plain, strain)
 
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Resultants per strain in the free robot, of a section or of many."""
