@@ -173,11 +173,7 @@ class NitinolLaw(SectionLaw):
             return jax.tree.map(jnp.add, total, added), (transformed, slope)
 
         none = _Sums(*(jnp.zeros_like(strain) for _ in _Sums._fields))
-        every = (
-            some(fibres.arm),
-            some(fibres.area),
-            memory if isinstance(memory, tuple) else some(memory),
-        )
+        every = some(fibres.arm), some(fibres.area), jax.tree.map(some, memory)
         sums, (transformed, slope) = jax.lax.scan(add, none, every)
         shape = fibres.arm.shape
         return sums, jnp.reshape(transformed, shape), jnp.reshape(slope, shape)
@@ -200,7 +196,7 @@ class NitinolLaw(SectionLaw):
             slope = slope + jnp.where((beyond > 0.0) & (beyond < length), by, 0.0)
         return transformed, slope
 
-    def _segments(self, onset: Array) -> list[tuple[Array, Array, Array, Array]]:
+    def _segments(self, onset: Array) -> list[tuple[Array, ...]]:
         """Side, onset, length and slope of every segment of a curve."""
         parts = self.side, onset, self.length, self.slope
         return [tuple(part[j] for part in parts) for j in range(self.side.shape[0])]

@@ -9,13 +9,12 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 from numpy.polynomial.legendre import leggauss
-from numpy.typing import ArrayLike
 
+from notchflex._jax import constant
 from notchflex.mechanics.section.angles import half_angle
 
 FIBRES = 40
-# Angles within the arc, and within the bevelled ends of an arc that a plane cuts.
-_ARC, _BEVEL = 14, 6
+_RADII = 5
 
 Points = tuple[Float[np.ndarray, " fibres"], Float[np.ndarray, " fibres"]]
 """Arms (mm) and areas (mm^2)."""
@@ -28,37 +27,42 @@ def rectangle_fibres(near: float, spine: float) -> Points:
 
 
 def sector_fibres(outer: float, inner: float, depth: float) -> Points:
-    """Fibres of an annular sector (`annular_sector`), two rows of twenty."""
-    half = float(half_angle(*(np.asarray(x) for x in (outer, 2.0 * outer - depth, depth))))
-    angles, weights = _between(0.0, half, FIBRES // 2)
-    return _polar(angles, weights, inner, outer)
+    """Fibres of an annular sector (`annular_sector`): five radii at eight angles of each half."""
+    numbers = outer, 2.0 * outer - depth, depth
+    half = float(half_angle(*(constant(number) for number in numbers)))
+    angles, of_angles = _between(0.0, half, FIBRES // _RADII)
+    radii, of_radii = _between(inner, outer, _RADII)
+    area = 2.0 * np.outer(of_radii * radii, of_angles)
+    return np.outer(radii, np.cos(angles)).ravel(), area.ravel()
 
 
 def segment_fibres(outer: float, inner: float, depth: float) -> Points:
-    """Fibres of an annular segment (`annular_segment`), two rows of twenty."""
+    """Fibres of an annular segment (`annular_segment`): strips across, outside and beside the bore.
+
+    The heights of strips are cosines, so that the chords of both circles are smooth over them.
+    """
     plane = depth - outer
-    at_outer, at_inner = (np.arccos(np.clip(plane / r, -1.0, 1.0)) for r in (outer, inner))
-    arc, of_arc = _between(0.0, min(at_outer, at_inner), _ARC)
-    bevel, of_bevel = _between(min(at_outer, at_inner), max(at_outer, at_inner), _BEVEL)
-    cut = plane / np.cos(bevel)  # distance of the plane from the axis along the angle
-    whole = np.ones(_ARC)
-    least = np.append(inner * whole, cut if plane > 0.0 else inner + 0.0 * cut)
-    most = np.append(outer * whole, cut if plane < 0.0 else outer + 0.0 * cut)
-    return _polar(np.append(arc, bevel), np.append(of_arc, of_bevel), least, most)
+    top, bottom = (float(np.arccos(np.clip(plane / r, -1.0, 1.0))) for r in (outer, inner))
+    beyond = float(np.arccos(np.clip(inner / outer, plane / outer, 1.0)))
+    ends = [(0.0, beyond)] + ([(np.pi - beyond, top)] if plane < -inner else [])
+    at_bore = FIBRES // 2 if bottom > 0.0 else 0
+    angles, of_angles = zip(
+        *(_between(*pair, (FIBRES - at_bore) // len(ends)) for pair in ends), strict=True
+    )
+    solid, of_solid = np.concatenate(angles), np.concatenate(of_angles)
+    bore, of_bore = _between(0.0, bottom, at_bore) if at_bore else (np.zeros(0), np.zeros(0))
+    height = inner * np.cos(bore)
+    wall = np.sqrt(outer**2 - height**2) - inner * np.sin(bore)
+    area = (
+        2.0 * (outer * np.sin(solid)) ** 2 * of_solid,
+        2.0 * wall * inner * np.sin(bore) * of_bore,
+    )
+    return np.append(outer * np.cos(solid), height), np.concatenate(area)
 
 
 def _between(first: float, last: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     points, weights = leggauss(count)
     return 0.5 * (first + last) + 0.5 * (last - first) * points, 0.5 * (last - first) * weights
-
-
-def _polar(angles: np.ndarray, weights: np.ndarray, least: ArrayLike, most: ArrayLike) -> Points:
-    """Two fibres along every radius, of both halves of the section together."""
-    points, of_points = leggauss(2)
-    middle, reach = 0.5 * (np.asarray(least) + most), 0.5 * (np.asarray(most) - least)
-    radius = middle + reach * points[:, None]
-    area = 2.0 * weights * reach * radius * of_points[:, None]
-    return (radius * np.cos(angles)).ravel(), area.ravel()
 
 
 def fitted(points: Points, area: float, second_moment: float) -> Points:

@@ -119,6 +119,8 @@ class _Quantities:
     """Largest tension ratio over a contact, shape (t, contacts)."""
     dissipation = Table()
     """Dissipation, N mm, shape (t, contacts)."""
+    material_dissipation = Table()
+    """Dissipation of the material, N mm, shape (n)."""
     front_contact = Table()
     """Friction front, shape (t)."""
     front_eta = Table()
