@@ -30,6 +30,9 @@ _AT_ONCE = 8
 # A transformed strain this near to a curve goes on along it.
 _ON_CURVE = 1e-12
 
+# Length of a plateau without end, as a strain.
+_ENDLESS = 1e6
+
 
 class _Sums(NamedTuple):
     """Sums over the fibres: force (N) and moment (N mm), and how they change.
@@ -258,6 +261,6 @@ def _(material: Nitinol) -> NitinolLaw:
         shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
         onset=constant(curves),
         side=constant([1.0, -1.0]),
-        length=constant([np.inf if end is None else end - loading] * 2),
+        length=constant([_ENDLESS if end is None else end - loading] * 2),
         slope=constant([1.0 - hardening / modulus] * 2),
     )
