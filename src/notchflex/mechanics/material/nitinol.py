@@ -23,8 +23,8 @@ from notchflex.mechanics.material.fibre_section import Fibres, FibreSection
 from notchflex.mechanics.material.law import Bending, SectionLaw, section_law
 from notchflex.robot import Nitinol
 
-# Newton's iterations from the elastic solution.
-_ITERATIONS = 10
+# Newton's method ends at this imbalance, as a part of the strain of bending, or after many tries.
+_BALANCED, _MOST_TRIES = 1e-13, 16
 # So many fibres at once: programs get longer with more, and slower with fewer.
 _AT_ONCE = 8
 # A transformed strain this near to a curve goes on along it.
@@ -69,11 +69,10 @@ class _Joint(NamedTuple):
             by_strain * sums.force - slopes.stretch * beyond
         ) / determinant
 
-    def size(self, curvature: Array, sums: _Sums, modulus: Array, section: FibreSection) -> Array:
+    def size(self, curvature: Array, sums: _Sums, scale: tuple[Array, Array]) -> Array:
         """Imbalance of forces and of bending, as strains."""
         beyond = self.own * curvature + self.soft * sums.moment - self.reduced
-        stretch = sums.force / (modulus * section.area)
-        return jnp.abs(stretch) + section.edge_near * jnp.abs(beyond)
+        return jnp.abs(sums.force) / scale[1] + scale[0] * jnp.abs(beyond)
 
     def slope(self, slopes: _Sums) -> Array:
         """Change of the moment with s."""
@@ -118,31 +117,12 @@ class NitinolLaw(SectionLaw):
         weak, share = (0.0, 0.0) if ends is None else (ends.weak, ends.material_share)
         rigidity = self.elastic_modulus * section.second_moment_weak
         joint = _Joint(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
-        everything = self, fibres, memory, joint
-        still, held, past, fixed = jax.tree.map(jax.lax.stop_gradient, everything)
-
-        def improve(_: int, search: tuple[Array, ...]) -> tuple[Array, ...]:
-            """Try a step: the next one where the imbalance falls, half of it where not."""
-            strain, curvature, *steps, least = search
-            trial = strain + steps[0], curvature + steps[1]
-            sums = still._sum(held, past, *trial)[0]
-            size = fixed.size(trial[1], sums, still.elastic_modulus, section)
-            falls = size < least
-            steps = [
-                jnp.where(falls, new, 0.5 * old)
-                for new, old in zip(fixed.step(trial[1], sums, sums), steps, strict=True)
-            ]
-            strain, curvature = (
-                jnp.where(falls, new, old)
-                for new, old in zip(trial, (strain, curvature), strict=True)
-            )
-            return strain, curvature, *steps, jnp.where(falls, size, least)
-
-        elastic = fixed.reduced / (1.0 + jax.lax.stop_gradient(weak))
-        none, far = jnp.zeros_like(elastic), jnp.full_like(elastic, jnp.inf)
-        begin = none, elastic, none, none, far
-        strain, curvature, *steps, _ = jax.lax.fori_loop(0, _ITERATIONS, improve, begin)
-        strain, curvature = strain + steps[0], curvature + steps[1]
+        start = reduced / (1.0 + weak)
+        scale = section.edge_near, self.elastic_modulus * section.area
+        everything = self, fibres, memory, joint, scale, start
+        still = jax.tree.map(jax.lax.stop_gradient, everything)
+        strain, curvature = _settled(*still)
+        _, held, _, fixed, *_ = still
         sums, transformed, slope = self._sum(fibres, memory, strain, curvature)
         slopes: _Sums = jax.tree.map(jax.lax.stop_gradient, sums)
         by_strain, by_curvature = joint.step(curvature, sums, slopes)
@@ -243,6 +223,62 @@ class NitinolLaw(SectionLaw):
         ends = section.ends
         follows = 1.0 if ends is None else 1.0 + ends.material_share * ends.weak
         return follows * np.sum(loss * section.fibres.area, axis=-1)
+
+
+def _settle(
+    law: NitinolLaw,
+    fibres: Fibres,
+    memory: Any,
+    joint: _Joint,
+    scale: tuple[Array, Array],
+    start: Array,
+) -> tuple[Array, Array]:
+    """Find strain of the neutral axis and curvature of all sections together, from a curvature.
+
+    Together, so that one condition stops the search, whose sections may have leading axes.
+    """
+    balance = law._sum
+    for _ in start.shape:
+        balance = jax.vmap(balance)
+
+    def proceed(search: tuple[Array, ...]) -> Array:
+        *_, least, tries = search
+        return jnp.any(least > _BALANCED * scale[0] * jnp.abs(joint.reduced)) & (
+            tries < _MOST_TRIES
+        )
+
+    def improve(search: tuple[Array, ...]) -> tuple[Array, ...]:
+        """Try a step: the next one where the imbalance falls, half of it where not."""
+        strain, curvature, by_strain, by_curvature, least, tries = search
+        trial = strain + by_strain, curvature + by_curvature
+        sums = balance(fibres, memory, *trial)[0]
+        size = joint.size(trial[1], sums, scale)
+        falls = size < least
+        new = *trial, *joint.step(trial[1], sums, sums), size
+        old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, least
+        kept = (jnp.where(falls, *pair) for pair in zip(new, old, strict=True))
+        return *kept, tries + 1
+
+    none, far = jnp.zeros_like(start), jnp.full_like(start, jnp.inf)
+    begin = none, start, none, none, far, jnp.zeros((), int)
+    strain, curvature, by_strain, by_curvature, *_ = jax.lax.while_loop(proceed, improve, begin)
+    return strain + by_strain, curvature + by_curvature
+
+
+_settled = jax.custom_batching.custom_vmap(_settle)
+
+
+@_settled.def_vmap
+def _(size: int, batched: Any, law: NitinolLaw, *sections: Any) -> tuple[Any, tuple[bool, bool]]:
+    if any(jax.tree.leaves(batched[0])):  # rows of a batch that is not one of sections
+        axes = jax.tree.map(lambda one: 0 if one else None, list(batched))
+        return jax.vmap(_settle, in_axes=tuple(axes))(law, *sections), (True, True)
+    every = jax.tree.map(
+        lambda one, leaf: leaf if one else jnp.broadcast_to(leaf, (size, *jnp.shape(leaf))),
+        list(batched[1:]),
+        list(sections),
+    )
+    return _settled(law, *every), (True, True)
 
 
 @section_law.register
