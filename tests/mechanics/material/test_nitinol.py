@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.mechanics.flexure import rod, with_fibres
+from notchflex.mechanics.chain.fibres import with_fibres
+from notchflex.mechanics.flexure import rod
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
 from notchflex.mechanics.section.fibres import Points, sector_fibres, segment_fibres
 

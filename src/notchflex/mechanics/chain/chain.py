@@ -11,6 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from notchflex._jax import constant, jax, jnp
 from notchflex._pytree import Pytree, static
+from notchflex.mechanics.chain.fibres import with_fibres
 from notchflex.mechanics.chain.mass import body_lengths, body_masses
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
 from notchflex.mechanics.contact import ContactGroup, build_contacts
@@ -23,7 +24,6 @@ from notchflex.mechanics.flexure import (
     free_pose,
     rod,
     stack,
-    with_fibres,
     with_level,
 )
 from notchflex.mechanics.flexure.plane import planar_points

@@ -3,7 +3,6 @@
 from notchflex._packages import import_all
 from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
-from notchflex.mechanics.flexure.fibres import section_fibres, with_fibres
 from notchflex.mechanics.flexure.plane import flattened
 from notchflex.mechanics.flexure.registry import rod
 from notchflex.mechanics.flexure.rod import Rod
@@ -46,9 +45,7 @@ __all__ = [
     "relative_pose",
     "rod",
     "rod_end",
-    "section_fibres",
     "stack",
     "turn_doubt",
-    "with_fibres",
     "with_level",
 ]

@@ -86,14 +86,14 @@ class NitinolLaw(SectionLaw):
     Attributes:
         onset: Strain from which each segment of the lower and of the upper curve transforms;
             one curve without hysteresis.
-        side: 1 for segments of tension, -1 for those of compression.
-        length: Strain over which a segment transforms.
+        low: Strain beyond the onset up to which a segment transforms in compression; 0 in tension.
+        high: The same in tension; 0 in compression.
         slope: Transformed strain per strain in it.
     """
 
     onset: Float[Array, "curves segments"]
-    side: Float[Array, " segments"]
-    length: Float[Array, " segments"]
+    low: Float[Array, " segments"]
+    high: Float[Array, " segments"]
     slope: Float[Array, " segments"]
 
     @property
@@ -123,7 +123,7 @@ class NitinolLaw(SectionLaw):
         still = jax.tree.map(jax.lax.stop_gradient, everything)
         strain, curvature = _settled(*still)
         _, held, _, fixed, *_ = still
-        sums, transformed, slope = self._sum(fibres, memory, strain, curvature)
+        sums, transformed, slope = self.sum_fibres(fibres, memory, strain, curvature)
         slopes: _Sums = jax.tree.map(jax.lax.stop_gradient, sums)
         by_strain, by_curvature = joint.step(curvature, sums, slopes)
         if not isinstance(memory, tuple):
@@ -137,7 +137,7 @@ class NitinolLaw(SectionLaw):
             strain=strain + by_strain,
         )
 
-    def _sum(
+    def sum_fibres(
         self, fibres: Fibres, memory: Any, strain: Array, curvature: Array
     ) -> tuple[_Sums, Array, Array]:
         """Sums over the fibres, transformed strain of each and its change with the strain."""
@@ -149,15 +149,15 @@ class NitinolLaw(SectionLaw):
             arm, area, past = some
             own = strain + curvature * arm
             transformed, slope = self._transformed(own, past)
-            force = area * self.elastic_modulus * (own - transformed)
-            tangent = area * self.elastic_modulus * (1.0 - slope)
-            parts = force, force * arm, tangent, tangent * arm, tangent * arm**2
+            force, tangent = area * (own - transformed), area * (1.0 - slope)
+            parts = force, force * arm, tangent, tangent * arm, tangent * arm * arm
             added = _Sums(*(jnp.sum(part) for part in parts))
             return jax.tree.map(jnp.add, total, added), (transformed, slope)
 
         none = _Sums(*(jnp.zeros_like(strain) for _ in _Sums._fields))
         every = some(fibres.arm), some(fibres.area), jax.tree.map(some, memory)
         sums, (transformed, slope) = jax.lax.scan(add, none, every)
+        sums = jax.tree.map(lambda total: self.elastic_modulus * total, sums)
         shape = fibres.arm.shape
         return sums, jnp.reshape(transformed, shape), jnp.reshape(slope, shape)
 
@@ -173,16 +173,17 @@ class NitinolLaw(SectionLaw):
     def _curve(self, strain: Array, onset: Array) -> tuple[Array, Array]:
         """Transformed strain on a curve, and its slope."""
         transformed, slope = jnp.zeros_like(strain), jnp.zeros_like(strain)
-        for side, start, length, by in self._segments(onset):
-            beyond = side * (strain - start)
-            transformed = transformed + side * by * jnp.clip(beyond, 0.0, length)
-            slope = slope + jnp.where((beyond > 0.0) & (beyond < length), by, 0.0)
+        for start, low, high, by in self._segments(onset):
+            beyond = strain - start
+            within = jnp.clip(beyond, low, high)
+            transformed = transformed + by * within
+            slope = slope + jnp.where(within == beyond, by, 0.0)
         return transformed, slope
 
     def _segments(self, onset: Array) -> list[tuple[Array, ...]]:
-        """Side, onset, length and slope of every segment of a curve."""
-        parts = self.side, onset, self.length, self.slope
-        return [tuple(part[j] for part in parts) for j in range(self.side.shape[0])]
+        """Onset, limits and slope of every segment of a curve."""
+        parts = onset, self.low, self.high, self.slope
+        return [tuple(part[j] for part in parts) for j in range(self.slope.shape[0])]
 
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
@@ -196,8 +197,9 @@ class NitinolLaw(SectionLaw):
             return fibres.area @ self._area_under(strain, halfway)
         # Where the curve halfway has the same transformed strain.
         there, transformed = jnp.zeros_like(strain), bent.memory
-        for side, start, _, by in self._segments(halfway):
-            there = there + jnp.where(side * transformed > 0.0, start + transformed / by, 0.0)
+        for start, low, high, by in self._segments(halfway):
+            part = jnp.clip(transformed / by, low, high)
+            there = there + jnp.where(part != 0.0, start + part, 0.0)
         elastic = (strain - transformed) ** 2 - (there - transformed) ** 2
         held = self._area_under(there, halfway) + 0.5 * self.elastic_modulus * elastic
         return fibres.area @ held
@@ -205,9 +207,9 @@ class NitinolLaw(SectionLaw):
     def _area_under(self, strain: Array, onset: Array) -> Array:
         """Area under the stress of a curve up to a strain, N mm/mm^3."""
         area = 0.5 * strain**2
-        for side, start, length, by in self._segments(onset):
-            beyond = side * (strain - start)
-            within = jnp.clip(beyond, 0.0, length)
+        for start, low, high, by in self._segments(onset):
+            beyond = strain - start
+            within = jnp.clip(beyond, low, high)
             area = area - by * within * (beyond - 0.5 * within)
         return self.elastic_modulus * area
 
@@ -216,9 +218,11 @@ class NitinolLaw(SectionLaw):
         if not self.remembers or section.fibres is None:
             return super().dissipated(section, before, after)
         loss = np.zeros(np.shape(after))
-        for number, side in enumerate(np.asarray(self.side)):
-            width = self.elastic_modulus * np.abs(self.onset[0, number] - self.onset[1, number])
-            change = np.maximum(side * after, 0.0) - np.maximum(side * before, 0.0)
+        for lower, upper, low, high, by in zip(
+            *self.onset, self.low, self.high, self.slope, strict=True
+        ):
+            width = self.elastic_modulus * np.abs(upper - lower)
+            change = np.clip(after, by * low, by * high) - np.clip(before, by * low, by * high)
             loss = loss + 0.5 * width * np.abs(change)
         ends = section.ends
         follows = 1.0 if ends is None else 1.0 + ends.material_share * ends.weak
@@ -237,7 +241,7 @@ def _settle(
 
     Together, so that one condition stops the search, whose sections may have leading axes.
     """
-    balance = law._sum
+    balance = law.sum_fibres
     for _ in start.shape:
         balance = jax.vmap(balance)
 
@@ -292,11 +296,12 @@ def _(material: Nitinol) -> NitinolLaw:
         # A fibre does not fall below loading in tension, nor below unloading in compression.
         curves = [(loading, -ratio * unloading), (unloading, -ratio * loading)]
     end = material.transformation_strain
+    length = _ENDLESS if end is None else end - loading
     return NitinolLaw(
         elastic_modulus=constant(modulus),
         shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
         onset=constant(curves),
-        side=constant([1.0, -1.0]),
-        length=constant([_ENDLESS if end is None else end - loading] * 2),
+        low=constant([0.0, -length]),
+        high=constant([length, 0.0]),
         slope=constant([1.0 - hardening / modulus] * 2),
     )

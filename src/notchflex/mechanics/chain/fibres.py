@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from notchflex._jax import constant
-from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure import Rod
 from notchflex.mechanics.material import Fibres
 from notchflex.mechanics.section.fibres import (
     Points,
