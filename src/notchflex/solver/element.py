@@ -49,7 +49,7 @@ class Memory(NamedTuple):
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
     slid: tuple[Float[Array, "*n t 2"], ...]
     bound: tuple[Float[Array, "*n t 2"], ...]
-    material: Any
+    material: Any = ()
 
 
 def notch_heights(chain: Chain) -> Float[Array, " n"]:
