@@ -21,7 +21,7 @@ from lanewise.lowering.scan_inputs import ScanInputs, slice_of
 
 # Primitives that call another function.
 _CALLS = {"jit", "pjit", "closed_call", "core_call", "remat", "remat2", "checkpoint"}.union(
-    ("custom_jvp_call", "custom_vjp_call")
+    ("custom_jvp_call", "custom_vjp_call", "custom_vmap_call")
 )
 
 
@@ -108,7 +108,7 @@ class JaxprLowering:
                     operands[at] = self.arrays.elementwise("to_float", operands[at])
             return self.function(_elementary(name, len(operands)), operands, scalar=True)
         if name in _CALLS:
-            inner = params["jaxpr" if "jaxpr" in params else "call_jaxpr"]
+            inner = next(params[key] for key in ("jaxpr", "call_jaxpr", "call") if key in params)
             if hasattr(inner, "consts"):
                 return self.function(inner, operands, scalar=scalar)
             return self._jaxpr(inner, [], operands, scalar)
