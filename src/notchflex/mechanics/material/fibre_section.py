@@ -43,6 +43,10 @@ class NotchEnds(Pytree):
         """By how much the distances of the fibres shrink at a curvature: q."""
         return 1.0 + curvature * (self.odd + curvature * self.even)
 
+    def slope_factor(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
+        """Tangent of an elastic notch over its stiffness at rest, times q^3; 0 at limit points."""
+        return 1.0 - curvature * (self.odd + 3.0 * curvature * self.even)
+
 
 class Fibres(Pytree):
     """Fibres of a section, for laws that sum up their stresses.
