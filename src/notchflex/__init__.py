@@ -74,6 +74,8 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "Band",
+            "Bands",
             "Batch",
             "Closing",
             "ClosingStatus",
@@ -92,6 +94,7 @@ _HOME = {
             "solve_each",
             "tip_from_angles",
             "tip_response",
+            "uncertain",
         ),
         "notchflex.analysis",
     ),

@@ -14,9 +14,12 @@ from notchflex.analysis.kinematics import (
     tip_from_angles,
 )
 from notchflex.analysis.solve import simulate, solve, solve_each
+from notchflex.analysis.uncertainty.bands import Band, Bands, uncertain
 
 __all__ = [
     "AxisPlaces",
+    "Band",
+    "Bands",
     "Batch",
     "Closing",
     "ClosingStatus",
@@ -38,4 +41,5 @@ __all__ = [
     "solve_each",
     "tip_from_angles",
     "tip_response",
+    "uncertain",
 ]

@@ -17,7 +17,7 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
     """Describe the picture of a result, whatever its kind.
 
     Args:
-        result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, a `Comparison`, a
+        result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a `Comparison`, a
             `Calibration`, a `FrictionRig`, or a dict of label to path for several beside each
             other.
         title: Heading; that of its kind if None.
@@ -42,7 +42,7 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
 
 def _picture(result: Any) -> Picture:
-    from notchflex.analysis import Batch
+    from notchflex.analysis import Bands, Batch
     from notchflex.comparison import Comparison
     from notchflex.plotting.batch import batch_picture
     from notchflex.plotting.beside import beside_picture
@@ -59,6 +59,7 @@ def _picture(result: Any) -> Picture:
         EquilibriumPath: path_picture,
         Equilibrium: lambda state: state_picture(state.path, state.step),
         Batch: batch_picture,
+        Bands: lambda bands: path_picture(bands.path, bands=bands),
         Comparison: comparison_picture,
     }
     for kind, describe in kinds.items():

@@ -23,6 +23,9 @@ _SECTIONS: dict[str, type] = {
 _PATH = re.compile(r"(?P<section>\w+)(?:\[(?P<index>\*|\d+)\])?(?:\.(?P<key>\w+))?")
 _EXAMPLES = "write it like material.elastic_modulus, notch[2].depth or notch[*].depth"
 
+# Begins the name of a tolerance, such as `tolerance.notch.depth`.
+_TOLERANCE = "tolerance."
+
 # More digits than the number of any notch has.
 _DIGITS = 9
 
@@ -72,9 +75,13 @@ def set_values(
     pairs: Iterable[tuple[str, object]] = (
         cast("Mapping[str, object]", values).items() if isinstance(values, Mapping) else values
     )
-    targets = [(_parse(path), value) for path, value in pairs]
+    pairs = list(pairs)
+    tolerances = {path: value for path, value in pairs if path.strip().startswith(_TOLERANCE)}
+    targets = [(_parse(path), value) for path, value in pairs if path not in tolerances]
     targets.sort(key=lambda item: (item[0].key != "kind", item[0].number is not None))
     table = to_table(robot)
+    for path, value in tolerances.items():
+        table.setdefault("tolerance", {})[path.strip().removeprefix(_TOLERANCE)] = value
     dropped: list[str] = []
     seen: set[tuple[str, int | None, str]] = set()
     for target, value in targets:
@@ -87,6 +94,8 @@ def set_values(
             dropped += _set_kind(table, target, value)
         else:
             _set_key(table, target, value)
+    for path in dropped:
+        table.get("tolerance", {}).pop(path, None)
     return Changed(remember_source(from_table(table), source_of(robot)), tuple(dropped))
 
 
@@ -147,6 +156,35 @@ def number_at(robot: Robot, path: str) -> float:
             f"`{path}` is {value!r} in this robot, and no number that changes smoothly."
         )
     return value
+
+
+def numbers_at(robot: Robot, path: str) -> dict[str, float]:
+    """Every number that a path means, each by its own name.
+
+    Args:
+        robot: The robot.
+        path: As for `Robot.with_value`; `notch.depth` means that of every notch that has a depth.
+
+    Raises:
+        InputError: As for `number_at`.
+
+    Example:
+        >>> from notchflex.robot import load_robot
+        >>> numbers_at(load_robot("pacheco2021-c"), "notch.depth")["notch[2].depth"]
+        1.39
+    """
+    target = _parse(path)
+    counts = {"notch": robot.number_of_notches, "tendon": robot.number_of_tendons}
+    if target.section not in counts or target.number is not None:
+        return {path: number_at(robot, path)}
+    found: dict[str, float] = {}
+    for number in range(1, counts[target.section] + 1):
+        name = f"{target.section}[{number}].{target.key}"
+        try:
+            found[name] = number_at(robot, name)
+        except InputError:  # a notch of another kind
+            continue
+    return found or {path: number_at(robot, path)}
 
 
 def described_at(robot: Robot, path: str) -> Described:
