@@ -13,7 +13,7 @@ from notchflex.robot.kinds import Friction, Material, Notch, one_of
 from notchflex.robot.openings import openings_along
 from notchflex.robot.part import ProblemError, part
 from notchflex.robot.tendon import Tendon
-from notchflex.robot.tolerance import Tolerances, tolerance_problems
+from notchflex.robot.tolerance import Tolerances
 from notchflex.robot.tube import Tube
 
 if TYPE_CHECKING:
@@ -113,6 +113,8 @@ class Robot:
                 for key, text in self._tendon_problems(tendon):
                     yield (f"tendon[{i}].{key}", text)
         if self.tolerance and not found:
+            from notchflex.robot.value_names import tolerance_problems  # it makes robots
+
             yield from tolerance_problems(self)
 
     def _tendon_problems(self, tendon: Tendon) -> Iterator[tuple[str, str]]:

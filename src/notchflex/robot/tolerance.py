@@ -4,16 +4,12 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, cast
+from typing import Annotated, Any, TypeAlias, cast
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from notchflex.errors import InputError
 from notchflex.robot.error_messages import unknown_key
 from notchflex.robot.part import ProblemError
-
-if TYPE_CHECKING:
-    from notchflex.robot.robot import Robot
 
 Deviation: TypeAlias = float | str
 """A number in the unit of the value, or a part of the value as text, such as "5 %"."""
@@ -62,30 +58,6 @@ def amount(deviation: Deviation | None, value: float) -> float:
     if isinstance(deviation, str):
         return float(deviation.rstrip("% ")) / 100.0 * abs(value)
     return math.inf if deviation is None else deviation
-
-
-def tolerance_problems(robot: "Robot") -> Iterator[tuple[str, str]]:
-    """Find tolerances of what the robot does not have, or in a wrong unit."""
-    from notchflex.robot.value_names import described_at, numbers_at  # it makes robots
-
-    for one in robot.tolerance:
-        try:
-            numbers = numbers_at(robot, one.value)
-        except InputError as error:
-            yield f"tolerance.{one.value}", f"is about no number of this robot: {error}"
-            continue
-        unit = described_at(robot, one.value).unit
-        if one.per_notch and not one.value.startswith("notch."):
-            yield f"tolerance.{one.value}", "has `per_notch`, which is for values of all notches."
-        smallest = min(abs(number) for number in numbers.values())
-        for key in ("sd", "plus", "minus") if unit in ("mm", "MPa") and smallest else ():
-            size = getattr(one, key)
-            if size is not None and amount(size, smallest) >= smallest:
-                yield (
-                    f"tolerance.{one.value}",
-                    f"has {key} = {size}, as much as the value itself, {smallest:g} {unit}; "
-                    f"give it in {unit}, or in percent as text.",
-                )
 
 
 def read_tolerances(table: Any) -> Any:

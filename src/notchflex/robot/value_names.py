@@ -3,7 +3,7 @@
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, cast
 
 from notchflex.errors import InputError
@@ -11,6 +11,7 @@ from notchflex.robot.error_messages import fields_of, nearest, unknown_key
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.robot import Robot, from_table, remember_source, source_of, to_table
 from notchflex.robot.tendon import Tendon
+from notchflex.robot.tolerance import amount
 from notchflex.robot.tube import Tube
 
 _SECTIONS: dict[str, type] = {
@@ -218,6 +219,28 @@ def described_at(robot: Robot, path: str) -> Described:
     raise InputError.UNKNOWN_NAME(
         f"`{path}` is not the name of a number of this robot; {_EXAMPLES}."
     )
+
+
+def tolerance_problems(robot: Robot) -> Iterator[tuple[str, str]]:
+    """Find tolerances of what the robot does not have, or in a wrong unit."""
+    for one in robot.tolerance:
+        try:
+            numbers = numbers_at(robot, one.value)
+        except InputError as error:
+            yield f"tolerance.{one.value}", f"is about no number of this robot: {error}"
+            continue
+        unit = described_at(robot, one.value).unit
+        if one.per_notch and not one.value.startswith("notch."):
+            yield f"tolerance.{one.value}", "has `per_notch`, which is for values of all notches."
+        smallest = min(abs(number) for number in numbers.values())
+        for key in ("sd", "plus", "minus") if unit in ("mm", "MPa") and smallest else ():
+            size = getattr(one, key)
+            if size is not None and amount(size, smallest) >= smallest:
+                yield (
+                    f"tolerance.{one.value}",
+                    f"has {key} = {size}, as much as the value itself, {smallest:g} {unit}; "
+                    f"give it in {unit}, or in percent as text.",
+                )
 
 
 def parse_value(text: str) -> object:

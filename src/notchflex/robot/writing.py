@@ -202,7 +202,9 @@ def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
             continue
         else:  # the head of the file: the name, and whatever is not under a header of its own
             headed = {one.name for one in blocks}
-            wanted.append((block, {k: v for k, v in new.items() if k not in (*headed, "tolerance")}))
+            wanted.append(
+                (block, {k: v for k, v in new.items() if k not in (*headed, "tolerance")})
+            )
     if "tolerance" in new and all(block.name != "tolerance" for block in blocks):
         wanted.append((_Block("tolerance", ["\n"], "[tolerance]\n"), new["tolerance"]))
     texts: list[str] = []

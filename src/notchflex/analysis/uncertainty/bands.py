@@ -122,7 +122,9 @@ class Bands(Displayed, Mapping[str, Band]):
             if name in self and self.samples[name].ndim == 2:
                 one = self[name]
                 ends = [course(side * quantity.scale) for side in (one.low, one.high)]
-                rows.append((quantity.title, f"{ends[0]} {quantity.unit}, {ends[1]} {quantity.unit}"))
+                rows.append(
+                    (quantity.title, f"{ends[0]} {quantity.unit}, {ends[1]} {quantity.unit}")
+                )
         rows.append(("bands of", ", ".join(self)))
         rows.append(("assumed", ", ".join(self.assumed) or "nothing"))
         title = f"Bands of {self.draws} draws over {len(self.path)} steps, 5 to 95 %"
@@ -209,7 +211,9 @@ def uncertain(
     samples: dict[str, np.ndarray] = {}
     for name in names:
         values = found[name] if turn is None else REGISTERED[name].turned(found[name], turn)
-        samples[name] = np.where(good.reshape(good.shape + (1,) * (values.ndim - 2)), values, np.nan)
+        samples[name] = np.where(
+            good.reshape(good.shape + (1,) * (values.ndim - 2)), values, np.nan
+        )
     return Bands(
         path, chosen, assumed, samples, drawn.values, good.sum(axis=0), drawn.redrawn, seed
     )

@@ -74,13 +74,17 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
     tension, angle = _closing(loads, gaps, forces > gaps * stiffness, angles)
     total = band(found.samples["total_angle"][:, np.searchsorted(loads, load)])
     by_depth = _by_depth(robot, _pull(robot, tendon, np.array([load])))
-    return ClosingBands(found, own + 1, _with_never(tension), band(angle), load, tendon, total, by_depth)
+    return ClosingBands(
+        found, own + 1, _with_never(tension), band(angle), load, tendon, total, by_depth
+    )
 
 
 def _with_never(tension: Float[np.ndarray, "d n"]) -> Band:
     """The band of tensions of which some are infinite."""
     found = band(np.minimum(tension, _NEVER))
-    return Band(*(np.where(one < _NEVER, one, np.inf) for one in (found.low, found.median, found.high)))
+    return Band(
+        *(np.where(one < _NEVER, one, np.inf) for one in (found.low, found.median, found.high))
+    )
 
 
 def _pull(robot: Robot, tendon: int, loads: Float[np.ndarray, " s"]) -> LoadPath:

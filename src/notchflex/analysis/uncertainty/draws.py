@@ -40,7 +40,9 @@ class _Source(NamedTuple):
 
     def values(self, level: float) -> dict[str, float]:
         """The values at a level of the distribution, between 0 and 1."""
-        return {name: one + deviation(self.tolerance, one, level) for name, one in self.nominal.items()}
+        return {
+            name: one + deviation(self.tolerance, one, level) for name, one in self.nominal.items()
+        }
 
 
 def deviation(tolerance: Tolerance, value: float, level: float) -> float:
