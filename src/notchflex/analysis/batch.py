@@ -322,6 +322,3 @@ def _tables(
         layouts = (structure, layout, outputs)
         tables.append(_Table(rows, structure.pack(vectors), np.concatenate(commands), own, layouts))
     return tables
-
-
-__all__ = ["Batch", "simulate_batch", "solve_batch"]

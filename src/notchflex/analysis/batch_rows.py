@@ -37,6 +37,3 @@ def follow_row(
     robot, loads = chain_layout.unpack(chain), command_layout.unpack(commands)
     start, settings = at_rest(robot), Settings.of(numbers)
     return follow_path(robot, loads, start, settings, outputs)
-
-
-__all__ = ["follow_row"]

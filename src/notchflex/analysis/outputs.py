@@ -89,6 +89,3 @@ def report_quantities(
     told = _told(chain, solved, outputs)
     del told["_holds"]
     return told
-
-
-__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "check_outputs", "follow_path", "report_quantities"]

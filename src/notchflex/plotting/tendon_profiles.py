@@ -12,8 +12,7 @@ from notchflex.plotting.branches import abscissa, steps_by_branch
 from notchflex.plotting.curves import LINE, NEUTRAL, branch_lines
 from notchflex.plotting.sheet import BESIDE, Colour, Line, Mark, Panel
 from notchflex.plotting.style import sequence_colours
-from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.results.quantities.spans import spans_of
+from notchflex.results.quantities.registry import QUANTITIES, spans_of
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath

@@ -134,6 +134,3 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         from notchflex.results.summary import equilibrium_summary
 
         return equilibrium_summary(self)
-
-
-__all__ = ["ConvergenceError", "Equilibrium"]

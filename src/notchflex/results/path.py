@@ -20,7 +20,7 @@ from notchflex.loads.command import Command, make_commands
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.motion import rotation_about
 from notchflex.results.equilibrium import Equilibrium
-from notchflex.results.quantities.front import friction_front
+from notchflex.results.quantities.path_formulas import friction_front
 from notchflex.results.quantities.properties import QUANTITIES, PathQuantities
 from notchflex.results.reason import why_not
 from notchflex.results.recorded import Recorded
@@ -253,6 +253,3 @@ class EquilibriumPath(PathQuantities, Displayed):
             failure, text = self.failures[step]
             raise ConvergenceError(f"step {step + 1} of {len(self)}: {text}", failure)
         return self
-
-
-__all__ = ["EquilibriumPath"]

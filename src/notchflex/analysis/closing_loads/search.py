@@ -126,6 +126,3 @@ def find_roots(
         slow = np.where(high - low > 0.5 * width, slow + 1, 0)
         width = high - low
     return 0.5 * (low + high), high - low <= _PRECISION * high
-
-
-__all__ = ["ClosingStatus", "closing_tensions", "find_roots", "statuses"]

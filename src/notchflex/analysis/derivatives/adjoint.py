@@ -151,6 +151,3 @@ def _adjoint(
     ]
     by_chain = chain_layout.pack(jnp.concatenate(every))
     return jnp.where(remembers[0] > 0.0, by_before, 0.0), {"load": by_load, "chain": by_chain}
-
-
-__all__ = ["Gradient", "gradient"]

@@ -105,6 +105,3 @@ def outputs_function(
 
 def _nothing(of: Any) -> np.ndarray:
     return np.full(of.shape, np.nan if of.dtype.kind == "f" else 0).astype(of.dtype)
-
-
-__all__ = ["Solver", "outputs_function"]

@@ -369,6 +369,3 @@ class _Solver:
                 del self._kept[next(iter(self._kept))]
             self._kept[key] = of.model.change(path.robot, path.load, name)
         return self._kept[key]
-
-
-__all__ = ["Differentiable", "differentiable"]

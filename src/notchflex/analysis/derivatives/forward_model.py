@@ -185,6 +185,3 @@ class ForwardModel:
     def _shape(self, robot: Robot) -> Shaped:
         chain = self.ready.chain
         return shape_of(robot, chain.level, chain.refinement)
-
-
-__all__ = ["Change", "ForwardModel"]

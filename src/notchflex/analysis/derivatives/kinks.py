@@ -94,6 +94,3 @@ def _notches(path: EquilibriumPath, within: float) -> list[Kink]:
         Kink(int(step), "notch", int(notch) + 1, None, float(distance[step, notch]))
         for step, notch in np.argwhere(distance < within)  # NaN where a notch has no lips
     ]
-
-
-__all__ = ["Kink", "kinks"]

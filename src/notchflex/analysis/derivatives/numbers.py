@@ -56,6 +56,3 @@ def _stencil(order: int, side: int) -> tuple[Float[np.ndarray, " p"], Float[np.n
     points = side * np.arange(order + 1.0) if side else central
     powers = np.vander(points, increasing=True).T
     return points, np.linalg.solve(powers, np.eye(len(points))[1])
-
-
-__all__ = ["slope"]

@@ -178,6 +178,3 @@ def _tangent(
     if varies:
         at, changes = (*at, chain), (*changes, chain_change)
     return jax.jvp(step, at, changes)[1]
-
-
-__all__ = ["Change", "PathTangents", "answer_of"]

@@ -133,6 +133,3 @@ def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float
         dead_moment=constant(applied.dead_moment + np.multiply.outer(last, moment)),
         dead_arm=constant(applied.dead_arm + np.multiply.outer(last, arm)),
     )
-
-
-__all__ = ["TipResponse", "tip_response"]

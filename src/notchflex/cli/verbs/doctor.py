@@ -14,8 +14,8 @@ from cyclopts import Parameter
 from notchflex import __version__
 from notchflex._extras import install_command
 from notchflex.cli import terminal
-from notchflex.cli.exit_codes import DONE
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet
+from notchflex.cli.terminal import DONE
 
 WRONG_SUMS = 1
 """Exit code where JAX computes wrong numbers."""
@@ -69,10 +69,9 @@ def doctor(
 
 def examination() -> dict[str, Any]:
     """Return the findings of `doctor` as plain values."""
-    from notchflex.cli.compile_cache import use_compile_cache
     from notchflex.solver.programs import shipped, store
 
-    use_compile_cache()
+    terminal.use_compile_cache()
     from lanewise import target
     from notchflex._canary import canary
     from notchflex._jax import jax

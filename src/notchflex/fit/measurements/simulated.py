@@ -14,7 +14,7 @@ from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.solved_rows import solved_rows
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.load_path import load_path
-from notchflex.results.quantities.spans import spans_of
+from notchflex.results.quantities.registry import spans_of
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:

@@ -157,6 +157,3 @@ class PathQuantities(_Quantities):
 
 class EquilibriumQuantities(_Quantities):
     """Quantities of one equilibrium: n notches, t tendons, n + 1 bodies."""
-
-
-__all__ = ["QUANTITIES", "EquilibriumQuantities", "PathQuantities"]
