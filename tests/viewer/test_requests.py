@@ -6,8 +6,8 @@ import socket
 import pytest
 
 import notchflex as nf
-from notchflex import InputError
-from notchflex.viewer.server.origin import refusal
+from notchflex.viewer.server.serving import refusal
+from refusals import refused
 
 viser = pytest.importorskip("viser", reason="the extra `viewer` is not installed")
 
@@ -127,7 +127,7 @@ def test_a_viser_that_cannot_be_checked_is_not_served(monkeypatch):
     monkeypatch.setattr(infra, "websockets", other)
     from notchflex.viewer.server.serving import serve
 
-    with pytest.raises(InputError, match="nothing is served"):
+    with refused("MISSING_PACKAGE"):
         serve("127.0.0.1", 18340)
     with pytest.raises(OSError, match="refused"):
         socket.create_connection(("127.0.0.1", 18340), timeout=1).close()

@@ -13,7 +13,7 @@ import numpy as np
 from notchflex.errors import InputError
 from notchflex.plotting.branches import abscissa
 from notchflex.plotting.curves import notches_panel, total_panel
-from notchflex.plotting.output import Picture
+from notchflex.plotting.picture import Picture
 from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import Area, Faces, Panel, stack
@@ -45,10 +45,11 @@ def save_animation(
 ) -> None:
     """Write a path as a GIF: the robot moves, and dots run along its curves.
 
-    It takes four seconds or more; the first and the last frame are shown longer.
+    It takes four seconds or more; the first and the last frame are shown longer. Of a long path an
+    even selection of steps is shown.
 
     Args:
-        path: Solved path; of a long one an even selection of steps is shown.
+        path: Solved path.
         target: Name of a file that ends in .gif; it is written completely or not at all.
         title: Heading; the name of the robot if None.
         progress: Called with the number of finished frames and of all frames.

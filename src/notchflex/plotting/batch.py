@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
-from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import BESIDE, Line, Mark, Panel, dots, grid
+from notchflex.plotting.picture import Picture
+from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
 
@@ -40,9 +40,6 @@ def batch_picture(
         against: Values for the horizontal axis, (rows,), such as tensions; row numbers if None.
         label: Label of this axis, with its unit.
         title: Heading.
-
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
 
     Raises:
         InputError: The number of values is not that of the rows, or there is nothing to draw.
@@ -110,7 +107,7 @@ def _over_rows(
         one = f"{quantity.per[0]} {column + 1}" if quantity.per and count > 1 else ""
         points = np.stack([x[order], table[order, column]], axis=1)
         options: dict[str, Any] = {"marker": "o", "size": 2.0, "width": 0.8, "hover": True}
-        items.append(Line(points, colour if count > 1 else BLUE, name=one, group=one, **options))
+        items.append(Curve(points, colour if count > 1 else BLUE, name=one, group=one, **options))
     return Panel(items, label, quantity.label, legend=BESIDE if count > 1 else "")
 
 

@@ -11,9 +11,9 @@ from notchflex.errors import InputError
 from notchflex.plotting.branches import LOADING, UNLOADING, abscissa, steps_by_branch
 from notchflex.plotting.curves import LINE, branch_lines, converged_only, failures
 from notchflex.plotting.fits.comparison import MODEL_COLOURS
-from notchflex.plotting.output import Picture
+from notchflex.plotting.picture import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
-from notchflex.plotting.sheet import BELOW, Cell, Colour, Line, Mark, Note, Panel, dots, stack
+from notchflex.plotting.sheet import BELOW, Cell, Colour, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import GREY, rgb
 from notchflex.plotting.tendon_profiles import SLACK, span_line
 from notchflex.results.quantities.registry import QUANTITIES
@@ -37,9 +37,6 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
     Args:
         paths: Label to path, two to five of them.
         title: Heading.
-
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
 
     Raises:
         InputError: Too few or too many paths.
@@ -67,9 +64,9 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
     curves = [_angles(paths, colours), _notches(paths, colours)]
     cells += stack(curves, len(paths))
     cells += stack([_travel(paths, colours), _tensions(paths, colours)], len(paths) + 1)
-    legend = [Line([], colours[label], name=label, group=label) for label in paths]
+    legend = [Curve([], colours[label], name=label, group=label) for label in paths]
     if any(len(steps_by_branch(path)) > 1 for path in paths.values()):
-        legend += [Line([], GREY, LINE[way], name=way) for way in (LOADING, UNLOADING)]
+        legend += [Curve([], GREY, LINE[way], name=way) for way in (LOADING, UNLOADING)]
     heading = title or "; ".join(dict.fromkeys(path.robot.name for path in paths.values()))
     return Picture(heading, 1.2 + 3.6 * (len(paths) + 2), 6.8, cells, legend)
 
@@ -122,7 +119,7 @@ def _notches(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]
         least = min(least, float(angle.min()))
         points = np.stack([np.arange(1, len(angle) + 1), angle], axis=1)
         look: dict[str, Any] = {"marker": "o", "size": 2.5, "group": label, "hover": True}
-        items.append(Line(points, colours[label], **look))
+        items.append(Curve(points, colours[label], **look))
     return Panel(
         items or [Note("no step was solved")],
         "notch [number], 1 at the base",

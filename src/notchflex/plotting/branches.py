@@ -18,18 +18,15 @@ LOADING, UNLOADING = "loading", "unloading"
 
 
 def abscissa(path: EquilibriumPath) -> tuple[NDArray[np.float64], str]:
-    """Return what a path is drawn against: the one tendon that changes, or the step.
+    """Return what a path is drawn against, (S,), and its label.
 
-    If several tendons change in proportion, it is the first of them. It is the stroke where the
-    stroke is prescribed, and the tension otherwise.
-
-    Returns:
-        Values (S,) and the label of the axis.
+    The stroke, where it is prescribed, or the tension of the one tendon that changes, or of the
+    first of several that change in proportion; else the step.
     """
     changing = _changing(path)
-    together = len(changing) > 0 and all(_in_proportion(path, changing[0], one) for one in changing)
-    if together or (len(path) == 1 and not len(changing)):
-        index = int(changing[0]) if len(changing) else 0
+    together = all(_in_proportion(path, changing[0], one) for one in changing)
+    if together if changing else len(path) == 1:
+        index = changing[0] if changing else 0
         quantity = QUANTITIES["stroke" if by_stroke(path, index) else "tension"]
         label = quantity.label
         if path.tension.shape[1] > 1:
@@ -40,27 +37,22 @@ def abscissa(path: EquilibriumPath) -> tuple[NDArray[np.float64], str]:
 
 
 def load_parameter(path: EquilibriumPath) -> NDArray[np.float64]:
-    """Return a number for each step that increases while the tendons are pulled, (S,).
+    """Return a number for each step, (S,), that increases while the tendons are pulled.
 
     The sum over the tendons that change, each by its prescribed tension or stroke.
     """
     total = np.zeros(len(path))
-    for index in _changing(path):
-        values = _prescribed(path, int(index))
-        largest = float(np.nanmax(np.abs(values), initial=0.0))
-        total = total + values / (largest or 1.0)
+    for tendon in _changing(path):
+        values = _prescribed(path, tendon)
+        total += values / (float(np.nanmax(np.abs(values), initial=0.0)) or 1.0)
     return total
 
 
 def branches(x: NDArray[np.float64]) -> Iterator[tuple[slice, str]]:
-    """Split steps where a load parameter changes its direction.
+    """Split steps where a load parameter x, (S,), changes its direction.
 
-    Args:
-        x: A number for each step, (S,).
-
-    Yields:
-        The steps of each branch with its two ends, and `LOADING` where x increases, else
-        `UNLOADING`.
+    Yield the steps of each branch with its two ends, and `LOADING` where x increases, else
+    `UNLOADING`.
 
     Example:
         >>> [(part.start, part.stop, way) for part, way in branches(np.array([0.0, 1.0, 2.0, 1.0]))]
@@ -85,7 +77,7 @@ def by_stroke(path: EquilibriumPath, tendon: int) -> bool:
 
 def driven_by_stroke(path: EquilibriumPath) -> list[int]:
     """Return the tendons (from 0) whose prescribed strokes change."""
-    return [int(tendon) for tendon in _changing(path) if by_stroke(path, int(tendon))]
+    return [tendon for tendon in _changing(path) if by_stroke(path, tendon)]
 
 
 def steps_by_branch(path: EquilibriumPath) -> dict[str, list[int]]:
@@ -102,18 +94,19 @@ def _prescribed(path: EquilibriumPath, tendon: int) -> NDArray[np.float64]:
     return (path.stroke if by_stroke(path, tendon) else path.tension)[:, tendon]
 
 
-def _changing(path: EquilibriumPath) -> NDArray[np.intp]:
+def _changing(path: EquilibriumPath) -> list[int]:
+    """Return the tendons whose prescribed tension or stroke changes."""
     good = np.asarray(path.converged)
     commanded = np.isfinite([path.commanded_tension, path.commanded_stroke]).any(axis=(0, 1))
     tendons = range(path.tension.shape[1])
     spread = [np.ptp(_prescribed(path, one)[good]) if good.any() else 0.0 for one in tendons]
-    return np.flatnonzero(np.where(commanded, spread, 0.0) > 1e-12)
+    return np.flatnonzero(np.where(commanded, spread, 0.0) > 1e-12).tolist()
 
 
 def _in_proportion(path: EquilibriumPath, first: int, other: int) -> bool:
     """Return whether what drives two tendons changes in proportion."""
     good = np.asarray(path.converged)
-    pair = [_prescribed(path, int(one))[good] for one in (first, other)]
+    pair = [_prescribed(path, one)[good] for one in (first, other)]
     change = [values - values[0] for values in pair]
     largest = int(np.argmax(np.abs(change[0])))
     ratio = change[1][largest] / change[0][largest]

@@ -16,7 +16,7 @@ from notchflex.plotting.sheet import (
     INSIDE,
     SOLID,
     Colour,
-    Line,
+    Curve,
     Mark,
     Panel,
     Span,
@@ -42,15 +42,11 @@ def branch_lines(
     colour: Colour | None = None,
     name: str | None = None,
     **look: Any,
-) -> Iterator[Line]:
-    """Yield the branches of a curve: loading solid, unloading dashed.
+) -> Iterator[Curve]:
+    """Yield the branches of a curve (S, 2): loading solid, unloading dashed; converged steps only.
 
-    Args:
-        path: Solved path.
-        points: A point for each step, (S, 2); steps that did not converge are left out.
-        colour: Colour of all branches; None for one colour each for loading and unloading.
-        name: Legend entry of all branches together; None to name loading and unloading.
-        look: Further options of `Line`; `group` is the name if not given.
+    Without a colour, loading and unloading have one each; without a name, each has its own. `look`
+    are further options of `Curve`; `group` is the name if not given.
     """
     points = converged_only(path, points)
     named: set[str] = set()
@@ -60,7 +56,7 @@ def branch_lines(
         options["marker"] = "o" if part.stop - part.start == 1 else ""
         shown = "" if label in named else label
         shade = COLOUR[way] if colour is None else colour
-        yield Line(points[part], shade, LINE[way], name=shown, **(options | look))
+        yield Curve(points[part], shade, LINE[way], name=shown, **(options | look))
         named.add(label)
 
 

@@ -24,7 +24,7 @@ class Tolerance:
 
     Attributes:
         value: Name of the value, such as `notch.depth` or `notch[3].depth`.
-        sd: Standard deviation; the deviation is then normal, cut off at `plus` and `minus` if given.
+        sd: Standard deviation of a normal distribution, cut off at `plus` and `minus` if given.
         plus: How far above the value it may lie; with `minus` and without `sd` the deviation is
             uniform.
         minus: How far below the value it may lie, as a positive number.

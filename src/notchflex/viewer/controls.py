@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
 from notchflex.loads import Load
 from notchflex.robot import Robot
-
-T = TypeVar("T")
 
 TENSION, STROKE = "tension", "stroke"
 
@@ -26,14 +23,10 @@ POINTING: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True)
 class Controls:
-    """Loads of a robot of t tendons.
+    """Loads of a robot.
 
-    Args:
-        by: `TENSION` or `STROKE` for every tendon.
-        value: Its tension [N] or stroke [mm].
-        tip_force: Force at the tip in the world [N].
-        tip_mass: Mass that hangs at the tip [g].
-        pointing: Direction of the tube, a key of `POINTING`.
+    Every tendon has a tension [N] or a stroke [mm] as `value`, by `TENSION` or `STROKE`. The force
+    at the tip is in the world [N], the mass hangs there [g]; `pointing` is a key of `POINTING`.
 
     Example:
         >>> Controls(("tension",), (2.0,)).load()
@@ -65,9 +58,9 @@ class Controls:
 
     def with_tendon(self, tendon: int, by: str, value: float) -> Controls:
         """Return the same with another tension or stroke of one tendon (from 0)."""
-        return replace(
-            self, by=_put(self.by, tendon, by), value=_put(self.value, tendon, float(value))
-        )
+        kinds, values = list(self.by), list(self.value)
+        kinds[tendon], values[tendon] = by, float(value)
+        return replace(self, by=tuple(kinds), value=tuple(values))
 
     def command(self, number: int) -> str:
         """Return `TENSION` or `STROKE` of one of the `numbers`; "" if it is not of a tendon."""
@@ -87,7 +80,3 @@ class Controls:
     def same_kind(self, other: Controls) -> bool:
         """Return whether other settings can be approached in small steps."""
         return (self.by, self.pointing) == (other.by, other.pointing)
-
-
-def _put(values: tuple[T, ...], index: int, value: T) -> tuple[T, ...]:
-    return (*values[:index], value, *values[index + 1 :])

@@ -28,27 +28,15 @@ STRETCH = 10.0
 
 @dataclass(frozen=True)
 class Reach:
-    """Ends of the sliders of a robot of t tendons; forces have both directions.
+    """Ends of the sliders of a robot; forces have both directions."""
 
-    Attributes:
-        tension: Of each tendon [N], (t,).
-        stroke: Of each tendon [mm], (t,).
-        force: At the tip [N].
-        mass: At the tip [g].
-    """
-
-    tension: tuple[float, ...]
-    stroke: tuple[float, ...]
-    force: float
-    mass: float
+    tension: tuple[float, ...]  # of each tendon [N]
+    stroke: tuple[float, ...]  # of each tendon [mm]
+    force: float  # at the tip [N]
+    mass: float  # at the tip [g]
 
     def ends(self, number: int, by: str) -> tuple[float, float]:
-        """Return the ends of the slider of a number of `Controls`.
-
-        Args:
-            number: Its index in `Controls.numbers`.
-            by: `TENSION` or `STROKE`, if it belongs to a tendon.
-        """
+        """Return the ends of the slider of one of the `Controls.numbers`, of a tendon `by`."""
         count = len(self.tension)
         if number < count:
             most = (self.tension if by == TENSION else self.stroke)[number]
@@ -85,8 +73,8 @@ def round_up(value: float) -> float:
     """
     power = 10.0 ** math.floor(math.log10(value))
     factors = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-    found = next(one for one in factors if one * power >= value * (1.0 - 1e-9))
-    return float(f"{found * power:.12g}")
+    factor = next(one for one in factors if one * power >= value * (1.0 - 1e-9))
+    return float(f"{factor * power:.12g}")
 
 
 def round_down(value: float) -> float:
@@ -104,17 +92,17 @@ def _pulled(robot: Robot, tendon: int) -> tuple[float, float]:
     """Return tension and stroke at the ends of the sliders of a tendon, for the same bend."""
     tension, drawn = FIRST, 0.0
     while tension <= MOST:
-        found = _stroke(robot, tendon, tension)
-        if found is None:
+        solved = _stroke(robot, tendon, tension)
+        if solved is None:
             tension *= 0.5 if drawn > 0.0 else 1.0
             break
-        drawn, bent = found
+        drawn, bent = solved
         if bent:
             break
         tension *= 2.0
     end = round_up(ROOM * min(tension, MOST))
-    found = _stroke(robot, tendon, end)
-    return end, round_down(found[0]) if found and found[0] > drawn else round_up(max(drawn, 1e-3))
+    last, _ = _stroke(robot, tendon, end) or (0.0, False)
+    return end, round_down(last) if last > drawn else round_up(max(drawn, 1e-3))
 
 
 def _stroke(robot: Robot, tendon: int, tension: float) -> tuple[float, bool] | None:

@@ -19,13 +19,11 @@ from notchflex.viewer.controls import Controls
 class TargetQueue:
     """Settings to reach, in order; several threads may use it.
 
-    Args:
-        start: The current setting of the robot.
-        stride: Largest change of each number of the settings in one step.
+    It begins at a setting, without targets. `stride` is the largest change of each of the
+    `Controls.numbers` in one step.
     """
 
     def __init__(self, start: Controls, stride: np.ndarray) -> None:
-        """Begin without targets."""
         self._lock = RLock()
         self._targets: deque[Controls] = deque()
         self.here = start
@@ -48,12 +46,7 @@ class TargetQueue:
                 self._targets.append(target)
 
     def set_number(self, number: int, value: float) -> None:
-        """Set one of the `numbers`: its former targets are dropped.
-
-        Args:
-            number: Its index in `Controls.numbers`.
-            value: Its new value.
-        """
+        """Set one of the `Controls.numbers`: its former targets are dropped."""
         with self._lock:
             self.hold(number)
             numbers = self.end.numbers
@@ -61,7 +54,7 @@ class TargetQueue:
             self.add(self.end.with_numbers(numbers))
 
     def hold(self, number: int) -> None:
-        """Keep one of the `numbers` at its current value: its targets are dropped."""
+        """Keep one of the `Controls.numbers` at its current value: its targets are dropped."""
         with self._lock:
             held: list[Controls] = []
             for target in self._targets:

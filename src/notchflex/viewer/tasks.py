@@ -12,57 +12,47 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from pathlib import Path
 from threading import Condition
-from typing import NamedTuple
+
+Task = Callable[[], None]
 
 PAUSE = 0.5
 """A pause of typing [s]."""
-
-
-class _Entry(NamedTuple):
-    task: Callable[[], None]
-    key: Hashable | None
-    due: float
 
 
 class Tasks:
     """Tasks in order; any thread may add, one thread takes them."""
 
     def __init__(self) -> None:
-        """Begin without tasks."""
         self._changed = Condition()
-        self._waiting: deque[_Entry] = deque()
+        self._waiting: deque[tuple[Task, Hashable, float]] = deque()  # task, key, due time [s]
 
-    def add(
-        self, task: Callable[[], None], key: Hashable | None = None, pause: float = 0.0
-    ) -> None:
-        """Append a task.
+    def add(self, task: Task, key: Hashable = None, pause: float = 0.0) -> None:
+        """Append a task that waits for a pause [s].
 
-        Args:
-            task: The task.
-            key: Its origin: the last task that waits is dropped if it has the same key.
-            pause: How long to wait for another one [s].
+        The last task that waits is dropped if it has the same key, its origin.
         """
         with self._changed:
-            if key is not None and self._waiting and self._waiting[-1].key == key:
+            if key is not None and self._waiting and self._waiting[-1][1] == key:
                 self._waiting.pop()
-            self._waiting.append(_Entry(task, key, time.monotonic() + pause))
+            self._waiting.append((task, key, time.monotonic() + pause))
             self._changed.notify()
 
     def has(self, key: Hashable) -> bool:
         """Return whether a task with a key waits."""
         with self._changed:
-            return any(entry.key == key for entry in self._waiting)
+            return any(waiting == key for _, waiting, _ in self._waiting)
 
-    def take(self, timeout: float = 0.0) -> Callable[[], None] | None:
+    def take(self, timeout: float = 0.0) -> Task | None:
         """Return the next task that is ready; None if there is none within `timeout` [s]."""
         end = time.monotonic() + timeout
         with self._changed:
             while True:
                 now = time.monotonic()
                 # A later task ends the pause of the earlier ones.
-                if self._waiting and (len(self._waiting) > 1 or self._waiting[0].due <= now):
-                    return self._waiting.popleft().task
-                until = min(end, self._waiting[0].due) if self._waiting else end
+                due = self._waiting[0][2] if self._waiting else end
+                if self._waiting and (len(self._waiting) > 1 or due <= now):
+                    return self._waiting.popleft()[0]
+                until = min(end, due)
                 if until <= now:
                     return None
                 self._changed.wait(until - now)
@@ -72,21 +62,18 @@ class WatchedFile:
     """A file that is edited meanwhile; it may be missing while an editor replaces it."""
 
     def __init__(self, path: Path) -> None:
-        """Remember its current version."""
         self.path = path
         self._seen = self._version()
 
     def changed(self) -> bool:
         """Return whether it has been saved since the last call."""
-        now = self._version()
-        if now is None or now == self._seen:
-            return False
-        self._seen = now
-        return True
+        before, now = self._seen, self._version()
+        self._seen = now or before
+        return self._seen != before
 
     def _version(self) -> tuple[int, int, int] | None:
         try:
-            found = self.path.stat()
+            file = self.path.stat()
         except OSError:
             return None
-        return found.st_mtime_ns, found.st_size, found.st_ino
+        return file.st_mtime_ns, file.st_size, file.st_ino

@@ -15,7 +15,7 @@ CUT, CUT_OF_DIAMETER = 0.010, 0.005
 WALL, WALL_OF_DIAMETER = 0.006, 0.003
 """The same for the wall of the tube [mm]."""
 
-# Nitinol of an unknown tube: lower, usual and upper value. The ranges go with the value of the file.
+# Nitinol of an unknown tube: lower, usual and upper value, in proportion to the value of the file.
 _NITINOL = {
     "elastic_modulus": (30e3, 42e3, 57e3),
     "plateau_stress": (260.0, 350.0, 460.0),

@@ -20,8 +20,7 @@ from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.validation import check_integer, check_is_robot
 from notchflex.results.path import EquilibriumPath
-from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.results.quantities.spans import holds
+from notchflex.results.quantities.registry import QUANTITIES, holds
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
 from notchflex.solver.newton import Settings
@@ -121,10 +120,8 @@ class Bands(Displayed, Mapping[str, Band]):
             quantity = QUANTITIES[name]
             if name in self and self.samples[name].ndim == 2:
                 one = self[name]
-                ends = [course(side * quantity.scale) for side in (one.low, one.high)]
-                rows.append(
-                    (quantity.title, f"{ends[0]} {quantity.unit}, {ends[1]} {quantity.unit}")
-                )
+                low, high = (course(end * quantity.scale) for end in (one.low, one.high))
+                rows.append((quantity.title, f"{low} {quantity.unit}; {high} {quantity.unit}"))
         rows.append(("bands of", ", ".join(self)))
         rows.append(("assumed", ", ".join(self.assumed) or "nothing"))
         title = f"Bands of {self.draws} draws over {len(self.path)} steps, 5 to 95 %"
@@ -211,9 +208,8 @@ def uncertain(
     samples: dict[str, np.ndarray] = {}
     for name in names:
         values = found[name] if turn is None else REGISTERED[name].turned(found[name], turn)
-        samples[name] = np.where(
-            good.reshape(good.shape + (1,) * (values.ndim - 2)), values, np.nan
-        )
+        there = good.reshape(good.shape + (1,) * (values.ndim - 2))
+        samples[name] = np.where(there, values, np.nan)
     return Bands(
         path, chosen, assumed, samples, drawn.values, good.sum(axis=0), drawn.redrawn, seed
     )

@@ -74,17 +74,15 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
     tension, angle = _closing(loads, gaps, forces > gaps * stiffness, angles)
     total = band(found.samples["total_angle"][:, np.searchsorted(loads, load)])
     by_depth = _by_depth(robot, _pull(robot, tendon, np.array([load])))
-    return ClosingBands(
-        found, own + 1, _with_never(tension), band(angle), load, tendon, total, by_depth
-    )
+    closing = _with_never(tension), band(angle)
+    return ClosingBands(found, own + 1, *closing, load, tendon, total, by_depth)
 
 
 def _with_never(tension: Float[np.ndarray, "d n"]) -> Band:
-    """The band of tensions of which some are infinite."""
-    found = band(np.minimum(tension, _NEVER))
-    return Band(
-        *(np.where(one < _NEVER, one, np.inf) for one in (found.low, found.median, found.high))
-    )
+    """Return the band of tensions of which some are infinite."""
+    one = band(np.minimum(tension, _NEVER))
+    ends = (one.low, one.median, one.high)
+    return Band(*(np.where(end < _NEVER, end, np.inf) for end in ends))
 
 
 def _pull(robot: Robot, tendon: int, loads: Float[np.ndarray, " s"]) -> LoadPath:
@@ -123,7 +121,7 @@ def _closing(
 
 
 def _by_depth(robot: Robot, load: LoadPath) -> float:
-    """Change of the total angle for each 10 µm of depth, from one deeper and one shallower robot."""
+    """Return the change of the total angle for each 10 µm of depth, by a central difference."""
     exact = robot.replace(tolerance=None)
     try:
         depths = numbers_at(robot, "notch.depth")

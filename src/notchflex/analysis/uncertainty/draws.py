@@ -77,7 +77,7 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
     exact = robot.replace(tolerance=None)
     sources = _sources(exact, tolerances)
     random = np.random.default_rng(seed)
-    # In every dimension one draw in each of as many equal parts (scipy.stats takes a second to load).
+    # In every dimension one draw in each of as many equal parts; scipy.stats loads for a second.
     part = random.permuted(np.tile(np.arange(draws), (len(sources), 1)), axis=1)
     levels = (part + random.random(part.shape)) / draws
     robots: list[Robot] = []
@@ -94,7 +94,7 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
                         f"{_TRIES} draws within the tolerances made no valid robot; make the "
                         f"tolerances smaller. The last one: {error}"
                     ) from None
-                level = random.random(len(sources))  # noqa: PLW2901 - drawn again
+                level = random.random(len(sources))
                 continue
             values.append(drawn)
             redrawn += tried > 0

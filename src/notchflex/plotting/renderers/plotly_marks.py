@@ -13,8 +13,8 @@ from notchflex.plotting.sheet import (
     Arrow,
     Bars,
     Correlations,
+    Curve,
     Faces,
-    Line,
     Note,
     Panel,
     Span,
@@ -37,7 +37,7 @@ def traces(
 ) -> Iterator[dict[str, Any]]:
     """Yield the traces of a mark; shapes, notes and tick labels are added to `layout`."""
     match item:
-        case Line():
+        case Curve():
             yield line_trace(item, panel)
         case Area():
             yield area_trace(item)
@@ -50,7 +50,7 @@ def traces(
             if item.name:  # a shape has no entry in a legend
                 look: dict[str, Any] = {"name": item.name, "group": item.group or item.name}
                 if item.low == item.high:
-                    yield line_trace(Line([], item.colour, item.dash, item.width, **look), None)
+                    yield line_trace(Curve([], item.colour, item.dash, item.width, **look), None)
                 else:
                     yield area_trace(Area([], item.colour, item.colour, item.opacity, 0.0, **look))
         case Bars():
@@ -80,7 +80,7 @@ def traces(
             raise NotImplementedError(f"plotly draws no {type(item).__name__}")
 
 
-def line_trace(item: Line, panel: Panel | None) -> dict[str, Any]:
+def line_trace(item: Curve, panel: Panel | None) -> dict[str, Any]:
     """Return a line as a trace; without a panel it is only the entry of a legend."""
     in_space = panel is not None and panel.in_space
     rows = item.rows if len(item.rows) else np.full((1, 3 if in_space else 2), np.nan)
@@ -216,7 +216,7 @@ def _named(item: Any) -> dict[str, Any]:
     return named | ({"legendgroup": group} if group else {})
 
 
-def _dashes(item: Line | Span) -> str:
+def _dashes(item: Curve | Span) -> str:
     return ",".join(f"{POINT * item.width * one:.1f}px" for one in item.dash or ())
 
 

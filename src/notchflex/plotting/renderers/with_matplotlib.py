@@ -21,8 +21,8 @@ from notchflex.plotting.sheet import (
     Arrow,
     Bars,
     Correlations,
+    Curve,
     Faces,
-    Line,
     Note,
     Panel,
     Sheet,
@@ -61,7 +61,7 @@ def figure_of(picture: Sheet) -> Figure:
         if picture.legend:
             entries = [
                 Line2D([], [], **_line_look(one))
-                if isinstance(one, Line)
+                if isinstance(one, Curve)
                 else _polygon(one, np.zeros((1, 2)), one.name)
                 for one in picture.legend
             ]
@@ -118,7 +118,7 @@ def draw_panel(axes: Any, panel: Panel) -> None:
 
 def _draw(axes: Any, item: Any) -> None:
     match item:
-        case Line():
+        case Curve():
             rows = item.rows if len(item.rows) else np.zeros((0, 3 if axes.name == "3d" else 2))
             axes.plot(*rows.T, **_line_look(item))
             if item.error is not None:
@@ -166,7 +166,7 @@ def _dashes(dash: tuple[float, ...] | None) -> Any:
     return "" if dash is None else (0, dash) if dash else "-"
 
 
-def _line_look(item: Line) -> dict[str, Any]:
+def _line_look(item: Curve) -> dict[str, Any]:
     return {
         "color": item.colour,
         "linestyle": _dashes(item.dash),

@@ -7,16 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILLION,
-)
+from notchflex.plotting.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
 from notchflex.results import Equilibrium
 
 Colour = tuple[int, int, int]
@@ -54,19 +45,14 @@ def is_beyond(part: float) -> bool:
 
 
 def strain_colour(part: float | None) -> Colour:
-    """Return the colour of a strain.
-
-    Args:
-        part: The strain as a fraction of the allowed one; None without an allowed strain.
-    """
+    """Return the colour of a strain by its fraction of the allowed one; None if none is set."""
     if part is None or not np.isfinite(part):
         return METAL
     if is_beyond(part):
         return BEYOND
     place = round(min(abs(part), 1.0) * STEPS) / STEPS * (len(_SCALE) - 1)
-    columns = [np.interp(place, np.arange(len(_SCALE)), column) for column in _SCALE.T]
-    red, green, blue = (round(float(value)) for value in columns)
-    return red, green, blue
+    red, green, blue = (np.interp(place, np.arange(len(_SCALE)), part) for part in _SCALE.T)
+    return round(float(red)), round(float(green)), round(float(blue))
 
 
 def contact_colours(state: Equilibrium, tendon: int) -> list[str]:
@@ -74,12 +60,12 @@ def contact_colours(state: Equilibrium, tendon: int) -> list[str]:
 
     A contact without friction, or of a slack tendon, neither sticks nor slips.
     """
-    found = np.asarray(state.contact_state, float)[tendon]
+    codes = np.asarray(state.contact_state, float)[tendon]
     bound = np.asarray(state.contact_bound, float)[tendon]
     slack = float(state.tension[tendon]) < SLACK
     return [
         UNKNOWN if slack or not holds > SMOOTH else CONTACT[int(one)]
-        for one, holds in zip(found, bound, strict=True)
+        for one, holds in zip(codes, bound, strict=True)
         if np.isfinite(one) and np.isfinite(holds)
     ]
 

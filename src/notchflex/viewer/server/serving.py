@@ -1,6 +1,10 @@
-"""Starts a viser server that checks the address of every request.
+"""Serves the page, and refuses requests of other pages in the same browser.
 
-viser 1.1 has no setting for this and hands its own `process_request` to `websockets`. Its server
+A page of another site can send requests to 127.0.0.1, and after DNS rebinding even under its own
+name. Browsers send the page in `Origin` and the name that it used in `Host`, and a page can
+forge neither.
+
+viser 1.1 has no setting for a check and hands its own `process_request` to `websockets`. Its server
 thread looks `websockets.asyncio.server.serve` up when it starts, so that public function is
 replaced until the server runs; nothing of viser is changed. If viser starts in another way,
 `serve` notices that no check is installed, and refuses to continue.
@@ -12,26 +16,26 @@ import contextlib
 import functools
 import http
 import io
-from collections.abc import Callable, Generator
+import ipaddress
+import socket
+from collections.abc import Callable, Generator, Sequence
 from threading import Lock
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
 
 from notchflex.errors import InputError
 from notchflex.viewer.server.address import INSTALL
-from notchflex.viewer.server.origin import refusal
 
 if TYPE_CHECKING:
     import viser
 
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
+_HTTP = 80  # browsers leave this port out
 _starting = Lock()
 
 
 def serve(host: str, port: int) -> viser.ViserServer:
-    """Begin to serve, without messages and only on the host.
-
-    Args:
-        host: Address to serve on.
-        port: Port to serve on, or the next one that is free.
+    """Begin to serve on a host and a port, or the next free one; without messages.
 
     Raises:
         InputError: This version of viser cannot be guarded; nothing is served.
@@ -82,3 +86,74 @@ def _answer(
     if reason is not None:
         return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
     return None if answer is None else answer(connection, request)
+
+
+def refusal(host: str, port: int, asked_for: Sequence[str], asked_by: Sequence[str]) -> str | None:
+    """Return why a request to a served host and port is refused, or None if it is allowed.
+
+    `asked_for` are the values of the header `Host`, `asked_by` those of `Origin`, which only
+    browsers send.
+
+    Example:
+        >>> refusal("127.0.0.1", 8080, ["localhost:8080"], ["http://localhost:8080"]) is None
+        True
+        >>> refusal("127.0.0.1", 8080, ["evil.example:8080"], []) is None
+        False
+    """
+    remedy = f"open http://{bracketed(host)}:{port}, with this port also through a tunnel"
+    if len(asked_for) != 1 or not _is_served(host, port, asked_for[0]):
+        names = ", ".join(map(repr, asked_for)) or "(missing)"
+        return f"Host {names} is not the address of this viewer; {remedy}"
+    if len(asked_by) > 1:
+        return f"the request names several origins; {remedy}"
+    for origin in asked_by:
+        scheme, _, address = origin.partition("://")
+        # Where every address is served, a page of another address must not pass for this one.
+        another = _is_wildcard(host) and _parts(address) != _parts(asked_for[0])
+        if scheme != "http" or another or not _is_served(host, port, address):
+            return f"Origin {origin!r} is another page; {remedy}"
+    return None
+
+
+def bracketed(host: str) -> str:
+    """Return a host for an address: IPv6 in brackets."""
+    return f"[{host}]" if ":" in host else host
+
+
+def _is_served(host: str, port: int, address: str) -> bool:
+    """Return whether an address such as `localhost:8080` is served."""
+    name, at = _parts(address)
+    if at != port:
+        return False
+    if name == host.lower() or name in _LOOPBACK:
+        return True
+    # On all addresses: any number will do, but of names only this machine's own, because
+    # rebinding needs a name.
+    machine = socket.gethostname().lower()
+    return _is_wildcard(host) and (
+        _number(name) is not None or name in (machine, f"{machine}.local")
+    )
+
+
+def _parts(address: str) -> tuple[str, int]:
+    """Return name and port of an address; "" and 0 if it is invalid."""
+    try:
+        split = urlsplit(f"//{address}")
+        port = split.port
+    except ValueError:
+        return "", 0
+    if split.hostname is None or split.netloc != address or "@" in address:
+        return "", 0
+    return split.hostname, _HTTP if port is None else port
+
+
+def _number(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    try:
+        return ipaddress.ip_address(name)
+    except ValueError:
+        return None
+
+
+def _is_wildcard(host: str) -> bool:
+    number = _number(host)
+    return number is not None and number.is_unspecified
