@@ -14,7 +14,7 @@ from notchflex.analysis.kinematics import (
     tip_from_angles,
 )
 from notchflex.analysis.solve import simulate, solve, solve_each
-from notchflex.analysis.uncertainty.bands import Band, Bands, uncertain
+from notchflex.analysis.uncertainty.bands import Band, Bands, band_names, uncertain
 
 __all__ = [
     "AxisPlaces",
@@ -29,6 +29,7 @@ __all__ = [
     "TipResponse",
     "axis_places",
     "axis_points",
+    "band_names",
     "bodies_from_angles",
     "closing",
     "differentiable",

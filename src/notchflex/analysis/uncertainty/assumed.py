@@ -47,7 +47,7 @@ def tolerances_of(robot: Robot) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]
 
 def _assumed(robot: Robot) -> Iterator[Tolerance]:
     diameter = robot.tube.outer_diameter
-    cut = max(CUT, CUT_OF_DIAMETER * diameter)
+    cut = _rounded(max(CUT, CUT_OF_DIAMETER * diameter))
     cuts = [
         name
         for notch in robot.notch
@@ -58,7 +58,7 @@ def _assumed(robot: Robot) -> Iterator[Tolerance]:
         if _is_number(robot, f"notch.{name}"):
             yield Tolerance(f"notch.{name}", sd=cut)
     wall = max(WALL, WALL_OF_DIAMETER * diameter)
-    yield Tolerance("tube.inner_diameter", sd=2.0 * wall)
+    yield Tolerance("tube.inner_diameter", sd=_rounded(2.0 * wall))
     material = robot.material
     nitinol = material.kind == "nitinol"
     for name, field in fields_of(type(material)).items():
@@ -69,6 +69,10 @@ def _assumed(robot: Robot) -> Iterator[Tolerance]:
     if _is_number(robot, "friction.coefficient"):
         limits = _NITINOL_FRICTION if nitinol else _FRICTION
         yield _between("friction.coefficient", *limits)
+
+
+def _rounded(size: float) -> float:
+    return float(f"{size:.2g}")
 
 
 def _between(name: str, lower: float, usual: float, upper: float) -> Tolerance:

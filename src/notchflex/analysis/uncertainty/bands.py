@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -12,7 +13,7 @@ from jaxtyping import Float, Int
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, course
 from notchflex.analysis.batch import simulate_batch
-from notchflex.analysis.outputs import check_outputs
+from notchflex.analysis.outputs import OUTPUTS, check_outputs
 from notchflex.analysis.solve import simulate
 from notchflex.analysis.uncertainty.assumed import tolerances_of
 from notchflex.analysis.uncertainty.draws import draw_robots
@@ -30,15 +31,7 @@ LEVELS = (0.05, 0.50, 0.95)
 
 DRAWS = 256
 
-USUAL = (
-    "total_angle",
-    "total_chord_angle",
-    "tip_position",
-    "notch_angle",
-    "peak_strain",
-    "tension",
-    "stroke",
-)
+USUAL = ("total_angle", "tip_position", "notch_angle", "peak_strain", "tension", "stroke")
 
 
 @dataclass(frozen=True)
@@ -82,7 +75,11 @@ class Bands(Displayed, Mapping[str, Band]):
 
     def __getitem__(self, name: str) -> Band:
         """The band of a quantity."""
-        return band(self.samples[name])
+        return self._found[name]
+
+    @cached_property
+    def _found(self) -> dict[str, Band]:
+        return {name: band(samples) for name, samples in self.samples.items()}
 
     def __iter__(self) -> Iterator[str]:
         """The names of the quantities."""
@@ -96,6 +93,17 @@ class Bands(Displayed, Mapping[str, Band]):
     def draws(self) -> int:
         """How many robots were drawn."""
         return len(next(iter(self.samples.values())))
+
+    def end(self, name: str) -> EquilibriumPath:
+        """Return one end of the bands as tables and files read a path.
+
+        Args:
+            name: "low", "median" or "high".
+
+        Returns:
+            What has the quantities of a path: those with a band at that end, others as they are.
+        """
+        return cast("EquilibriumPath", _End(self, name))
 
     def warnings(self) -> list[str]:
         """Return a sentence for each thing that makes the bands less than they seem."""
@@ -126,6 +134,19 @@ class Bands(Displayed, Mapping[str, Band]):
         rows.append(("assumed", ", ".join(self.assumed) or "nothing"))
         title = f"Bands of {self.draws} draws over {len(self.path)} steps, 5 to 95 %"
         return Summary(title, rows, '["total_angle"].low, .median, .high; nf.plot(it) draws them')
+
+
+class _End:
+    """One end of bands, in place of a path."""
+
+    def __init__(self, bands: Bands, end: str) -> None:
+        self._bands, self._end = bands, end
+        self.converged = bands.converged > 0
+        self.closed = np.zeros_like(bands.path.closed)  # which differs from draw to draw
+
+    def __getattr__(self, name: str) -> Any:
+        bands = self._bands
+        return getattr(bands[name], self._end) if name in bands else getattr(bands.path, name)
 
 
 def band(samples: Float[np.ndarray, "draws ..."]) -> Band:
@@ -160,7 +181,7 @@ def uncertain(
             as `{"notch.depth": 0.01, "material.elastic_modulus": "5 %"}`, and nothing else. None
             takes the table of the robot, and assumes the rest.
         outputs: Names of quantities of `EquilibriumPath`; None for angles, tip, strains, tensions
-            and strokes.
+            and strokes. Only numbers have bands.
         draws: How many robots are drawn, as a Latin hypercube; 2 or more.
         seed: The same seed makes the same robots.
         settings: Tolerance and limits of the solver.
@@ -190,9 +211,8 @@ def uncertain(
     else:
         chosen, assumed = robot.replace(tolerance=tolerances).tolerance, ()
     path = simulate(robot, loads, settings=settings, refinement=refinement)
-    if outputs is None:
-        outputs = [name for name in USUAL if holds(path, QUANTITIES[name])]
-    names = [name for name in check_outputs(outputs) if _has_band(name)]
+    asked = check_outputs(USUAL if outputs is None else outputs)
+    names = [name for name in asked if _has_band(name) and holds(path, QUANTITIES[name])]
     drawn = draw_robots(robot, chosen, draws, check_integer(seed, "seed"))
     found = simulate_batch(
         drawn.robots,
@@ -215,6 +235,12 @@ def uncertain(
     )
 
 
+def band_names(more: Iterable[str]) -> list[str]:
+    """Return the names of the usual bands and of further quantities that can have one."""
+    return [*dict.fromkeys([*USUAL, *(name for name in more if _has_band(name))])]
+
+
 def _has_band(name: str) -> bool:
+    """Whether a quantity is a number, or some, that a batch returns."""
     quantity = REGISTERED[name]
-    return quantity.kind is float and "row" not in quantity.per
+    return name in OUTPUTS and quantity.kind is float and "row" not in quantity.per

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -12,6 +12,7 @@ from notchflex.analysis.closing_loads.closing import Closing
 from notchflex.analysis.uncertainty.bands import Band, Bands, band, uncertain
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
+from notchflex.results.quantities.registry import DEGREES
 from notchflex.robot import Robot
 from notchflex.robot.value_names import numbers_at
 
@@ -83,6 +84,27 @@ def _with_never(tension: Float[np.ndarray, "d n"]) -> Band:
     one = band(np.minimum(tension, _NEVER))
     ends = (one.low, one.median, one.high)
     return Band(*(np.where(end < _NEVER, end, np.inf) for end in ends))
+
+
+def closing_document(found: ClosingBands) -> dict[str, Any]:
+    """Return what `notchflex show --json` says of tolerances, at the edge units."""
+    return {
+        "draws": found.bands.draws,
+        "tolerances": {one.value: one.written for one in found.bands.tolerances},
+        "assumed": list(found.bands.assumed),
+        "tendon": found.tendon,
+        "notches": found.notches,
+        "closing_tension_N": _ends(found.tension),
+        "closing_angle_deg": _ends(found.angle, DEGREES),
+        "load_N": found.load,
+        "total_angle_deg": _ends(found.total_angle, DEGREES),
+        "total_angle_deg_by_10um_depth": found.by_depth * DEGREES,
+    }
+
+
+def _ends(one: Band, scale: float = 1.0) -> dict[str, Any]:
+    ends = {"low": one.low, "median": one.median, "high": one.high}
+    return {name: np.where(np.isfinite(end), end * scale, np.nan) for name, end in ends.items()}
 
 
 def _pull(robot: Robot, tendon: int, loads: Float[np.ndarray, " s"]) -> LoadPath:

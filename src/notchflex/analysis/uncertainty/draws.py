@@ -49,8 +49,8 @@ def deviation(tolerance: Tolerance, value: float, level: float) -> float:
     """Return the deviation from a value that a part `level` of all deviations stays below.
 
     Example:
-        >>> deviation(Tolerance("notch.depth", plus=0.02, minus=0.01), 1.4, 0.5)
-        0.005
+        >>> deviation(Tolerance("material.elastic_modulus", plus="20 %", minus="10 %"), 4e4, 0.5)
+        2000.0
     """
     sd = amount(tolerance.sd, value)
     plus, minus = amount(tolerance.plus, value), amount(tolerance.minus, value)
