@@ -41,7 +41,7 @@ class Tolerance:
     def written(self) -> Any:
         """What stands in a robot file: the standard deviation alone, or a table."""
         keys = {name: getattr(self, name) for name in _KEYS}
-        table = {name: one for name, one in keys.items() if one not in (None, False)}
+        table = {name: one for name, one in keys.items() if one is not None and one is not False}
         return self.sd if list(table) == ["sd"] else table
 
 

@@ -77,13 +77,10 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
     exact = robot.replace(tolerance=None)
     sources = _sources(exact, tolerances)
     random = np.random.default_rng(seed)
-    # In every dimension one draw in each of as many equal parts; scipy.stats loads for a second.
-    part = random.permuted(np.tile(np.arange(draws), (len(sources), 1)), axis=1)
-    levels = (part + random.random(part.shape)) / draws
     robots: list[Robot] = []
     values: list[dict[str, float]] = []
     redrawn = 0
-    for level in levels.T:
+    for level in _levels(draws, len(sources), random):
         for tried in range(_TRIES):
             drawn = _values(sources, level)
             try:
@@ -101,6 +98,22 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
             break
     names = values[0] if values else {}
     return Draws(robots, {name: np.array([one[name] for one in values]) for name in names}, redrawn)
+
+
+def _levels(
+    draws: int, count: int, random: np.random.Generator
+) -> Float[np.ndarray, "draws count"]:
+    """Draw a Latin hypercube whose columns do not correlate (Iman and Conover 1982).
+
+    In every column one draw lies in each of as many equal parts. Their random pairing alone would
+    make spreads wrong by 4 % at 256 draws; without its correlations it is 0.5 %.
+    """
+    part = random.permuted(np.tile(np.arange(draws), (count, 1)), axis=1).T
+    if draws > count + 1 > 2:
+        normal = ndtri((part + 0.5) / draws)
+        root = np.linalg.cholesky(np.corrcoef(normal, rowvar=False))
+        part = np.linalg.solve(root, normal.T).T.argsort(axis=0).argsort(axis=0)
+    return (part + random.random(part.shape)) / draws
 
 
 def _values(sources: Sequence[_Source], levels: Float[np.ndarray, " d"]) -> dict[str, float]:
