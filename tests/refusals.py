@@ -1,4 +1,4 @@
-"""Asserts that something is refused with a code."""
+"""What a refused input tells: the code of its error, and what its message names."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from contextlib import contextmanager
 
 import pytest
 
-from notchflex.errors import InputError
+import notchflex as nf
 
 
 @contextmanager
-def refused(code: str) -> Iterator[pytest.ExceptionInfo[InputError]]:
-    """Expect an `InputError` with a code."""
-    with pytest.raises(InputError) as caught:
+def refused(code: str, *names: str) -> Iterator[pytest.ExceptionInfo[nf.InputError]]:
+    """Expect an InputError of a code, whose message names all of `names`."""
+    with pytest.raises(nf.InputError) as caught:
         yield caught
-    assert caught.value.code is not None
-    assert caught.value.code.name == code
+    assert caught.value.code is nf.ErrorCode[code]
+    for name in names:
+        assert name in str(caught.value)

@@ -56,7 +56,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("results.equilibrium", "results.path"): _TYPE,
     ("results.reason", "results.path"): _TYPE,
     ("results.quantities.path_formulas", "results.path"): _TYPE,
-    ("fit.estimation.calibration", "fit.summary"): _SHOWN,
+    ("fit.estimation.calibration", "fit.documents"): _SHOWN,
     ("comparison.comparison", "comparison.tables"): _SHOWN,
     ("viewer.viewer", "viewer.page.page"): "the viewer makes its page; the page acts on the viewer",
 }

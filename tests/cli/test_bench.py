@@ -7,7 +7,7 @@ import json
 import pytest
 
 from notchflex.bench import PEERS
-from notchflex.bench.processes import first_call
+from notchflex.bench.cases import first_call
 from notchflex.cli.app import run
 
 

@@ -25,6 +25,7 @@ from notchflex.fit import (
     repeats_of_each,
 )
 from notchflex.results.files.json import json_text
+from refusals import refused
 
 
 def as_read(document):
@@ -189,14 +190,14 @@ def test_input_files_are_never_replaced(tmp_path):
     found = fitted()
     (file,) = nf.write_fitted(found, tmp_path)
     text = file.read_text(encoding="utf-8")
-    with pytest.raises(nf.InputError, match="replace the file that is read"):
+    with refused("CONFLICT", file.name):
         nf.write_fitted(found, tmp_path, inputs=[file])
     nf.save_robot(nf.load_robot(ROBOT), file)  # now the file that the robot came from
-    with pytest.raises(nf.InputError, match="was read from"):
+    with refused("CONFLICT", file.name):
         nf.write_fitted(found, tmp_path)
     assert file.read_text(encoding="utf-8") != text
     (tmp_path / "file").touch()
-    with pytest.raises(nf.InputError, match="is a file, not a folder"):
+    with refused("FILE_UNWRITABLE", "file"):
         nf.write_fitted(found, tmp_path / "file")
-    with pytest.raises(nf.InputError, match="does not exist"):
+    with refused("FILE_UNWRITABLE", "none"):
         nf.write_fitted(found, tmp_path / "none" / "folder")

@@ -51,3 +51,16 @@ def test_a_value_that_nothing_depends_on_stays():
     found = minimise(flat, np.array([0.0, 7.0]), *WIDE)
     assert found.converged
     np.testing.assert_allclose(found.values, [2.0, 7.0], atol=1e-5)
+
+
+def test_equal_limits_hold_a_value():
+    lower, upper = np.array([0.5, -np.inf]), np.array([0.5, np.inf])
+    found = minimise(rosenbrock, np.array([0.5, 1.0]), lower, upper)
+    assert found.converged
+    np.testing.assert_allclose(found.values, [0.5, 0.25], atol=1e-6)
+    assert found.values[0] == 0.5
+    both = np.array([0.5, 1.0])
+    held = minimise(rosenbrock, both, both, both)
+    assert held.converged
+    assert held.calls == 1
+    assert held.cost.value == rosenbrock(both).value

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from notchflex.analysis.closing_loads.closing import closing, moment_arms
-from notchflex.mechanics.chain import assemble
-from notchflex.mechanics.flexure import rod
+from notchflex.mechanics.chain import assemble, sites_of
+from notchflex.mechanics.flexure import Site, rod
 from notchflex.results.quantities.registry import DEGREES
-from notchflex.robot import Robot
+from notchflex.robot import Robot, Tube
 from notchflex.robot.error_messages import fields_of
 from notchflex.robot.kinds import Notch
 
@@ -42,11 +42,12 @@ def notch_table(robot: Robot) -> list[dict[str, Any]]:
     """
     table = closing(robot)
     arms = moment_arms(assemble(robot, flat=False))
-    described = {notch: _description(notch, robot) for notch in dict.fromkeys(robot.notches)}
+    placed = list(zip(robot.notches, sites_of(robot), strict=True))
+    described = {each: _description(*each, robot.tube) for each in dict.fromkeys(placed)}
     return [
         {
             "notch": index + 1,
-            **described[notch],
+            **described[each],
             "moment_arm_mm": arms[index].tolist(),
             "closing_angle_deg": float(table.angle[index]) * DEGREES,
             "closing_tendon": int(table.tendon[index]),
@@ -55,7 +56,7 @@ def notch_table(robot: Robot) -> list[dict[str, Any]]:
             "closing_outer_strain": float(table.outer_strain[index]),
             "closing_peak_strain": float(table.peak_strain[index]),
         }
-        for index, notch in enumerate(robot.notches)
+        for index, each in enumerate(placed)
     ]
 
 
@@ -74,8 +75,8 @@ def named_values(notch: Notch) -> dict[str, Any]:
     }
 
 
-def _description(notch: Notch, robot: Robot) -> dict[str, Any]:
-    one = rod(notch, robot.tube)
+def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
+    one = rod(notch, tube) if site is None else rod(notch, tube, site=site)
     section = one.section
     weakest = int(np.argmin(section.second_moment_weak))
     values: dict[str, Any] = {
@@ -83,7 +84,7 @@ def _description(notch: Notch, robot: Robot) -> dict[str, Any]:
         "second_moment_mm4": float(section.second_moment_weak[weakest]),
     }
     if float(one.has_closure) > 0.0:  # opposite a spine
-        values["centroid_mm"] = robot.tube.outer_radius - float(section.edge_spine[weakest])
+        values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
     return named_values(notch) | values
 
 

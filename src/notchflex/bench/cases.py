@@ -1,7 +1,12 @@
-"""What `notchflex bench` times: robots and loads in this process, and whole processes."""
+"""The cases of `notchflex bench`: robots and loads in this process, and whole processes."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import tempfile
+import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
@@ -10,7 +15,8 @@ import numpy as np
 
 import notchflex as nf
 from notchflex._jax import jax
-from notchflex.bench import processes
+from notchflex.errors import InputError
+from notchflex.solver.programs.store import VARIABLE
 
 Run = Callable[[], object]
 
@@ -106,6 +112,67 @@ def _derivative(kind: str) -> Callable[[], Run]:
     return make
 
 
+_FIRST = """
+import sys, time
+import notchflex as nf
+robot = nf.load_robot(sys.argv[1])
+nf.solve  # the import is not part of the call
+started = time.perf_counter()
+nf.solve(robot, nf.Load(tension=1.0)).total_angle
+print(time.perf_counter() - started)
+"""
+# On Linux `getrusage` of a process starts from the peak of its parent, so the peak is read from
+# /proc there.
+_MEMORY = """
+import pathlib, resource
+import notchflex as nf
+robot = nf.load_robot("pacheco2021-a")
+ups = [1.0 + 1e-5 * row for row in range(100_000)]
+# Three steps each: up, further up, and back.
+loads = [nf.pull(0.5, up, steps=2).then(nf.pull(0.7, 0.7, steps=1)) for up in ups]
+found = nf.simulate_batch(robot, loads, outputs=("total_angle", "converged"))
+assert found["converged"].all()
+status = pathlib.Path("/proc/self/status")
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+if status.exists():
+    peak = int(status.read_text().split("VmHWM:")[1].split()[0])
+print(peak / 1024)
+"""
+
+
+def first_call(robot: str) -> float:
+    """Return the time of the first solve of a process where nothing is compiled yet, s."""
+    return float(_run(["-c", _FIRST, robot]))
+
+
+def second_command() -> float:
+    """Return the time of a whole command whose compiled programs are kept from the first, s."""
+    command = ["-m", "notchflex", "simulate", "pacheco2021-a", "--tension", "0:3:31,3:0:31"]
+    with tempfile.TemporaryDirectory() as folder:
+        cache = {"XDG_CACHE_HOME": folder, "LOCALAPPDATA": folder}
+        _run(command, cache)
+        started = time.perf_counter()
+        _run(command, cache)
+        return time.perf_counter() - started
+
+
+def memory() -> float:
+    """Return the peak memory of a process that solves 100,000 paths, MiB."""
+    return float(_run(["-c", _MEMORY]))
+
+
+def _run(arguments: list[str], cache: dict[str, str] | None = None) -> str:
+    """Run Python, with a new folder of compiled programs unless one is given; return its output."""
+    inherited = {key: value for key, value in os.environ.items() if not key.startswith("JAX_COMP")}
+    with tempfile.TemporaryDirectory() as new:
+        environment = inherited | (cache or {VARIABLE: new})
+        command = [sys.executable, *arguments]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    if done.returncode:
+        raise InputError.PROCESS_FAILED(f"a measuring process failed: {done.stderr.strip()[-500:]}")
+    return done.stdout
+
+
 _FUNCTION = "links (Gao) as a JAX function"
 _TIP = {"tip_force": (0.05 * 9.81, 0.0, 0.0)}  # 50 g, N
 _FOUR: dict[str, Any] = {"tension": [0.1, 0.05, 0.0, 0.02], "tip_force": (0.002, 0.001, 0.0)}
@@ -129,11 +196,11 @@ CASES: tuple[Case, ...] = (
     Case("its slopes by three parameters", 2.5, _derivative("three"), of=_FUNCTION),
     Case("its gradient by all (reverse)", 3.0, _derivative("reverse"), of=_FUNCTION),
     Case("first call, wrist, nothing compiled", 1.5,
-         partial(processes.first_call, "pacheco2021-a"), unit="s"),
+         partial(first_call, "pacheco2021-a"), unit="s"),
     Case("first call, links (Gao), nothing compiled", 5.0,
-         partial(processes.first_call, "gao2017"), unit="s"),
+         partial(first_call, "gao2017"), unit="s"),
     Case("simulate pacheco2021-a, second time, whole process", 3.0,
-         processes.second_command, unit="s"),
-    Case("memory, batch of 100,000 wrist paths", 2048.0, processes.memory, unit="MiB"),
+         second_command, unit="s"),
+    Case("memory, batch of 100,000 wrist paths", 2048.0, memory, unit="MiB"),
 )
 # fmt: on

@@ -1,4 +1,4 @@
-"""The model at every measured row, and how far it is from the measurement."""
+"""The model at every measured row, and its errors."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from notchflex._jax import constant
 from notchflex.analysis import axis_points, equal_stroke, tip_from_angles
 from notchflex.errors import InputError
 from notchflex.fit.measurements.measurements import Measurements
-from notchflex.fit.model.branch_residuals import branch_difference, branch_words
-from notchflex.fit.model.residuals import misfit, outputs_for
-from notchflex.fit.model.rows import Predicted
-from notchflex.fit.model.solved_rows import solved_rows
+from notchflex.fit.measurements.simulated import solved_rows
+from notchflex.fit.model.branch_residuals import branch_words
+from notchflex.fit.model.residuals import misfit
+from notchflex.fit.model.rows import OUTPUTS, Predicted
 from notchflex.mechanics.motion import rotation_about
 from notchflex.robot import Robot
 
@@ -25,27 +25,27 @@ if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
 _COLUMNS = ("tension", "stroke", "notch_angle", "total_angle", "tip_position", "converged")
-# What has no column of its own in a comparison: only its error is told.
+# Quantities without a column of their own in a comparison: only their errors are kept.
 _OTHERS = ("tip_rotation", "tip_tension", "axis_points")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """A robot beside its measurement, P rows, n notches, t tendons.
+    """A robot beside its measurements, P rows, n notches, t tendons.
 
     Errors are taken over the rows that were solved; they are NaN for what was not measured.
 
     Attributes:
-        robot: The robot that was compared.
-        measured: The measurement; its `from_rest` says how the rows were loaded.
+        robot: The robot.
+        measured: The measurements; their `from_rest` says how the rows were loaded.
         tension: Base tension in the model [N], (P, t).
         stroke: Stroke in the model [mm], (P, t).
         notch_angle: Notch angles of the model [rad], (P, n).
         total_angle: Total angle of the model [rad], (P,).
         tip: Tip of the model in the world [mm], (P, 3).
         converged: Whether the equilibrium was found, (P,).
-        reason: Why not, P texts, "" where it was.
-        others: Root-mean-square errors of what else was measured, by the names of
+        reason: Why not, P texts, "" if it was.
+        others: Root-mean-square errors of other measured quantities, by the names of
             `Measurements.observed`: "tip_rotation" [rad], "tip_tension" [N], "axis_points" [mm].
         stroke_lost: Stroke that closed notches could not take in the kinematic model [mm], (P,);
             None for a model with forces.
@@ -73,25 +73,24 @@ class Comparison:
     def measured_total_angle(self) -> Float[np.ndarray, " p"]:
         """Measured total angle [rad], (P,): its own column, or else the sum of all notches."""
         added = np.sum(self.measured_notch_angle, axis=1)
-        own = self.measured.observed.get("total_angle")
-        return added if own is None else np.where(np.isnan(own), added, own)
+        total = self.measured.observed.get("total_angle")
+        return added if total is None else np.where(np.isnan(total), added, total)
 
     @cached_property
     def measured_tip(self) -> Float[np.ndarray, "p 3"]:
-        """Measured tip in the world [mm], (P, 3); NaN for coordinates that are not known.
+        """Measured tip in the world [mm], (P, 3); NaN for unknown coordinates.
 
-        As measured, or else the forward kinematics of the measured notch angles.
+        As measured, or else by forward kinematics of the measured notch angles.
         """
-        found = np.full(self.tip.shape, np.nan)
         angles = self.measured_notch_angle
-        whole = np.isfinite(angles).all(axis=1)
-        if whole.any():
-            found[whole] = _tip_in_world(self.robot, self.measured, angles[whole])
-        own = self.measured.observed.get("tip_position")
-        if own is not None:
-            seen = np.isfinite(own).any(axis=1)
-            found[seen] = own[seen]
-        return found
+        complete = np.isfinite(angles).all(axis=1)
+        tip = np.full(self.tip.shape, np.nan)
+        if complete.any():
+            tip[complete] = _tip_in_world(self.robot, self.measured, angles[complete])
+        measured = self.measured.observed.get("tip_position")
+        if measured is None:
+            return tip
+        return np.where(np.isfinite(measured).any(axis=1, keepdims=True), measured, tip)
 
     @property
     def points(self) -> int:
@@ -121,12 +120,9 @@ class Comparison:
 
     @property
     def diagnosis(self) -> tuple[str, ...]:
-        """What a user should know before trusting the errors; nothing where there is nothing."""
+        """Sentences that a user should know before trusting the errors."""
         off = np.where(self.converged, self.measured_total_angle - self.total_angle, np.nan)
-        difference = branch_difference(off, self.measured.branches)
-        if difference is None:
-            return ()
-        return (branch_words(difference, "total_angle", self.measured),)
+        return branch_words(off, "total_angle", self.measured)
 
     def _rms(self, errors: NDArray[np.float64]) -> NDArray[np.float64]:
         known = np.isfinite(errors) & self.converged.reshape(-1, *(1,) * (errors.ndim - 1))
@@ -170,17 +166,14 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
         0.54
     """
     _check(robot, measurements)
-    observed = tuple(name for name in _OTHERS if name in measurements.observed)
+    others = [name for name in _OTHERS if name in measurements.observed]
 
     def read(path: EquilibriumPath) -> dict[str, Any]:
-        columns = {name: np.asarray(getattr(path, name)) for name in _COLUMNS}
+        names = [*_COLUMNS, *(OUTPUTS.get(name, name) for name in others if name != "axis_points")]
+        columns = {name: np.asarray(getattr(path, name)) for name in names}
         columns["reason"] = np.array(path.reason, object)
-        for name in outputs_for(observed):
-            columns[name] = (
-                np.asarray(axis_points(path, measurements.axis_at))
-                if name == "axis_points"
-                else np.asarray(getattr(path, name))
-            )
+        if "axis_points" in others:
+            columns["axis_points"] = np.asarray(axis_points(path, measurements.axis_at))
         return columns
 
     model = solved_rows(robot, measurements.load, measurements.pull, measurements.from_rest, read)
@@ -194,16 +187,16 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
         tip=model["tip_position"],
         converged=model["converged"],
         reason=tuple(str(one) for one in model["reason"]),
-        others={name: _error(name, measurements, model) for name in observed},
+        others={name: _error(name, measurements, model) for name in others},
     )
 
 
 def compare_kinematics(comparison: Comparison) -> Comparison:
     """Compare the model that shares the stroke equally over the notches (Pacheco 2021, eq. 1-3).
 
-    It knows no forces: it takes the measured stroke, and where only the force was measured the
-    stroke that the full model finds under it. Notches that are alike then add up to the total angle
-    of the full model, whatever was measured: only the notches and the tip tell the two apart.
+    It takes the measured stroke or, if only the force was measured, the stroke of the full model.
+    Equal notches then add up to the total angle of the full model, whatever was measured: only the
+    notches and the tip distinguish the two models.
 
     Args:
         comparison: The full model, for a robot of one tendon.
@@ -220,12 +213,13 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
             f"the kinematic model shares the stroke of one tendon; {robot.name} has "
             f"{robot.number_of_tendons}."
         )
-    given = ~np.isnan(comparison.measured.load.stroke[:, 0])
-    stroke = np.where(given, comparison.measured.load.stroke[:, 0], comparison.stroke[:, 0])
+    measured = comparison.measured.load.stroke[:, 0]
+    known = ~np.isnan(measured)
+    stroke = np.where(known, measured, comparison.stroke[:, 0])
     shared = equal_stroke(robot, stroke)
     angles = shared.notch_angle
     # A stroke past the last closing has no equilibrium, but here it is the closed shape.
-    solved = comparison.converged | given
+    solved = comparison.converged | known
     return replace(
         comparison,
         stroke=stroke[:, None],
@@ -235,9 +229,7 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
         converged=solved,
         others={},
         stroke_lost=shared.stroke_lost,
-        reason=tuple(
-            "" if good else why for good, why in zip(solved, comparison.reason, strict=True)
-        ),
+        reason=tuple(np.where(solved, "", comparison.reason).tolist()),
     )
 
 
@@ -258,7 +250,7 @@ def _check(robot: Robot, measurements: Measurements) -> None:
 def _tip_in_world(
     robot: Robot, measured: Measurements, angles: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Forward kinematics of notch angles, on the base as it was turned."""
+    """Forward kinematics of notch angles, with the base rotation."""
     tip, _ = tip_from_angles(robot, angles)
     return np.asarray(tip) @ np.asarray(rotation_about(constant(measured.load.base_rotation))).T
 
@@ -268,13 +260,9 @@ def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
     rows = np.flatnonzero(model["converged"])
     if not len(rows) or not np.isfinite(measured.observed[name][rows]).any():
         return float("nan")
-    values = {one: model[one][rows] for one in outputs_for((name,))}
-    predicted = Predicted(values, np.ones(len(rows), bool), {})
-    off = misfit(name, measured.taken(rows), predicted).values
-    coordinates = 1 if name == "tip_tension" else 3
-    squares = off.reshape(len(rows), -1, coordinates) ** 2
+    output = OUTPUTS.get(name, name)
+    predicted = Predicted({output: model[output][rows]}, np.ones(len(rows), bool), {})
+    off, _ = misfit(name, measured.taken(rows), predicted)
+    squares = off.reshape(len(rows), -1, 1 if name == "tip_tension" else 3) ** 2
     known = np.isfinite(squares).any(axis=2)
     return float(np.sqrt(np.nansum(squares) / known.sum()))
-
-
-__all__ = ["Comparison", "compare", "compare_kinematics"]

@@ -1,12 +1,10 @@
-"""A comparison as a JSON document and as the columns of a CSV."""
+"""A comparison as a JSON document, as columns of a CSV, and as text."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from notchflex.comparison.comparison import Comparison
 from notchflex.fit.assessment.errors_of_parts import edge
@@ -28,27 +26,24 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
     """
     measured = comparison.measured
     failed = [reason for reason in comparison.reason if reason]
-    points = [
+    columns = {
+        "tendon_tension_N": (measured.measured_tension, comparison.tension),
+        "tendon_stroke_mm": (measured.load.stroke, comparison.stroke),
+        "notch_angle_deg": _degrees(comparison.measured_notch_angle, comparison.notch_angle),
+        "total_angle_deg": _degrees(comparison.measured_total_angle, comparison.total_angle),
+        "tip_position_mm": (comparison.measured_tip, comparison.tip),
+    }
+    rows = [
         {
-            "trial": measured.pull[index],
-            "measured": {
-                "tendon_tension_N": measured.measured_tension[index],
-                "tendon_stroke_mm": measured.load.stroke[index],
-                "notch_angle_deg": comparison.measured_notch_angle[index] * DEGREES,
-                "total_angle_deg": comparison.measured_total_angle[index] * DEGREES,
-                "tip_position_mm": comparison.measured_tip[index],
-            },
+            "trial": measured.pull[row],
+            "measured": {key: values[row] for key, (values, _) in columns.items()},
             "model": {
-                "tendon_tension_N": comparison.tension[index],
-                "tendon_stroke_mm": comparison.stroke[index],
-                "notch_angle_deg": comparison.notch_angle[index] * DEGREES,
-                "total_angle_deg": comparison.total_angle[index] * DEGREES,
-                "tip_position_mm": comparison.tip[index],
-                "converged": comparison.converged[index],
-                "reason": comparison.reason[index],
+                **{key: values[row] for key, (_, values) in columns.items()},
+                "converged": comparison.converged[row],
+                "reason": comparison.reason[row],
             },
         }
-        for index in range(len(measured))
+        for row in range(len(measured))
     ]
     return {
         **document_head(comparison.robot),
@@ -61,7 +56,7 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
         "ignored_columns": measured.ignored,
         "converged": not failed,
         "reason": failed[0] if failed else "",
-        "rows": points,
+        "rows": rows,
     }
 
 
@@ -69,19 +64,18 @@ def errors_document(comparison: Comparison) -> dict[str, Any]:
     """Return the errors of a comparison: `rmse_deg`, `tip_rmse_mm` and the number of `points`.
 
     `rmse_others` holds those of the tip's rotation, of tensions at the tip and of points on the
-    axis, where they were measured. For the kinematic model also `stroke_from` ("measurement", or
-    "model" where only forces were measured) and `stroke_lost_mm`, what closed notches could not
-    take, by row.
+    axis, if they were measured. For the kinematic model also `stroke_from` ("measurement", or
+    "model" if some row has only forces) and `stroke_lost_mm`, which closed notches could not take,
+    by row.
     """
     lost: dict[str, Any] = {}
     if comparison.stroke_lost is not None:
         source = "model" if takes_stroke_of_model(comparison) else "measurement"
         lost = {"stroke_from": source, "stroke_lost_mm": comparison.stroke_lost}
-    notches = comparison.rmse_notches * DEGREES
-    seen = "notch_angle" in comparison.measured.observed
+    measured = "notch_angle" in comparison.measured.observed
     return {
         "rmse_deg": {
-            "notches": notches if seen else None,
+            "notches": comparison.rmse_notches * DEGREES if measured else None,
             "total": comparison.rmse_total * DEGREES,
         },
         "tip_rmse_mm": comparison.tip_rmse,
@@ -95,23 +89,31 @@ def errors_document(comparison: Comparison) -> dict[str, Any]:
 
 
 def comparison_columns(comparison: Comparison) -> dict[str, Any]:
-    """Return a comparison as columns for a CSV: header to P values, at the edge units."""
-    measured = comparison.measured
-    columns: dict[str, Any] = {"trial": measured.pull}
-    tendons = comparison.robot.number_of_tendons
+    """Return a comparison as columns for a CSV: header to P values, in deg, mm and N."""
+    robot, measured = comparison.robot, comparison.measured
+    tendons = robot.number_of_tendons
+    pairs: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for tendon in range(tendons):
         number = "" if tendons == 1 else tendon + 1
-        for name, given in (
-            ("tension", measured.measured_tension),
-            ("stroke", measured.load.stroke),
+        for name, values, model in (
+            ("tension", measured.measured_tension, comparison.tension),
+            ("stroke", measured.load.stroke, comparison.stroke),
         ):
             header = QUANTITIES[name].header(tendon=number)
-            if not np.isnan(given[:, tendon]).all():
-                columns[header] = given[:, tendon]
-            columns[f"{header}_model"] = getattr(comparison, name)[:, tendon]
-    for header, seen, model in _pairs(comparison):
-        if not np.isnan(seen).all():
-            columns[header] = seen
+            pairs[header] = values[:, tendon], model[:, tendon]
+    angles = _degrees(comparison.measured_notch_angle, comparison.notch_angle)
+    for notch in range(robot.number_of_notches):
+        header = QUANTITIES["notch_angle"].header(notch=notch + 1)
+        pairs[header] = angles[0][:, notch], angles[1][:, notch]
+    total = _degrees(comparison.measured_total_angle, comparison.total_angle)
+    pairs[QUANTITIES["total_angle"].header()] = total
+    for index, axis in enumerate(AXES):
+        header = QUANTITIES["tip_position"].header(axis=axis)
+        pairs[header] = comparison.measured_tip[:, index], comparison.tip[:, index]
+    columns: dict[str, Any] = {"trial": measured.pull}
+    for header, (values, model) in pairs.items():
+        if not np.isnan(values).all():
+            columns[header] = values
         columns[f"{header}_model"] = model
     columns["tip_error_mm"] = comparison.tip_error
     columns["converged"] = comparison.converged
@@ -119,28 +121,13 @@ def comparison_columns(comparison: Comparison) -> dict[str, Any]:
     return columns
 
 
-def _pairs(
-    comparison: Comparison,
-) -> Iterator[tuple[str, Float[np.ndarray, " p"], Float[np.ndarray, " p"]]]:
-    """Yield header, measured and modelled column of every notch, the total and the tip."""
-    for notch in range(comparison.robot.number_of_notches):
-        header = QUANTITIES["notch_angle"].header(notch=notch + 1)
-        pair = comparison.measured_notch_angle[:, notch], comparison.notch_angle[:, notch]
-        yield header, pair[0] * DEGREES, pair[1] * DEGREES
-    pair = comparison.measured_total_angle, comparison.total_angle
-    yield QUANTITIES["total_angle"].header(), pair[0] * DEGREES, pair[1] * DEGREES
-    for index, axis in enumerate(AXES):
-        header = QUANTITIES["tip_position"].header(axis=axis)
-        yield header, comparison.measured_tip[:, index], comparison.tip[:, index]
-
-
 def takes_stroke_of_model(kinematics: Comparison) -> bool:
-    """Tell whether the kinematic model had to take the stroke of the full model in some row."""
+    """Return whether the kinematic model takes the stroke of the full model in some row."""
     return bool(np.isnan(kinematics.measured.load.stroke[:, 0]).any())
 
 
 def summary(comparison: Comparison) -> str:
-    """Return what a comparison found as a few lines of text."""
+    """Return the errors of a comparison as a few lines of text."""
     measured = comparison.measured
     way = "each from rest" if measured.from_rest else "each pull one path"
     notches = ", ".join(_number(one * DEGREES) for one in comparison.rmse_notches)
@@ -156,6 +143,10 @@ def summary(comparison: Comparison) -> str:
         title, unit, scale = edge(name)
         lines.append(f"  {title}  {_number(value * scale)} {unit}")
     return "\n".join([*lines, *comparison.diagnosis])
+
+
+def _degrees(measured: np.ndarray, model: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return measured * DEGREES, model * DEGREES
 
 
 def _number(value: float) -> str:

@@ -1,4 +1,8 @@
-"""What a fit found as JSON documents."""
+"""Fits as JSON documents, for `notchflex.results.files.json.write_json`, and as text.
+
+Constants are in the units of the robot file. None stands for a missing number, also for an open end
+of an interval.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +12,25 @@ from typing import Any
 import numpy as np
 
 from notchflex import __version__
-from notchflex.fit.assessment.diagnosis import diagnose
+from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
 from notchflex.fit.assessment.errors_of_parts import edge, errors_of_parts
 from notchflex.fit.assessment.folds import LeftOut
 from notchflex.fit.assessment.next_measurement import NextMeasurement
 from notchflex.fit.assessment.posterior import Posterior
 from notchflex.fit.estimation.calibration import Calibration
+from notchflex.fit.estimation.intervals import Interval
 from notchflex.fit.estimation.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
-from notchflex.fit.measurements.measurements import OBSERVED
 from notchflex.results.files.json import plain
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot.robot import to_table
 
+HEAD = {"program": "notchflex", "version": __version__}
 # An objective's value is a sum of these; half a chi squared has no unit.
 _UNIT_OF_COST: dict[type, str] = {SumOfRobotErrors: "deg", SumOfDistances: "mm"}
 
 
 def calibration_document(found: Calibration) -> dict[str, Any]:
-    """Return a fit as a document for `notchflex.results.files.json.write_json`.
+    """Return a fit as a document.
 
     Args:
         found: The fit.
@@ -34,21 +39,17 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         `converged`, `reason`, `objective`, `cost`, `numbers_measured` (`numbers_counted` without
         totals that are sums of the notches), `reduced_chi_squared`, `constants` (each with value,
         unit, 95 % interval and whether it is by rows or by whole pulls, standard deviations,
-        limits), `correlation`, `verdict` (the sentences of `diagnose`), `noise`,
-        `errors` (root mean squares of every notch, beside the repeats), `searches`, `solves` (rows
-        that were solved) and `robots` (their data, and their descriptions with the constants that
-        were found). Constants are in the units of the robot file; None stands where there is no
-        number, also for an open end of an interval.
+        limits), `correlation`, `verdict` (the sentences of `diagnose`), `noise`, `errors` (root
+        mean squares of every notch, beside the repeats), `searches`, `solves` (number of rows
+        solved) and `robots` (their data, and their descriptions with the fitted constants).
     """
     objective = found.problem.objective
-    told: dict[str, Any] = {"name": type(objective).__name__}
-    if isinstance(objective, LeastSquares):
-        told["huber"] = objective.huber
+    huber = {"huber": objective.huber} if isinstance(objective, LeastSquares) else {}
     return {
-        **_head(),
+        **HEAD,
         "converged": found.converged,
         "reason": found.reason,
-        "objective": told,
+        "objective": {"name": type(objective).__name__, **huber},
         "cost": found.cost,
         "cost_unit": _UNIT_OF_COST.get(type(objective), ""),
         "numbers_measured": len(found.residuals),
@@ -60,29 +61,8 @@ def calibration_document(found: Calibration) -> dict[str, Any]:
         "correlation": [[_finite(one) for one in row] for row in found.correlation],
         "verdict": list(diagnose(found)),
         "noise": _noise(found),
-        "errors": [
-            {
-                "robot": one.robot,
-                "quantity": one.quantity,
-                "part": one.part or None,
-                "unit": one.unit,
-                "rmse": one.error,
-                "repeats": _finite(one.repeats),
-                "count": one.count,
-            }
-            for one in errors_of_parts(found)
-        ],
-        "searches": [
-            {
-                "values": dict(zip(found.names, one.values.tolist(), strict=True)),
-                "cost": None if one.cost is None else one.cost.value,
-                "converged": one.converged,
-                "reason": one.reason,
-                "iterations": one.iterations,
-                "calls": one.calls,
-            }
-            for one in found.searches
-        ],
+        "errors": _errors(found),
+        "searches": _searches(found),
         "solves": found.solves,
         "robots": {
             label: {"data": data_of(found, label), "robot": plain(to_table(robot))}
@@ -103,7 +83,7 @@ def left_out_document(left_out: LeftOut) -> dict[str, Any]:
         those constants and `error_of_all` of those that were fitted to everything.
     """
     return {
-        **_head(),
+        **HEAD,
         "by": left_out.by,
         "constants": left_out.whole.values,
         "folds": [
@@ -127,37 +107,37 @@ def left_out_document(left_out: LeftOut) -> dict[str, Any]:
     }
 
 
-def next_measurement_document(told: NextMeasurement) -> dict[str, Any]:
-    """Return what candidates for the next measurement would tell as a document.
+def next_measurement_document(ranked: NextMeasurement) -> dict[str, Any]:
+    """Return candidates for the next measurement as a document.
 
     Args:
-        told: The candidates, weighed.
+        ranked: The candidates.
 
     Returns:
         `robot`, `wanted` (constants to be narrowed, empty for all together), `best` (number of the
         best candidate, from 1) and `candidates`: the load, `narrower` (width of every constant's
         interval after it over that before), `volume` (of all together) and `gain` (of what is
-        wanted). None stands where a candidate has no solution.
+        wanted), None if a candidate has no solution.
     """
-    tension, stroke = QUANTITIES["commanded_tension"], QUANTITIES["commanded_stroke"]
-    rows = zip(told.loads.tension, told.loads.stroke, told.narrower, strict=True)
+    keys = [QUANTITIES[f"commanded_{name}"].key for name in ("tension", "stroke")]
+    tension, stroke = (key.rpartition(".")[2] for key in keys)
     return {
-        **_head(),
-        "robot": told.label,
-        "wanted": list(told.wanted),
-        "best": told.best + 1,
+        **HEAD,
+        "robot": ranked.label,
+        "wanted": list(ranked.wanted),
+        "best": ranked.best + 1,
         "candidates": [
             {
                 "load": {
-                    tension.key.rpartition(".")[2]: pulled,
-                    stroke.key.rpartition(".")[2]: drawn,
+                    tension: ranked.loads.tension[number],
+                    stroke: ranked.loads.stroke[number],
                 },
-                "converged": bool(told.converged[number]),
-                "narrower": dict(zip(told.names, narrower.tolist(), strict=True)),
-                "volume": told.volume[number],
-                "gain": told.gain[number],
+                "converged": bool(ranked.converged[number]),
+                "narrower": dict(zip(ranked.names, narrower.tolist(), strict=True)),
+                "volume": ranked.volume[number],
+                "gain": ranked.gain[number],
             }
-            for number, (pulled, drawn, narrower) in enumerate(rows)
+            for number, narrower in enumerate(ranked.narrower)
         ],
     }
 
@@ -167,16 +147,17 @@ def posterior_document(drawn: Posterior, *, draws: bool = False) -> dict[str, An
 
     Args:
         drawn: The draws.
-        draws: Whether to tell every draw too.
+        draws: Whether to include every draw.
 
     Returns:
-        `constants` (mean, standard deviation, the middle 95 %, how many independent draws they are
-        worth, how unlike the chains are), `chains`, `draws_per_chain`, `divergent`, and `draws` if
-        wanted: by constant, chains by draws.
+        `constants` (mean, standard deviation, middle 95 %, effective number of draws, split
+        R-hat), `chains`, `draws_per_chain`, `divergent`, and `draws` if wanted: by constant,
+        chains by draws.
     """
     chains, count, _ = drawn.draws.shape
-    document: dict[str, Any] = {
-        **_head(),
+    every = {name: drawn.draws[..., number] for number, name in enumerate(drawn.names)}
+    return {
+        **HEAD,
         "chains": chains,
         "draws_per_chain": count,
         "divergent": drawn.divergent,
@@ -191,22 +172,36 @@ def posterior_document(drawn: Posterior, *, draws: bool = False) -> dict[str, An
             }
             for name in drawn.names
         ],
+        **({"draws": every} if draws else {}),
     }
-    if draws:
-        document["draws"] = {
-            name: drawn.draws[..., number] for number, name in enumerate(drawn.names)
-        }
-    return document
 
 
 def data_of(found: Calibration, label: str) -> list[str]:
-    """Where the measurements of a robot came from."""
-    every = (one.measured.source for one in found.problem.samples.every if one.label == label)
-    return list(dict.fromkeys(every))
+    """Return the sources of the measurements of a robot."""
+    sources = (one.source for one in found.problem.samples.of_robot(label))
+    return list(dict.fromkeys(sources))
 
 
-def _head() -> dict[str, Any]:
-    return {"program": "notchflex", "version": __version__}
+def summary(found: Calibration) -> str:
+    """Return constants with intervals and units, root-mean-square errors and the diagnosis."""
+    state = "converged" if found.converged else f"not converged: {found.reason}"
+    lines = [f"{', '.join(found.given)}: {found.counted} numbers measured, {state}"]
+    width = max(map(len, found.names))
+    for name, value in found.values.items():
+        unit, interval = found.units[name], found.intervals.get(name)
+        ends = "" if interval is None else f"  95 %: {_ends(interval, unit)}"
+        lines.append(f"  {name:<{width}}  {with_unit(value, unit)}{ends}")
+    errors = [
+        f"{edge(name)[0]} {error * edge(name)[2]:.3g} {edge(name)[1]}"
+        for name, error in found.residuals.root_mean_squares().items()
+    ]
+    lines.append(f"  rms error: {', '.join(errors)}")
+    return "\n".join([*lines, *(diagnose(found) or (NO_PROBLEMS,))])
+
+
+def _ends(interval: Interval, unit: str) -> str:
+    ends = ("open" if end is None else f"{end:.5g}" for end in (interval.lower, interval.upper))
+    return f"{' to '.join(ends)} {unit}".strip()
 
 
 def _constants(found: Calibration) -> list[dict[str, Any]]:
@@ -237,38 +232,53 @@ def _constants(found: Calibration) -> list[dict[str, Any]]:
 
 
 def _noise(found: Calibration) -> list[dict[str, Any]]:
-    """Noise of every quantity of every file: where it was known from, root mean square."""
+    """Source and root mean square of the noise of every quantity of every file."""
     rows: list[dict[str, Any]] = []
-    residuals = found.residuals
     for number, sample in enumerate(found.problem.samples.every):
         for name in sample.measured.observed:
-            own = (residuals.sample == number) & (residuals.quantity == OBSERVED.index(name))
-            if not own.any():
+            deviation = found.noise.deviation[found.residuals.of(number, name)]
+            if not len(deviation):
                 continue
             _, unit, scale = edge(name)
-            size = float(np.sqrt(np.mean(found.noise.deviation[own] ** 2)))
             rows.append(
                 {
                     "robot": sample.label,
                     "data": sample.measured.source,
                     "quantity": name,
                     "unit": unit,
-                    "standard_deviation": size * scale,
+                    "standard_deviation": float(np.sqrt(np.mean(deviation**2))) * scale,
                     "known_from": found.noise.source[number, name],
                 }
             )
     return rows
 
 
+def _errors(found: Calibration) -> list[dict[str, Any]]:
+    return [
+        {
+            "robot": one.robot,
+            "quantity": one.quantity,
+            "part": one.part or None,
+            "unit": one.unit,
+            "rmse": one.error,
+            "repeats": _finite(one.repeats),
+            "count": one.count,
+        }
+        for one in errors_of_parts(found)
+    ]
+
+
+def _searches(found: Calibration) -> list[dict[str, Any]]:
+    return [
+        {
+            **one._asdict(),
+            "values": dict(zip(found.names, one.values.tolist(), strict=True)),
+            "cost": None if one.cost is None else one.cost.value,
+        }
+        for one in found.searches
+    ]
+
+
 def _finite(value: float) -> float | None:
-    """A number, or None where there is none: of what is not known at all."""
+    """A number; None instead of NaN and infinity."""
     return float(value) if math.isfinite(value) else None
-
-
-__all__ = [
-    "calibration_document",
-    "data_of",
-    "left_out_document",
-    "next_measurement_document",
-    "posterior_document",
-]

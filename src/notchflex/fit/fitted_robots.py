@@ -1,4 +1,4 @@
-"""Fitted robots as robot files that say where each value came from."""
+"""Fitted robots as robot files that say where each value comes from."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from notchflex.results.files.writing import check_folder, write_text
 from notchflex.robot import robot_text
 from notchflex.robot.robot import source_of
 
-# More files than that are told by their number.
+# More files than that are not named, but counted.
 _FILES = 3
 
 
@@ -25,13 +25,12 @@ def write_fitted(
 ) -> tuple[Path, ...]:
     """Write every fitted robot as a robot file, named after its label.
 
-    Comments of the file that the robot was read from are kept. Beside each value that was fitted
-    stands to which data, and its 95 % interval. What belongs to the measurement (`sensor.`) stands
-    in no robot file.
+    Comments of the file that the robot was read from are kept. A comment beside each fitted value
+    names the data and the 95 % interval. Constants of the measurement (`sensor.`) are not written.
 
     Args:
         found: The fit.
-        folder: Where to; made if it is not there. Files of the same names are replaced.
+        folder: Folder of the files; made if it is missing. Files of the same names are replaced.
         inputs: Files that must not be replaced.
 
     Returns:
@@ -62,29 +61,18 @@ def write_fitted(
         ) from None
     for label, target in targets.items():
         robot = found.robots[label]
-        write_text(target, robot_text(robot, source_of(robot), fitted_notes(found, label)))
+        notes = {
+            path: _note(found, unknown)
+            for unknown in found.problem.unknowns
+            for owner, path in unknown.sets
+            if owner == label and path not in SENSOR
+        }
+        write_text(target, robot_text(robot, source_of(robot), notes))
     return files
 
 
-def fitted_notes(found: Calibration, label: str) -> dict[str, str]:
-    """What a robot file says of every fitted value: the data, and how far to trust it.
-
-    Args:
-        found: The fit.
-        label: Label of the robot.
-
-    Returns:
-        By name of the value, as `Robot.with_value` takes it.
-    """
-    return {
-        path: _note(found, unknown)
-        for unknown in found.problem.unknowns
-        for owner, path in unknown.sets
-        if owner == label and path not in SENSOR
-    }
-
-
 def _note(found: Calibration, unknown: Unknown) -> str:
+    """The comment beside a fitted value: the data, and how far to trust it."""
     labels = dict.fromkeys(owner for owner, _ in unknown.sets)
     files = [Path(one).name for label in labels for one in data_of(found, label)]
     files = list(dict.fromkeys(" ".join(one.split()) for one in files))
@@ -119,6 +107,3 @@ def _text(target: Path) -> str | None:
         return target.read_text(encoding="utf-8-sig")
     except (OSError, ValueError):
         return None
-
-
-__all__ = ["fitted_notes", "write_fitted"]

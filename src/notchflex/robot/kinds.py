@@ -49,6 +49,11 @@ class Notch:
         Field(ge=1, le=10_000, description="how many equal notches follow"),
     ] = 1
 
+    @property
+    def has_elastic_ends(self) -> bool:
+        """Whether its stiffness depends on the rings beside it."""
+        return False
+
     def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
         """Find what does not fit the tube: pairs of a key and the rest of the sentence."""
         del tube

@@ -193,6 +193,8 @@ def _contact_rows(here: _Linearisation) -> list[Array]:
             ..., None
         ]
         closing = here.unit.spread(contact.gap)
+        if chain.contact_flexibility is not None:
+            closing = closing + chain.contact_flexibility[:, None, None] * unit_force[None]
         rows.append(jnp.where(active, closing / height, unit_force[None] / (stiffness * height)))
     return rows
 

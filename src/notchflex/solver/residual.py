@@ -138,10 +138,14 @@ def evaluate(
         for k, group in enumerate(chain.groups)
     )
     contacts = tuple(
-        jax.vmap(type(group).gap_response)(
-            group, chain.rods, flexure, select_anchors(anchors, group.back)
+        _yielding(
+            chain,
+            jax.vmap(type(group).gap_response)(
+                group, chain.rods, flexure, select_anchors(anchors, group.back)
+            ),
+            force,
         )
-        for group in chain.contact_pairs
+        for group, force in zip(chain.contact_pairs, unknowns.contact_force, strict=True)
     )
     rotation, wrenches, at_base = None, None, None
     if on_bodies:
@@ -166,6 +170,13 @@ def evaluate(
         at_base,
     )
     return Evaluation(flexure, anchors, rotation, spans, contacts, wrenches, base, residual)
+
+
+def _yielding(chain: Chain, response: GapResponse, force: Float[Array, "n l"]) -> GapResponse:
+    """Gaps between lips that yield to their contact force."""
+    if chain.contact_flexibility is None:
+        return response
+    return response._replace(gap=response.gap + chain.contact_flexibility[:, None] * force)
 
 
 def _balance(

@@ -11,6 +11,7 @@ from scipy import stats
 import notchflex as nf
 from notchflex.fit import constancy, weight_held
 from notchflex.fit.friction_rig.scattered import fit_line, mean_interval, outliers
+from refusals import refused
 
 MU = 0.15
 
@@ -198,35 +199,35 @@ def test_equal_numbers_have_an_interval_of_nothing():
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "code", "name"),
     [
-        ("weight_1_g,weight_2_g\n1,1\n", "columns turn_1_deg, turn_2_deg are not there"),
-        ("a\n1\n", "columns weight_1_g, weight_2_g, turn_1_deg, turn_2_deg are not there"),
-        ("weight_1_g,weight_2_g,turn_1_deg\n1,1,1\n", "the column turn_2_deg is not there"),
-        ("{h}\n# note\n200,150,90,90\n150,200,90,90\n", "line 4: weight 2 is larger"),
-        ("{h}\n200,150,0,0\n", "line 2: the string does not turn"),
-        ("{h}\n200,150,180,90\n", "line 2: a string turns over an edge by 0 to less than 180"),
-        ("{h}\n200,,90,90\n", "line 2: weight_2_g is nothing"),
-        ("{h},turn_1_sd_deg\n200,150,90,90,0\n", "line 2: turn_1_sd_deg is 0; a standard"),
+        ("weight_1_g,weight_2_g\n1,1\n", "TABLE_COLUMNS", "columns turn_1_deg, turn_2_deg are"),
+        ("a\n1\n", "TABLE_COLUMNS", "weight_1_g, weight_2_g, turn_1_deg, turn_2_deg"),
+        ("weight_1_g,weight_2_g,turn_1_deg\n1,1,1\n", "TABLE_COLUMNS", "column turn_2_deg is"),
+        ("{h}\n# note\n200,150,90,90\n150,200,90,90\n", "OUT_OF_RANGE", "line 4: weight 2"),
+        ("{h}\n200,150,0,0\n", "OUT_OF_RANGE", "line 2: the string"),
+        ("{h}\n200,150,180,90\n", "OUT_OF_RANGE", "0 to less than 180"),
+        ("{h}\n200,,90,90\n", "NOT_A_NUMBER", "line 2: weight_2_g"),
+        ("{h},turn_1_sd_deg\n200,150,90,90,0\n", "OUT_OF_RANGE", "line 2: turn_1_sd_deg is 0"),
     ],
 )
-def test_bad_files_are_told_in_one_sentence(tmp_path, text, words):
+def test_bad_files_are_told_in_one_sentence(tmp_path, text, code, name):
     file = tmp_path / "rig.csv"
     file.write_text(text.format(h="weight_1_g,weight_2_g,turn_1_deg,turn_2_deg"))
-    with pytest.raises(nf.InputError, match=words) as told:
+    with refused(code, name) as told:
         nf.read_friction_rig(file)
     assert "rig.csv" in str(told.value)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "code", "name"),
     [
-        (([], [], [], []), "no readings"),
-        (([1.0], [1.0, 2.0], [1.0], [1.0]), "four numbers each"),
-        (([1.0], [np.nan], [1.0], [1.0]), "must be finite"),
-        (([1.0], [1.0], [1.0], [1.0], [[0.0, 1.0, 1.0, 1.0]]), "above 0 or NaN"),
+        (([], [], [], []), "NO_DATA", "readings"),
+        (([1.0], [1.0, 2.0], [1.0], [1.0]), "WRONG_SHAPE", "four numbers"),
+        (([1.0], [np.nan], [1.0], [1.0]), "NOT_FINITE", "finite"),
+        (([1.0], [1.0], [1.0], [1.0], [[0.0, 1.0, 1.0, 1.0]]), "NOT_FINITE", "above 0 or NaN"),
     ],
 )
-def test_bad_readings_are_refused(arguments, words):
-    with pytest.raises(nf.InputError, match=words):
+def test_bad_readings_are_refused(arguments, code, name):
+    with refused(code, name):
         nf.FrictionReadings(*arguments)

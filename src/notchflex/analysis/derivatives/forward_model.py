@@ -32,6 +32,8 @@ from notchflex.solver.programs.run import run
 
 # One gradient of a number takes about as long as derivatives along so many directions.
 _ADJOINT = 4
+# Numbers of the material on which more than the law of the sections depends.
+_OF_THE_CHAIN = ("density", "poisson_ratio")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +88,7 @@ class ForwardModel:
             InputError: The number cannot be varied.
         """
         section, _, key = name.partition(".")
-        if section in ("material", "friction") and key != "density":
+        if section in ("material", "friction") and key not in _OF_THE_CHAIN:
             part, shape = getattr(robot, section), self._shape(robot)
 
             def of_laws(value: float) -> np.ndarray:

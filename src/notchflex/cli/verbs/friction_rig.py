@@ -31,8 +31,8 @@ def friction_rig(
     """
     outputs = Outputs([data], json=json, plot=plot)
 
-    from notchflex.fit.friction_rig.documents import friction_document
     from notchflex.fit.friction_rig.readings import read_friction_rig
+    from notchflex.fit.friction_rig.rig import friction_document
     from notchflex.fit.friction_rig.rig import friction_rig as estimate
 
     rig = estimate(read_friction_rig(data))

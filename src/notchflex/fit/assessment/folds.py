@@ -1,32 +1,31 @@
-"""Honest testing: constants fitted without a pull, or a robot, tried on what was left out."""
+"""Cross-validation: constants fitted without a pull, or a robot, tested on what was left out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
-
-import numpy as np
+from typing import Literal
 
 from notchflex.errors import InputError
 from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.estimation.fit import fitted
+from notchflex.fit.estimation.fit import check_search, fitted
 from notchflex.fit.estimation.problem import Problem, Progress
-from notchflex.fit.measurements.measurements import OBSERVED, Measurements
-from notchflex.fit.model.residuals import Residuals
+from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.model.samples import Samples
-from notchflex.robot import Robot
+
+Data = dict[str, tuple[Measurements, ...]]
+"""Measurements by label of their robot."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """One thing left out.
+    """One part left out.
 
     Attributes:
-        label: The robot, and the pull where a pull was left out.
+        label: The robot, and the pull if a pull was left out.
         found: The fit to all the rest.
         errors: Root-mean-square error on what was left out by quantity (rad, mm, N).
-        errors_of_all: The same of constants that were fitted to everything.
+        errors_of_all: The same of the constants fitted to everything.
         converged: Whether every row left out was solved.
     """
 
@@ -60,17 +59,17 @@ def leave_out(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> LeftOut:
-    """Fit again without each pull, or each robot, and try the constants on it.
+    """Fit again without each pull, or each robot, and test the constants on it.
 
     Args:
         found: A fit to everything.
         by: "pull" or "robot".
-        starts: From how many places to search each time.
-        seed: Of the places.
-        progress: Called with what is done, how much of it, and how much there is.
+        starts: Number of starting points of each search.
+        seed: Seed of the starting points.
+        progress: Called with the name of the task, how much of it is done, and how much there is.
 
     Returns:
-        The fit to everything, and what each part makes of constants fitted without it.
+        The fit to everything, and errors on each part of constants fitted without it.
 
     Raises:
         InputError: There is only one part, or a constant belongs to the one left out alone.
@@ -89,102 +88,51 @@ def leave_out(
         >>> [fold.errors["notch_angle"] < 0.02 for fold in tested.folds]
         [True, True]
     """
-    every = found.problem.samples.every
-    data = {
-        label: tuple(one.measured for one in every if one.label == label) for label in found.given
-    }
-    if starts < 1 or seed < 0:
-        raise InputError.OUT_OF_RANGE(
-            f"starts must be 1 or more, seed 0 or more; got {starts} and {seed}"
-        )
-    parts = _parts(data, by)
+    if by not in ("pull", "robot"):
+        raise InputError.UNKNOWN_NAME(f'leave out by "pull" or by "robot"; got {by!r}')
+    check_search(starts, seed)
+    data = {label: tuple(found.problem.samples.of_robot(label)) for label in found.given}
+    parts = list(_parts(data, by))
     if len(parts) < 2:
         raise InputError.TOO_FEW_DATA(
             f"there is only one {by}; leaving it out leaves nothing to fit to"
         )
-    settings = every[0].rows.settings
+    settings = found.problem.samples.every[0].settings
     folds: list[Fold] = []
-    for number, part in enumerate(parts):
-        rest = {label: _without(data[label], label, part) for label in found.given}
-        kept = {label: robot for label, robot in found.given.items() if rest[label]}
+    for number, (name, label, part, rest) in enumerate(parts, start=1):
+        kept = {label: found.given[label] for label, every in rest.items() if every}
         constants = tuple(one.among(kept) for one in found.problem.unknowns)
-        samples = Samples.of(kept, {label: rest[label] for label in kept}, constants, settings)
-        problem = Problem(samples, found.problem.objective)
+        problem = Problem(Samples.of(kept, rest, constants, settings), found.problem.objective)
         again = fitted(kept, problem, starts, seed, intervals=False)
-        own = (found.given[part.robot], data[part.robot], part)
-        errors, of_all = _errors(*own, again), _errors(*own, found)
-        folds.append(
-            Fold(part.told(data[part.robot]), again, errors or {}, of_all or {}, errors is not None)
-        )
+        errors, of_all = _errors(again, found, label, part), _errors(found, found, label, part)
+        folds.append(Fold(name, again, errors or {}, of_all or {}, errors is not None))
         if progress is not None:
-            progress("leaving out", number + 1, len(parts))
+            progress("leaving out", number, len(parts))
     return LeftOut(by, found, tuple(folds))
 
 
-def root_mean_squares(residuals: Residuals) -> dict[str, float]:
-    """Root-mean-square residuals by quantity (rad, mm, N)."""
-    return {
-        OBSERVED[quantity]: float(
-            np.sqrt(np.mean(residuals.values[residuals.quantity == quantity] ** 2))
-        )
-        for quantity in np.unique(residuals.quantity)
-    }
-
-
-class _Part(NamedTuple):
-    """A robot, or one of its pulls: the number of its measurement and the pull's label."""
-
-    robot: str
-    measurement: int = -1
-    pull: str = ""
-
-    def is_in(self, label: str, number: int) -> bool:
-        """Whether it is, or lies in, a measurement of a robot."""
-        return label == self.robot and self.measurement in (-1, number)
-
-    def told(self, every: Sequence[Measurements]) -> str:
-        """What it is called."""
-        if self.measurement < 0:
-            return self.robot
-        source = f", {every[self.measurement].source}" if len(every) > 1 else ""
-        return f"{self.robot}{source}, pull {self.pull}"
-
-
-def _parts(data: Mapping[str, Sequence[Measurements]], by: str) -> list[_Part]:
-    if by == "robot":
-        return [_Part(label) for label in data]
-    if by != "pull":
-        raise InputError.UNKNOWN_NAME(f'leave out by "pull" or by "robot"; got {by!r}')
-    return [
-        _Part(label, number, pull)
-        for label, every in data.items()
-        for number, measured in enumerate(every)
-        for pull in measured.pulls
-    ]
-
-
-def _without(every: Sequence[Measurements], label: str, part: _Part) -> tuple[Measurements, ...]:
-    kept: list[Measurements] = []
-    for number, measured in enumerate(every):
-        if not part.is_in(label, number):
-            kept.append(measured)
-        elif part.pull and len(measured.pulls) > 1:
-            kept.append(measured.of_pulls([pull for pull in measured.pulls if pull != part.pull]))
-    return tuple(kept)
+def _parts(data: Data, by: str) -> Iterator[tuple[str, str, Sequence[Measurements], Data]]:
+    """Yield name, robot and measurements of every part, and all the other measurements."""
+    for label, every in data.items():
+        if by == "robot":
+            yield label, label, every, data | {label: ()}
+            continue
+        for number, measured in enumerate(every):
+            source = f", {measured.source}" if len(every) > 1 else ""
+            for pull in measured.pulls:
+                others = [one for one in measured.pulls if one != pull]
+                rest = (measured.of_pulls(others),) if others else ()
+                kept = every[:number] + rest + every[number + 1 :]
+                part = [measured.of_pulls([pull])]
+                yield f"{label}{source}, pull {pull}", label, part, data | {label: kept}
 
 
 def _errors(
-    robot: Robot, every: Sequence[Measurements], part: _Part, found: Calibration
+    fit: Calibration, whole: Calibration, label: str, part: Sequence[Measurements]
 ) -> dict[str, float] | None:
-    """Errors on the part left out; None where a row of it has no solution."""
-    label = part.robot
-    if part.pull:
-        every = [every[part.measurement].of_pulls([part.pull])]
-    constants = tuple(one.shared_with(label) for one in found.problem.unknowns)
-    settings = found.problem.samples.every[0].rows.settings
-    samples = Samples.of({label: robot}, {label: every}, constants, settings)
-    residuals = samples.residuals(found.best.values)
-    return None if residuals is None else root_mean_squares(residuals)
-
-
-__all__ = ["Fold", "LeftOut", "leave_out", "root_mean_squares"]
+    """Errors of fitted constants on a part; None if one of its rows has no solution."""
+    constants = tuple(one.shared_with(label) for one in fit.problem.unknowns)
+    settings = whole.problem.samples.every[0].settings
+    samples = Samples.of({label: whole.given[label]}, {label: part}, constants, settings)
+    residuals = samples.residuals(fit.best.values)
+    return None if residuals is None else residuals.root_mean_squares()

@@ -1,11 +1,12 @@
 """The posterior of a fit's constants by sampling (NUTS), with the likelihood of the fit itself.
 
-Hoffman and Gelman 2014. The sampler sees the model through its misfit and slope alone, in the
+Hoffman and Gelman 2014. The sampler sees the model through its misfit and gradient alone, in the
 units of the fit's own spread, so that its steps are of one size in every direction.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from notchflex.fit.estimation.intervals import LEVEL
 from notchflex.fit.estimation.problem import Progress
 
 LEAST_DRAWS = 4
-"""Fewer draws of a chain tell nothing of how unlike its halves are."""
+"""With fewer draws the halves of a chain cannot be compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +30,9 @@ class Posterior:
     Attributes:
         names: The constants.
         draws: Draws by chains, draws and constants, in the units of the robot file.
-        effective: How many independent draws they are worth, by constant.
-        unlike: How unlike the chains are (split R-hat, 1 where they agree), by constant.
-        divergent: How many steps the sampler could not follow; more than a few are too many.
+        effective: Number of independent draws they are worth, by constant.
+        unlike: Split R-hat, 1 if the chains agree, by constant.
+        divergent: Number of divergent steps of the sampler; more than a few are too many.
     """
 
     names: tuple[str, ...]
@@ -68,32 +69,26 @@ def sample_posterior(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Posterior:
-    """Draw constants as probable as the measurements make them.
+    """Draw constants from their posterior.
 
-    Every value within the constants' limits is taken for equally probable beforehand, but for
-    their priors. Where the model misses more than noise explains, the misfit counts less, as it
-    does in the fit's intervals; where whole pulls differ by more than their rows do, the draws are
-    spread about the fit by as much (the adjustment of Shaby 2014).
+    The prior is uniform within the constants' limits, but for priors that were given. If the model
+    misses more than noise explains, the misfit counts less, as in the fit's intervals; if whole
+    pulls differ by more than their rows do, the draws are spread about the fit by as much (the
+    adjustment of Shaby 2014).
 
     Args:
         found: A fit by `LeastSquares`.
         draws: Draws of each chain.
-        warm_up: Steps before them, to find the sampler's own step.
-        chains: How many chains, one after the other.
-        seed: Of the draws.
-        progress: Called with what is done, how much of it, and how much there is.
-
-    Returns:
-        The draws, and how far to trust them.
+        warm_up: Steps before them, which adapt the step size.
+        chains: Number of chains, one after the other.
+        seed: Seed of the draws.
+        progress: Called with the name of the task, how much of it is done, and how much there is.
 
     Raises:
-        InputError: The objective is no likelihood, the numbers are not above 0, or numpyro is not
-            installed (extra `bayes`).
+        InputError: The objective is no likelihood, the data are too few, a number is too small, or
+            numpyro is not installed (extra `bayes`).
     """
-    if not found.problem.objective.is_likelihood:
-        raise InputError.UNSUPPORTED(
-            "a posterior needs LeastSquares(); other objectives are no likelihoods"
-        )
+    _check(found)
     if draws < LEAST_DRAWS or chains < 1 or warm_up < 0:
         raise InputError.OUT_OF_RANGE(
             f"draws must be {LEAST_DRAWS} or more (the chain's halves are compared), chains 1 or "
@@ -102,11 +97,10 @@ def sample_posterior(
     need("numpyro", "bayes", "a posterior")
     from numpyro import diagnostics, infer
 
-    target = _Target(found)
-    # The target has about unit spread in every direction: there is no mass matrix to be found, and
-    # a few steps of this size go from one side to the other.
+    # The target has about unit spread in every direction: no mass matrix has to be adapted, and a
+    # few steps of this size go from one side to the other.
     kernel = infer.NUTS(
-        potential_fn=target.potential, step_size=0.7, adapt_mass_matrix=False, max_tree_depth=4
+        potential_fn=_potential(found), step_size=0.7, adapt_mass_matrix=False, max_tree_depth=4
     )
     every: list[np.ndarray] = []
     divergent = 0
@@ -117,72 +111,61 @@ def sample_posterior(
         key = jax.random.PRNGKey(seed + chain)
         start = 0.5 * jax.random.normal(key, (len(found.names),))
         sampler.run(key, init_params=start, extra_fields=("diverging",))
-        every.append(np.stack([target.spread(np.asarray(one)) for one in sampler.get_samples()]))
+        every.append(_constants(found, np.asarray(sampler.get_samples())))
         divergent += int(np.sum(sampler.get_extra_fields()["diverging"]))
         if progress is not None:
             progress("drawing", chain + 1, chains)
-    told = np.stack(every)
-    effective = {
-        name: float(diagnostics.effective_sample_size(told[..., number]))
-        for number, name in enumerate(found.names)
-    }
-    unlike = {
-        name: float(diagnostics.split_gelman_rubin(told[..., number]))
-        for number, name in enumerate(found.names)
-    }
-    return Posterior(found.names, told, effective, unlike, divergent)
+    drawn = np.stack(every)
+    by_name = list(zip(found.names, np.moveaxis(drawn, -1, 0), strict=True))
+    effective = {name: float(diagnostics.effective_sample_size(one)) for name, one in by_name}
+    unlike = {name: float(diagnostics.split_gelman_rubin(one)) for name, one in by_name}
+    return Posterior(found.names, drawn, effective, unlike, divergent)
 
 
-class _Target:
+def _check(found: Calibration) -> None:
+    if not found.is_likelihood:
+        raise InputError.UNSUPPORTED(
+            "a posterior needs LeastSquares(); other objectives are no likelihoods"
+        )
+    if found.tells_no_noise:
+        raise InputError.TOO_FEW_DATA(
+            "nothing tells the noise: as many constants were fitted as numbers measured; "
+            "measure more, or give standard deviations"
+        )
+    if not np.isfinite(found.covariance_by_rows).all():
+        raise InputError.TOO_FEW_DATA(
+            "the data cannot tell some of the constants; fit only the others"
+        )
+
+
+def _potential(found: Calibration) -> Callable[[jax.Array], jax.Array]:
     """Minus the logarithm of the posterior, in the units of the fit's own spread."""
+    problem, best = found.problem, found.best.values
+    spread = np.linalg.cholesky(found.covariance_by_rows)
+    shape, temper = jax.ShapeDtypeStruct((1 + len(best),), float), found.widened**2
 
-    def __init__(self, found: Calibration) -> None:
-        if found.tells_no_noise:
-            raise InputError.TOO_FEW_DATA(
-                "nothing tells the noise: as many constants were fitted as numbers measured; "
-                "measure more, or give standard deviations"
-            )
-        covariance = found.covariance_by_rows
-        self._wider = found.by_pulls.wider
-        if not np.isfinite(covariance).all():
-            raise InputError.TOO_FEW_DATA(
-                "the data cannot tell some of the constants; fit only the others"
-            )
-        self._problem, self._best = found.problem, found.best.values
-        self._spread = np.linalg.cholesky(covariance)
-        self._temper = found.widened**2
-        shape = jax.ShapeDtypeStruct((1 + len(self._best),), float)
-
-        @jax.custom_vjp
-        def potential(place: jax.Array) -> jax.Array:
-            return jax.pure_callback(self._at, shape, place, vmap_method="sequential")[0]
-
-        def forward(place: jax.Array) -> tuple[jax.Array, jax.Array]:
-            both = jax.pure_callback(self._at, shape, place, vmap_method="sequential")
-            return both[0], both[1:]
-
-        def backward(slope: jax.Array, cotangent: jax.Array) -> tuple[jax.Array]:
-            return (jnp.where(jnp.isfinite(slope), slope, 0.0) * cotangent,)
-
-        potential.defvjp(forward, backward)
-        self.potential = potential
-
-    def values(self, place: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Constants at a place of the sampler."""
-        return self._best + self._spread @ place
-
-    def spread(self, place: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Constants of a draw, farther from the fit where whole pulls say so."""
-        values = self._best + self._wider * (self._spread @ place)
-        return np.clip(values, self._problem.lower, self._problem.upper)
-
-    def _at(self, place: np.ndarray) -> np.ndarray:
-        values = self.values(np.asarray(place, float))
-        inside = (values >= self._problem.lower).all() and (values <= self._problem.upper).all()
-        cost = self._problem(values) if inside else None
+    def value_and_gradient(place: np.ndarray) -> np.ndarray:
+        values = best + spread @ np.asarray(place, float)
+        inside = (values >= problem.lower).all() and (values <= problem.upper).all()
+        cost = problem(values) if inside else None
         if cost is None:
             return np.concatenate([[np.inf], np.zeros(len(values))])
-        return np.concatenate([[cost.value], self._spread.T @ cost.gradient]) / self._temper
+        return np.concatenate([[cost.value], spread.T @ cost.gradient]) / temper
+
+    def forward(place: jax.Array) -> tuple[jax.Array, jax.Array]:
+        both = jax.pure_callback(value_and_gradient, shape, place, vmap_method="sequential")
+        return both[0], both[1:]
+
+    def backward(gradient: jax.Array, cotangent: jax.Array) -> tuple[jax.Array]:
+        return (jnp.where(jnp.isfinite(gradient), gradient, 0.0) * cotangent,)
+
+    potential = jax.custom_vjp(lambda place: forward(place)[0])
+    potential.defvjp(forward, backward)
+    return potential
 
 
-__all__ = ["LEAST_DRAWS", "Posterior", "sample_posterior"]
+def _constants(found: Calibration, places: Float[np.ndarray, "d k"]) -> Float[np.ndarray, "d k"]:
+    """Constants of draws, farther from the fit if whole pulls differ."""
+    spread = np.linalg.cholesky(found.covariance_by_rows)
+    values = found.best.values + found.by_pulls.wider * (places @ spread.T)
+    return np.clip(values, found.problem.lower, found.problem.upper)

@@ -1,4 +1,4 @@
-"""What a fit found: constants, robots, and how far to trust them."""
+"""The result of a fit: constants, robots, and how far to trust them."""
 
 from __future__ import annotations
 
@@ -11,30 +11,29 @@ from jaxtyping import Bool, Float
 from scipy.stats import chi2, t
 
 from notchflex.errors import InputError
-from notchflex.fit.estimation.by_pulls import ByPulls, by_pulls
-from notchflex.fit.estimation.curvature import inverse_of
-from notchflex.fit.estimation.intervals import LEVEL, Interval, allowed_rise, held
+from notchflex.fit.estimation.covariance import ByPulls, by_pulls, inverse_of
+from notchflex.fit.estimation.intervals import LEVEL, Interval, Profile, allowed_rise
 from notchflex.fit.estimation.minimise import Cost, Minimum
 from notchflex.fit.estimation.noise import Noise
 from notchflex.fit.estimation.problem import Problem
 from notchflex.fit.model.residuals import Residuals
 from notchflex.robot import Robot
 
-# A misfit this unlikely for the noise that was told means that the model misses something.
+# Probability below which noise does not explain the misfit: the model misses something.
 _UNLIKELY = 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """What a fit found.
+    """The result of a fit.
 
     Attributes:
         given: The robots as they were, by label.
-        problem: What was fitted to what.
+        problem: The measurements, the constants and the objective.
         best: Where the best search ended.
         reached: The objective there.
         searches: Where every search ended, the first from the robots as they were.
-        intervals: 95 % intervals by constant; of `LeastSquares` only. By whole pulls where these
+        intervals: 95 % intervals by constant, of `LeastSquares` only; by whole pulls if these
             differ by more than their rows do.
     """
 
@@ -47,32 +46,32 @@ class Calibration:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The constants."""
+        """Names of the constants."""
         return tuple(one.name for one in self.problem.unknowns)
 
     @property
     def values(self) -> dict[str, float]:
-        """What they were found to be, in the units of the robot file."""
+        """Fitted values, in the units of the robot file."""
         return dict(zip(self.names, self.best.values.tolist(), strict=True))
 
     @property
     def units(self) -> dict[str, str]:
-        """Their units, "" for a pure number."""
+        """Units of the values, "" for a pure number."""
         return {one.name: one.unit for one in self.problem.unknowns}
 
     @property
     def converged(self) -> bool:
-        """Whether the best search settled."""
+        """Whether the best search converged."""
         return self.best.converged
 
     @property
     def reason(self) -> str:
-        """Why it did not, "" where it did."""
+        """Why it did not, "" if it did."""
         return self.best.reason
 
     @property
     def cost(self) -> float:
-        """The objective that was reached: half a chi squared, or a sum of norms (deg or mm)."""
+        """The objective reached: half a chi squared, or a sum of norms (deg or mm)."""
         return self.reached.value
 
     @property
@@ -82,24 +81,20 @@ class Calibration:
 
     @property
     def noise(self) -> Noise:
-        """Standard deviations of what was measured."""
+        """Standard deviations of the measured numbers."""
         assert self.problem.noise is not None
         return self.problem.noise
 
     @property
     def solves(self) -> int:
-        """How many rows of measurements were solved for all this."""
+        """Number of rows that were solved."""
         return self.problem.samples.solves
 
     @cached_property
     def robots(self) -> dict[str, Robot]:
-        """The robots with the constants that were found."""
-        found: dict[str, Robot] = {}
-        for sample in self.problem.samples.every:
-            if sample.label not in found:
-                own = self.best.values[list(sample.columns)]
-                found[sample.label] = sample.rows.robot_with(own.tolist())
-        return found
+        """The robots with the fitted constants."""
+        samples = {one.label: one for one in self.problem.samples.every}
+        return {label: samples[label].robot_with(self.best.values) for label in self.given}
 
     @property
     def counted(self) -> int:
@@ -107,8 +102,7 @@ class Calibration:
 
         A total angle that is the sum of the notches adds nothing to them in least squares.
         """
-        likelihood = self.problem.objective.is_likelihood
-        return self.noise.counted if likelihood else len(self.residuals)
+        return self.noise.counted if self.is_likelihood else len(self.residuals)
 
     @property
     def freedom(self) -> int:
@@ -116,15 +110,20 @@ class Calibration:
         return self.noise.counted - len(self.names)
 
     @property
+    def is_likelihood(self) -> bool:
+        """Whether the objective is a likelihood, and so gives intervals."""
+        return self.problem.objective.is_likelihood
+
+    @property
     def tells_no_noise(self) -> bool:
-        """Whether the fit goes through numbers of unknown noise, with none left over to tell it."""
+        """Whether the noise is unknown, and no number is left over to estimate it."""
         return not self.noise.is_known and self.freedom <= 0
 
     @property
     def reduced_chi_squared(self) -> float:
-        """Mean square of residuals over their noise; about 1 where the model is right.
+        """Mean square of residuals over their noise; about 1 if the model is right.
 
-        Of numbers whose noise is known otherwise than by the fit; NaN where there are none.
+        Of numbers whose noise is known independently of the fit; NaN if there are none.
         """
         known, left = self._known
         if left <= 0:
@@ -134,26 +133,26 @@ class Calibration:
 
     @property
     def _known(self) -> tuple[Bool[np.ndarray, " r"], int]:
-        """Numbers whose noise is known otherwise than by the fit; how many more than constants."""
+        """Numbers with noise known independently of the fit; how many more than constants."""
         known = ~self.noise.estimated & np.isfinite(self.noise.deviation)
         return known, int(known.sum()) - len(self.names)
 
     @property
     def misses(self) -> bool:
-        """Whether the model misses what was measured by more than noise can explain."""
+        """Whether the model misses the measurements by more than noise can explain."""
         value, (_, left) = self.reduced_chi_squared, self._known
         return bool(value > 1.0 and chi2.sf(value * left, left) < _UNLIKELY)
 
     @property
     def widened(self) -> float:
-        """By how much intervals are wider than noise alone makes them: the model misses more."""
+        """Factor by which intervals are wider than by noise alone, if the model misses more."""
         return float(np.sqrt(self.reduced_chi_squared)) if self.misses else 1.0
 
     def allowed_rise(self, name: str) -> float:
-        """By how much twice the misfit may rise in the 95 % interval of a constant.
+        """Return the rise of twice the misfit at the ends of the 95 % interval of a constant.
 
-        By rows, or by whole pulls where these differ by more than their rows do (`by_pulls`).
-        Infinite where nothing tells the noise.
+        By rows, or by whole pulls if these differ by more than their rows do (`by_pulls`);
+        infinite if the noise is unknown.
         """
         if self.tells_no_noise:
             return float("inf")
@@ -164,9 +163,9 @@ class Calibration:
         return allowed_rise(freedom) * self.widened**2
 
     def allows(self, name: str, value: float) -> bool:
-        """Whether the data leave room for a value of a constant: the 95 % interval holds it.
+        """Return whether the 95 % interval of a constant holds a value.
 
-        The others make the best of it, as in the interval, whose ends need not be known.
+        The other constants are fitted again, as for the interval, whose ends need not be known.
 
         Args:
             name: The constant.
@@ -179,64 +178,70 @@ class Calibration:
             raise InputError.UNKNOWN_NAME(
                 f"{name!r} was not fitted; there are {', '.join(self.names)}"
             )
-        if not self.problem.objective.is_likelihood:
+        if not self.is_likelihood:
             raise InputError.UNSUPPORTED(
                 "an interval needs LeastSquares(); other objectives are no likelihoods"
             )
-        lower, upper = self.problem.lower, self.problem.upper
         number = self.names.index(name)
-        if not lower[number] <= value <= upper[number]:
+        if not self.problem.lower[number] <= value <= self.problem.upper[number]:
             return False
-        found = held(self.problem, self.best.values, number, value, lower, upper)
-        return found is not None and 2.0 * (found[1] - self.cost) <= self.allowed_rise(name)
+        minimum = self.profile(name).held(value, self.best.values)
+        if minimum.cost is None:
+            return False
+        return 2.0 * (minimum.cost.value - self.cost) <= self.allowed_rise(name)
+
+    def profile(self, name: str) -> Profile:
+        """Return the misfit as a function of one constant."""
+        problem, number = self.problem, self.names.index(name)
+        values = self.best.values
+        return Profile(problem, values, self.reached, number, problem.lower, problem.upper)
 
     @cached_property
     def covariance(self) -> Float[np.ndarray, "k k"]:
-        """Covariance of the constants, in a straight-line view of the model.
+        """Covariance of the constants, with the model linearised.
 
-        By rows; wider for constants about which whole pulls differ by more than their rows do
-        (`by_pulls`). For objectives that are no likelihood by pulls alone (Huber's sandwich).
-        Infinite where nothing measured depends on a constant, or nothing tells the noise.
+        By rows; wider for constants for which whole pulls differ by more than their rows do
+        (`by_pulls`). By pulls alone (Huber's sandwich) for objectives that are no likelihood.
+        Infinite if nothing measured depends on a constant, or the noise is unknown.
         """
-        if not self.problem.objective.is_likelihood:
+        if not self.is_likelihood:
             return self.by_pulls.covariance
         wider = self.by_pulls.wider
         return self.covariance_by_rows * np.outer(wider, wider)
 
     @cached_property
     def covariance_by_rows(self) -> Float[np.ndarray, "k k"]:
-        """Covariance of the constants if all rows were independent of each other."""
-        if self.problem.objective.is_likelihood and self.tells_no_noise:
+        """Covariance of the constants if all rows were independent."""
+        if self.is_likelihood and self.tells_no_noise:
             return np.diag(np.full(len(self.names), np.inf))
         return inverse_of(self.reached.curvature) * self.widened**2
 
     @cached_property
     def by_pulls(self) -> ByPulls:
-        """How certain the constants are if whole pulls count, not rows.
+        """Uncertainty of the constants from the scatter between whole pulls.
 
-        What the model misses is much alike within a pull: rows are not worth as much as their
-        number.
+        Model errors are much alike within a pull: rows are not worth as much as their number.
         """
         residuals = self.residuals
         return by_pulls(self.reached, residuals.slopes, residuals.pull, self.covariance_by_rows)
 
     def half_width(self, slopes: Float[np.ndarray, "r k"]) -> Float[np.ndarray, " r"]:
-        """Half the 95 % interval of numbers that depend on the constants by some slopes.
+        """Return half the 95 % interval of numbers from their derivatives by the constants.
 
-        In a straight-line view of the model; NaN where it has no end.
+        With the model linearised; NaN if it has no end.
         """
         known = np.isfinite(np.diag(self.covariance))
         freedom = np.where(self.by_pulls.wider > 1.0, self.by_pulls.pulls - 1, max(self.freedom, 1))
         times = t.ppf(0.5 + 0.5 * LEVEL, freedom)[known]
         covariance = self.covariance[np.ix_(known, known)] * np.outer(times, times)
         variance = np.einsum("ri,ij,rj->r", slopes[:, known], covariance, slopes[:, known])
-        # A constant that is not known at all only matters where the model depends on it.
+        # An unknown constant only matters to numbers that depend on it.
         variance[slopes[:, ~known].any(axis=1)] = np.nan
         return np.sqrt(np.maximum(variance, 0.0))
 
     @property
     def deviations(self) -> dict[str, float]:
-        """Standard deviations of the constants, in a straight-line view of the model."""
+        """Standard deviations of the constants, with the model linearised."""
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
@@ -248,7 +253,7 @@ class Calibration:
 
     def __repr__(self) -> str:
         """Return the constants with their intervals, the errors and the diagnosis on few lines."""
-        from notchflex.fit.summary import summary
+        from notchflex.fit.documents import summary
 
         return summary(self)
 
@@ -257,6 +262,3 @@ class Calibration:
         from html import escape
 
         return f"<pre>{escape(repr(self))}</pre>"
-
-
-__all__ = ["Calibration"]

@@ -1,4 +1,4 @@
-"""How far each measured number may be off: given, told by repeats, or by what the fit leaves."""
+"""Standard deviations of measured numbers: given, from repeats, or from residuals of the fit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from notchflex.fit.measurements.repeats import repeats
 from notchflex.fit.model.residuals import Residuals
 from notchflex.fit.model.samples import Samples
 
-# Standard deviations to begin with where nothing is known: 1 deg, 0.1 mm, 0.01 N.
+# Standard deviations to begin with if nothing is known: 1 deg, 0.1 mm, 0.01 N.
 _FIRST: dict[str, float] = {"tip_tension": 0.01, "tip_position": 0.1, "axis_points": 0.1}
 _FIRST_ANGLE = float(np.radians(1.0))
 # Nothing is measured better than this part of that; else an exact fit would have no noise at all.
@@ -26,11 +26,11 @@ class Noise:
     """Standard deviations of all measured numbers.
 
     Attributes:
-        deviation: Of every number (rad, mm, N), (R,).
-        estimated: Which of them the fit itself has told.
-        source: By number of the measurement and quantity: "given", "repeats", "fit", or "sum of
-            the notches" of a total angle that tells nothing that the notches do not; its deviation
-            is infinite.
+        deviation: Standard deviation of every number (rad, mm, N), (R,).
+        estimated: Whether it is estimated from the residuals of the fit, (R,).
+        source: By number of the measurements and quantity: "given", "repeats", "fit", or "sum of
+            the notches" of a total angle that adds nothing to the notches; its deviation is
+            infinite.
     """
 
     deviation: Float[np.ndarray, " r"]
@@ -44,28 +44,28 @@ class Noise:
 
     @property
     def is_known(self) -> bool:
-        """Whether the fit had to tell none of them."""
+        """Whether none of them is estimated from the residuals."""
         return not bool(self.estimated.any())
 
 
 def first_noise(samples: Samples, residuals: Residuals) -> Noise:
-    """Standard deviations as given, or else of repeats; a first guess where there are neither."""
+    """Return standard deviations as given, or of repeats; a first guess if there are neither."""
     deviation = residuals.given.copy()
     estimated = np.zeros(len(deviation), bool)
     source: dict[tuple[int, str], str] = {}
     for number, sample in enumerate(samples.every):
-        told = repeats(sample.measured)
+        of_repeats = repeats(sample.measured)
         for name in sample.measured.observed:
-            own = (residuals.sample == number) & (residuals.quantity == OBSERVED.index(name))
-            missing = own & ~(deviation > 0.0)
+            mine = residuals.of(number, name)
+            missing = mine & ~(deviation > 0.0)
             key = (number, name)
             if name == "total_angle" and _is_sum(sample.measured):
-                deviation[own] = np.inf
+                deviation[mine] = np.inf
                 source[key] = "sum of the notches"
             elif not missing.any():
                 source[key] = "given"
-            elif np.isfinite(told.get(name, np.nan)) and told[name] > 0.0:
-                deviation[missing] = told[name]
+            elif 0.0 < of_repeats[name] < np.inf:
+                deviation[missing] = of_repeats[name]
                 source[key] = "repeats"
             else:
                 deviation[missing] = _FIRST.get(name, _FIRST_ANGLE)
@@ -84,18 +84,15 @@ def _is_sum(measured: Measurements) -> bool:
 
 
 def noise_left(noise: Noise, residuals: Residuals, constants: int) -> Noise:
-    """The same, with what the fit leaves for quantities whose noise is not known.
+    """Return the noise with the unknown standard deviations estimated from the residuals.
 
-    Their mean squares, over the degrees of freedom that the fit has left them.
+    By quantity: root mean squares over the degrees of freedom that the constants leave.
     """
     deviation = noise.deviation.copy()
     counted = max(noise.counted, 1)
     share = max(1.0 - constants / counted, 1.0 / counted)
     for quantity in np.unique(residuals.quantity[noise.estimated]):
-        own = noise.estimated & (residuals.quantity == quantity)
+        mine = noise.estimated & (residuals.quantity == quantity)
         least = _LEAST * _FIRST.get(OBSERVED[quantity], _FIRST_ANGLE)
-        deviation[own] = max(np.sqrt(np.mean(residuals.values[own] ** 2) / share), least)
+        deviation[mine] = max(np.sqrt(np.mean(residuals.values[mine] ** 2) / share), least)
     return Noise(deviation, noise.estimated, noise.source)
-
-
-__all__ = ["Noise", "first_noise", "noise_left"]

@@ -1,4 +1,4 @@
-"""What a fit makes small: squares over their noise, or the sums of norms of the papers."""
+"""Objectives of a fit: squares over their noise, or the sums of norms of the papers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from notchflex.fit.model.residuals import ANGLES, LENGTHS, Residuals
 
 
 class FitObjective(Protocol):
-    """What a fit makes small; a value such as `LeastSquares()`."""
+    """The objective of a fit; a value such as `LeastSquares()`."""
 
     is_likelihood: ClassVar[bool]
     """Whether it is minus the logarithm of a likelihood, so that it gives intervals."""
@@ -24,7 +24,7 @@ class FitObjective(Protocol):
         ...
 
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
-        """Its value, slope and curvature."""
+        """Return value, gradient and curvature."""
         ...
 
 
@@ -33,8 +33,8 @@ class LeastSquares:
     """Half the sum of squared residuals over their noise (Gaussian noise).
 
     Args:
-        huber: Residuals beyond so many standard deviations count by their size, not its square
-            (Huber 1964), so that outliers pull less; none where not given.
+        huber: Residuals beyond so many standard deviations count linearly, not by their square
+            (Huber 1964), which limits the weight of outliers; by default none do.
 
     Example:
         >>> LeastSquares(huber=1.5).is_likelihood
@@ -50,10 +50,10 @@ class LeastSquares:
             raise InputError.OUT_OF_RANGE(f"huber must be above 0, about 1.5; got {self.huber}")
 
     def check(self, quantities: tuple[str, ...]) -> None:
-        """Anything measured will do."""
+        """Accept every quantity."""
 
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
-        """Half the sum of squares, or of Huber's function."""
+        """Return half the sum of squares, or of Huber's function."""
         scaled = residuals.values / noise
         size = np.abs(scaled)
         most = np.inf if self.huber is None else self.huber
@@ -62,13 +62,14 @@ class LeastSquares:
         value = float(np.sum(np.where(size > most, linear, 0.5 * scaled**2)))
         slopes = residuals.slopes / noise[:, None]
         weighted = slopes * weight[:, None]
-        shares = weighted * scaled[:, None]
-        return Cost(value, shares.sum(axis=0), weighted.T @ slopes, residuals, shares)
+        contributions = weighted * scaled[:, None]
+        gradient = contributions.sum(axis=0)
+        return Cost(value, gradient, weighted.T @ slopes, residuals, contributions)
 
 
 @dataclass(frozen=True)
 class SumOfRobotErrors:
-    """Pacheco 2021, eq. 17: over all robots the norm of their root-mean-square errors, deg.
+    """Sum over all robots of the norm of their root-mean-square errors, deg (Pacheco 2021, eq. 17).
 
     Each robot adds the 2-norm of the vector of errors of its notches and of its total angle.
 
@@ -80,19 +81,18 @@ class SumOfRobotErrors:
     is_likelihood: ClassVar[bool] = False
 
     def check(self, quantities: tuple[str, ...]) -> None:
-        """Only angles can be added up in degrees."""
-        _only(quantities, ANGLES, "SumOfRobotErrors adds angles")
+        """Raise InputError unless all quantities are angles."""
+        _check(quantities, ANGLES, "SumOfRobotErrors adds angles")
 
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
-        """Sum of norms, a group per robot, each over the root of its number of points."""
-        del noise
+        """Return the sum of norms, a group per robot, each over the root of its number of rows."""
         factor = np.degrees(1.0) / np.sqrt(residuals.rows)
         return _sum_of_norms(residuals, residuals.robot, factor)
 
 
 @dataclass(frozen=True)
 class SumOfDistances:
-    """Gao 2017, eq. 27: the sum of distances between measured points and those of the model, mm.
+    """Sum of distances between measured and modelled points, mm (Gao 2017, eq. 27).
 
     Example:
         >>> SumOfDistances().is_likelihood
@@ -102,16 +102,15 @@ class SumOfDistances:
     is_likelihood: ClassVar[bool] = False
 
     def check(self, quantities: tuple[str, ...]) -> None:
-        """Only points have distances."""
-        _only(quantities, LENGTHS, "SumOfDistances adds distances of points")
+        """Raise InputError unless all quantities are points."""
+        _check(quantities, LENGTHS, "SumOfDistances adds distances of points")
 
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
-        """Sum of norms, a group per point."""
-        del noise
-        return _sum_of_norms(residuals, residuals.point, np.ones(len(residuals.values)))
+        """Return the sum of norms, a group per point."""
+        return _sum_of_norms(residuals, residuals.point, np.ones(len(residuals)))
 
 
-def _only(quantities: tuple[str, ...], allowed: tuple[str, ...], what: str) -> None:
+def _check(quantities: tuple[str, ...], allowed: tuple[str, ...], what: str) -> None:
     wrong = [name for name in quantities if name not in allowed]
     if wrong:
         raise InputError.UNSUPPORTED(
@@ -124,20 +123,16 @@ def _sum_of_norms(
 ) -> Cost:
     """The sum over groups of the norm of their residuals.
 
-    The curvature is that with straight residuals: of a norm n = |r| it is
-    J^T (1 - r r^T / n^2) J / n, never negative.
+    The curvature is that of linear residuals: of a norm n = |r| it is J^T (1 - r r^T / n^2) J / n,
+    positive semidefinite.
     """
-    values = residuals.values * factor
+    values, slopes = residuals.values * factor, residuals.slopes * factor[:, None]
     groups = int(group.max()) + 1
     norm = np.sqrt(np.bincount(group, values**2, groups))
-    value = float(norm.sum())
-    slopes = residuals.slopes * factor[:, None]
-    each = np.maximum(norm, 1e-12)
-    weighted = slopes / each[group][:, None]
-    shares = weighted * values[:, None]
-    along = np.stack([np.bincount(group, column, groups) for column in shares.T], axis=1)
-    curvature = weighted.T @ slopes - (along / each[:, None]).T @ along
-    return Cost(value, shares.sum(axis=0), curvature, residuals, shares)
-
-
-__all__ = ["FitObjective", "LeastSquares", "SumOfDistances", "SumOfRobotErrors"]
+    divisor = np.maximum(norm, 1e-12)
+    weighted = slopes / divisor[group][:, None]
+    contributions = weighted * values[:, None]
+    along = np.stack([np.bincount(group, one, groups) for one in contributions.T], axis=1)
+    curvature = weighted.T @ slopes - (along / divisor[:, None]).T @ along
+    gradient = contributions.sum(axis=0)
+    return Cost(float(norm.sum()), gradient, curvature, residuals, contributions)

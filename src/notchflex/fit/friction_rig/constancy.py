@@ -10,32 +10,31 @@ from scipy.stats import chi2
 from scipy.stats import f as fisher
 
 from notchflex.fit.friction_rig.readings import FrictionReadings
-from notchflex.fit.friction_rig.scattered import Line, fit_line
+from notchflex.fit.friction_rig.scattered import ScatterFit, fit_line
 
 LEVEL = 0.05
-"""Below this probability a constant coefficient is said not to be enough."""
+"""Probability below which a constant coefficient is not enough."""
 
-# A turn (rad) or the logarithm of a load that varies by less than this does not vary.
+# A turn (rad) or the logarithm of a load that varies by less than this is constant.
 _VARIES = 1e-6
 
 
 @dataclass(frozen=True)
 class Constancy:
-    """A constant coefficient of friction against one that depends on turning and load.
+    """A constant coefficient of friction against one that depends on turn and load.
 
-    The other model is mu + a (turn - mean turn) + b (ln weight 1 - its mean), the turn being that
-    over both edges; Gaussian readings, as for the estimate.
+    The other model is mu + a (turn - mean turn) + b (ln weight 1 - its mean), with the turn over
+    both edges and Gaussian readings, as for the estimate.
 
     Attributes:
-        statistic: Twice the difference of the log likelihoods; NaN where it cannot be tested.
-        degrees_of_freedom: How many of the two numbers a and b the readings can tell.
-        p_value: Probability of so large a statistic where the coefficient is constant; NaN
-            likewise.
-        by_turn: a, per rad; NaN where the turn does not vary.
+        statistic: Twice the difference of the log likelihoods; NaN if it cannot be tested.
+        degrees_of_freedom: How many of the two numbers a and b the readings determine.
+        p_value: Probability of so large a statistic if the coefficient is constant, or NaN.
+        by_turn: a, per rad; NaN if the turn does not vary.
         by_turn_error: Its standard error.
-        by_load: b, per unit of the natural logarithm; NaN where the load does not vary.
+        by_load: b, per unit of the natural logarithm; NaN if the load does not vary.
         by_load_error: Its standard error.
-        words: What that means.
+        words: The result in words.
     """
 
     statistic: float
@@ -49,21 +48,18 @@ class Constancy:
 
     @property
     def enough(self) -> bool | None:
-        """Whether a constant is enough as far as the readings tell; None where they cannot."""
+        """Whether a constant is enough for the readings; None if it cannot be tested."""
         return None if np.isnan(self.p_value) else self.p_value >= LEVEL
 
 
 def constancy(readings: FrictionReadings) -> Constancy:
-    """Test whether a constant coefficient of friction is enough.
+    """Test whether a constant coefficient of friction is enough (Liu 2022, fig. 8).
 
-    The statistic is compared with the distribution that makes the test exact where no standard
-    deviations are given (Fisher's F), and with chi-square where those given explain the scatter.
+    The statistic is compared with Fisher's F, which makes the test exact if no standard deviations
+    are given, and with chi-square if those given explain the scatter.
 
     Args:
         readings: N readings.
-
-    Returns:
-        The test; with the reason in words where nothing can be tested.
 
     Example:
         >>> from notchflex.fit import weight_held
@@ -76,52 +72,53 @@ def constancy(readings: FrictionReadings) -> Constancy:
         (False, -0.01)
     """
     x = design(readings)
-    turns, loads = (bool(np.ptp(column) > _VARIES) for column in x.T[1:])
-    used = [0, *([1] if turns else []), *([2] if loads else [])]
+    used = [0, *np.flatnonzero(np.ptp(x, axis=0) > _VARIES).tolist()]
     if len(used) == 3 and np.linalg.matrix_rank(x, tol=_VARIES * np.sqrt(len(x))) < 3:
         # Turn and load go together: what depends on both shows in one of them.
-        used, loads = [0, 1], False
+        used = [0, 1]
     freedom = len(used) - 1
+    y, known = readings.coefficient, known_variance(readings)
+    plain = fit_line(x[:, :1], y, known)
     if not freedom:
-        return _untold("All readings have one load and one turn, so that nothing can be told.", 0)
-    if len(readings) < len(used) + 2:
+        words = "All readings have one load and one turn, so that nothing can be told."
+    elif len(readings) < len(used) + 2:
         words = (
             f"{len(readings)} readings are too few to tell whether mu is constant; take "
             f"{len(used) + 2} or more at different loads and turns."
         )
-        return _untold(words, freedom)
-    y, known = readings.coefficient, known_variance(readings)
-    plain, other = fit_line(x[:, :1], y, known), fit_line(x[:, used], y, known)
-    if np.isinf(plain.log_likelihood):
-        return _untold("The readings agree to rounding: a constant mu is enough.", freedom)
-    statistic = max(2.0 * (other.log_likelihood - plain.log_likelihood), 0.0)
-    p_value = _probability(statistic, freedom, len(y), len(used), other)
-    slopes = np.full((2, 2), np.nan)
-    for place, column in enumerate(used[1:], start=1):
-        slopes[column - 1] = other.values[place], np.sqrt(other.covariance[place, place])
-    (by_turn, turn_error), (by_load, load_error) = slopes.tolist()
-    words = _words(p_value, slopes)
-    return Constancy(statistic, freedom, p_value, by_turn, turn_error, by_load, load_error, words)
+    elif np.isinf(plain.log_likelihood):
+        words = "The readings agree to rounding: a constant mu is enough."
+    else:
+        other = fit_line(x[:, used], y, known)
+        statistic = max(2.0 * (other.log_likelihood - plain.log_likelihood), 0.0)
+        p_value = _probability(statistic, freedom, len(y), len(used), other)
+        slopes = np.full((2, 2), np.nan)
+        errors = np.sqrt(np.diag(other.covariance))
+        slopes[np.array(used[1:]) - 1] = np.stack([other.values, errors], axis=1)[1:]
+        words = _words(p_value, slopes)
+        return Constancy(statistic, freedom, p_value, *slopes.ravel().tolist(), words=words)
+    return Constancy(np.nan, freedom, *(np.nan,) * 5, words=words)
 
 
 def design(readings: FrictionReadings) -> NDArray[np.float64]:
-    """What a coefficient may depend on: 1, turn and logarithm of the load about their means."""
+    """Return columns of 1, turn and logarithm of the load, the latter two less their means."""
     turn, load = readings.turn, np.log(readings.weight_1)
     return np.stack([np.ones(len(readings)), turn - turn.mean(), load - load.mean()], axis=1)
 
 
 def known_variance(readings: FrictionReadings) -> NDArray[np.float64]:
-    """Variance of every coefficient that the standard deviations of its reading give.
+    """Return the variance of every coefficient from the standard deviations of its reading.
 
-    A reading without any is taken to be as accurate as the others are in the mean, not exact;
-    0 where there is none at all.
+    A reading without any is taken to be as accurate as the others in the mean; 0 if none has any.
     """
     variance = readings.coefficient_deviation**2
-    told = np.isfinite(variance)
-    return np.where(told, variance, np.mean(variance[told]) if told.any() else 0.0)
+    known = np.isfinite(variance)
+    return np.where(known, variance, np.mean(variance[known]) if known.any() else 0.0)
 
 
-def _probability(statistic: float, freedom: int, count: int, columns: int, other: Line) -> float:
+def _probability(
+    statistic: float, freedom: int, count: int, columns: int, other: ScatterFit
+) -> float:
     if np.isinf(statistic):
         return 0.0
     if other.rest == 0.0:
@@ -137,28 +134,19 @@ def _words(p_value: float, slopes: NDArray[np.float64]) -> str:
             f"A constant mu is enough for these readings (p = {p_value:.2g}): turn and load "
             "explain no more of their scatter than chance would."
         )
-    named = (
+    units = (
         ("turn", "for 10 deg more of turn", np.radians(10.0)),
         ("load", "when the load doubles", np.log(2.0)),
     )
-    found: list[str] = []
-    silent: list[str] = []
-    for (what, where, unit), (slope, error) in zip(named, slopes, strict=True):
-        if np.isnan(slope):
-            continue
+    changes: list[str] = []
+    constant: list[str] = []
+    for (what, where, unit), (slope, error) in zip(units, slopes, strict=True):
         if abs(slope) < 2.0 * error:
-            silent.append(what)
-            continue
-        way = "rises" if slope > 0.0 else "falls"
-        found.append(f"{way} by {abs(slope) * unit:.2g} {where}")
-    said = " and ".join(found) or "changes with turn and load together"
-    rest = f", and does not change with the {silent[0]} beyond chance" if found and silent else ""
-    return f"A constant mu is not enough (p = {p_value:.2g}): mu {said}{rest}."
-
-
-def _untold(words: str, freedom: int) -> Constancy:
-    nothing = float("nan")
-    return Constancy(nothing, freedom, nothing, nothing, nothing, nothing, nothing, words)
-
-
-__all__ = ["LEVEL", "Constancy", "constancy", "design", "known_variance"]
+            constant.append(what)
+        elif np.isfinite(slope):
+            way = "rises" if slope > 0.0 else "falls"
+            changes.append(f"{way} by {abs(slope) * unit:.2g} {where}")
+    said = " and ".join(changes) or "changes with turn and load together"
+    if changes and constant:
+        said += f", and does not change with the {constant[0]} beyond chance"
+    return f"A constant mu is not enough (p = {p_value:.2g}): mu {said}."

@@ -15,6 +15,7 @@ from notchflex.fit.friction_rig.two_weights import (
     impossible,
     slopes_of_coefficient,
 )
+from notchflex.fit.measurements.csv import check_deviation
 from notchflex.results.files.csv_reading import read_table
 
 COLUMNS = {
@@ -33,16 +34,16 @@ class FrictionReadings:
     Attributes:
         weight_1: Weight that pulls, g, (N,).
         weight_2: Weight that is lifted, g, (N,).
-        turn_1: Angle by which the string turns over the first edge, rad, (N,).
-        turn_2: The same over the second edge, rad, (N,).
-        deviation: Standard deviations of these four, in their order and units, (N, 4); NaN where
-            not known. A reading without any is taken to be as accurate as the others.
-        source: Where they came from.
-        lines: Lines of the file that they stand in; empty if there is none.
+        turn_1: Turn of the string over the first edge, rad, (N,).
+        turn_2: Turn over the second edge, rad, (N,).
+        deviation: Standard deviations of these four, in their order and units, (N, 4); NaN if
+            unknown. A reading without any is taken to be as accurate as the others.
+        source: Where they come from.
+        lines: Their lines in the file; empty if there is none.
         ignored: Columns of the file that were not used.
 
     Raises:
-        InputError: Shapes that do not fit, or a reading that cannot be.
+        InputError: Shapes that do not match, or an impossible reading.
 
     Example:
         >>> rig = FrictionReadings([200.0, 300.0], [150.0, 221.0], [1.6, 1.6], [1.6, 1.6])
@@ -60,7 +61,7 @@ class FrictionReadings:
     ignored: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the numbers, and bring them to arrays of floats."""
+        """Check the numbers, and convert them to arrays of floats."""
         arrays = [np.array(getattr(self, name), float, ndmin=1) for name in COLUMNS]
         count = len(arrays[0])
         deviation = np.array(self.deviation, float)
@@ -79,16 +80,16 @@ class FrictionReadings:
         for name, value in zip(COLUMNS, arrays, strict=True):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "deviation", deviation)
-        found = impossible(*arrays)
-        if found is not None:
-            raise InputError.OUT_OF_RANGE(f"{self.at(found[0])}: {found[1]}")
+        wrong = impossible(*arrays)
+        if wrong is not None:
+            raise InputError.OUT_OF_RANGE(f"{self.at(wrong[0])}: {wrong[1]}")
 
     def __len__(self) -> int:
         """Number of readings."""
         return len(self.weight_1)
 
     def __repr__(self) -> str:
-        """How many, from where."""
+        """Return the source and the number of readings."""
         return f"<FrictionReadings of {self.source}: {len(self)}>"
 
     def at(self, reading: int) -> str:
@@ -104,9 +105,9 @@ class FrictionReadings:
 
     @cached_property
     def coefficient_deviation(self) -> NDArray[np.float64]:
-        """Standard deviation of it by those of the reading, (N,); NaN where none is known.
+        """Its standard deviation from those of the reading, (N,); NaN if none is known.
 
-        To first order; of a reading of which only some are known, by these.
+        To first order; those that are unknown count as 0.
         """
         slopes = slopes_of_coefficient(
             self.coefficient, self.weight_1, self.weight_2, self.turn_1, self.turn_2
@@ -117,7 +118,7 @@ class FrictionReadings:
 
     @property
     def turn(self) -> NDArray[np.float64]:
-        """Angle by which the string turns over both edges, rad, (N,)."""
+        """Turn of the string over both edges, rad, (N,)."""
         return self.turn_1 + self.turn_2
 
 
@@ -135,7 +136,7 @@ def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
         The readings, in the order of the file.
 
     Raises:
-        InputError: The file cannot be used, or a reading is impossible; one sentence names the
+        InputError: The file cannot be used, or a reading is impossible; the message names the
             line.
 
     Example:
@@ -148,35 +149,26 @@ def read_friction_rig(source: str | os.PathLike[str]) -> FrictionReadings:
     table = read_table(source)
     missing = [column for column, _ in COLUMNS.values() if column not in table.header]
     if missing:
-        words = f"column {missing[0]} is" if len(missing) == 1 else f"columns {missing[0]} "
-        if len(missing) > 1:
-            words = f"columns {', '.join(missing)} are"
-        raise InputError.TABLE_COLUMNS(f"{table.name}: the {words} not there; {table.columns}.")
+        words = f"column{'s'[: len(missing) - 1]} {', '.join(missing)}"
+        raise InputError.TABLE_COLUMNS(
+            f"{table.name}: the {words} {'are' if missing[1:] else 'is'} not there; "
+            f"{table.columns}."
+        )
     deviation = np.full((len(table), len(COLUMNS)), np.nan)
     values: dict[str, NDArray[np.float64]] = {}
-    used: set[str] = set()
-    for place, (name, (column, spread)) in enumerate(COLUMNS.items()):
+    for number, (name, (column, spread)) in enumerate(COLUMNS.items()):
         values[name] = table.numbers(column)
-        used.add(column)
         if spread in table.header:
-            used.add(spread)
-            deviation[:, place] = table.numbers(spread, may_miss=True)
-            if (deviation[:, place] <= 0.0).any():
-                row = int(np.argmax(deviation[:, place] <= 0.0))
-                raise InputError.OUT_OF_RANGE(
-                    f"{table.at(row)}: {spread} is {deviation[row, place]:g}; a standard deviation "
-                    "is above 0, or empty where it is not known."
-                )
+            deviation[:, number] = table.numbers(spread, may_miss=True)
+            check_deviation(table, spread, deviation[:, number])
         if column.endswith("_deg"):
             values[name] = np.radians(values[name])
-            deviation[:, place] = np.radians(deviation[:, place])
+            deviation[:, number] = np.radians(deviation[:, number])
+    used = [name for pair in COLUMNS.values() for name in pair]
     return FrictionReadings(
         **values,
         deviation=deviation,
         source=table.name,
         lines=table.lines,
-        ignored=tuple(column for column in table.header if column not in used),
+        ignored=tuple(name for name in table.header if name not in used),
     )
-
-
-__all__ = ["COLUMNS", "FrictionReadings", "read_friction_rig"]

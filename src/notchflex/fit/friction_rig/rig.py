@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from notchflex import __version__
 from notchflex.fit.friction_rig.constancy import Constancy, constancy, design, known_variance
-from notchflex.fit.friction_rig.readings import FrictionReadings
+from notchflex.fit.friction_rig.readings import COLUMNS, FrictionReadings
 from notchflex.fit.friction_rig.scattered import fit_line, mean_interval, outliers
+from notchflex.results.quantities.registry import DEGREES
 
-# A tendon that rubs more than that is more likely a wrong unit.
+# A larger coefficient of a tendon is more likely a wrong unit.
 _RARE = 1.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FrictionRig:
-    """What readings of the two-weight rig say of the friction; see `friction_rig`.
+    """The coefficient of friction from readings of the two-weight rig; see `friction_rig`.
 
     Attributes:
         readings: The N readings.
         coefficient: The likeliest coefficient of friction.
-        interval: Its 95 % profile-likelihood interval; NaN where one reading tells none.
+        interval: Its 95 % profile-likelihood interval; NaN for one reading of unknown error.
         standard_error: Its standard error; NaN likewise.
         spread: Standard deviation of the coefficients of the readings; NaN for one.
-        scatter: How much of it the standard deviations that were given do not explain.
+        scatter: The part of it that the standard deviations given do not explain.
         outliers: Readings, from 0, that lie too far from the others.
-        without_outliers: The coefficient without these; the same where there are none.
+        without_outliers: The coefficient without these; the same if there are none.
         constancy: Whether a constant coefficient is enough.
     """
 
@@ -42,7 +44,7 @@ class FrictionRig:
     constancy: Constancy
 
     def __repr__(self) -> str:
-        """Coefficient and interval."""
+        """Return coefficient and interval."""
         low, high = self.interval
         return (
             f"<FrictionRig: mu = {self.coefficient:.4g} ({low:.4g} to {high:.4g}), "
@@ -51,16 +53,15 @@ class FrictionRig:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What there is to say, a sentence each."""
+        """The result in sentences."""
         low, high = self.interval
         count = len(self.readings)
         if np.isnan(low):
-            first = (
+            return (
                 f"mu = {self.coefficient:.4g} from one reading, without a standard deviation: how "
                 "far it can be trusted is not known; take more readings, or give standard "
-                "deviations."
+                "deviations.",
             )
-            return (first,)
         of = "one reading" if count == 1 else f"{count} readings"
         said = [f"mu = {self.coefficient:.4g}, 95 % interval {low:.4g} to {high:.4g}, from {of}."]
         if count > 1:
@@ -72,16 +73,20 @@ class FrictionRig:
             )
         if self.coefficient > _RARE:
             said.append("So large a coefficient is rare: are the turns in degrees?")
-        given = np.isfinite(self.readings.coefficient_deviation)
-        if given.all() and count > 1:
-            typical = float(np.sqrt(np.mean(self.readings.coefficient_deviation**2)))
+        deviation = self.readings.coefficient_deviation
+        if np.isfinite(deviation).all() and count > 1:
+            typical = float(np.sqrt(np.mean(deviation**2)))
             more = (
                 "which explain the spread"
                 if self.scatter < 0.5 * typical
                 else f"which leave a scatter of {self.scatter:.2g} unexplained"
             )
             said.append(f"Their standard deviations stand for {typical:.2g}, {more}.")
-        said += [self._outlier(reading) for reading in self.outliers]
+        said += [
+            f"{self.readings.at(reading)}: mu = {self.readings.coefficient[reading]:.4g} lies too "
+            "far from the others to be chance; look at this reading again."
+            for reading in self.outliers
+        ]
         if self.outliers:
             those = "it" if len(self.outliers) == 1 else "them"
             said.append(f"Without {those} mu would be {self.without_outliers:.4g}.")
@@ -89,28 +94,20 @@ class FrictionRig:
             said.append(self.constancy.words)
         return tuple(said)
 
-    def _outlier(self, reading: int) -> str:
-        value = self.readings.coefficient[reading]
-        return (
-            f"{self.readings.at(reading)}: mu = {value:.4g} lies too far from the others to be "
-            "chance; look at this reading again."
-        )
-
 
 def friction_rig(readings: FrictionReadings) -> FrictionRig:
     """Estimate the coefficient of friction from readings of the two-weight rig.
 
     Every reading has a coefficient by Liu's eq. 21. These are taken as Gaussian about one value,
-    with the variance that their standard deviations give plus one more for all, found from the
-    readings: rig and tendon differ from reading to reading. The likeliest value and its
-    profile-likelihood interval follow; where no standard deviations are given they are mean and
-    Student's interval.
+    with the variance from their standard deviations plus a common one, estimated from the readings:
+    rig and tendon differ from reading to reading. The maximum of the likelihood and its profile
+    give value and interval; without standard deviations these are mean and Student's interval.
 
     Args:
         readings: The readings.
 
     Returns:
-        The coefficient, with how far to trust it, and whether a constant is enough.
+        The coefficient with its interval, and whether a constant is enough.
 
     Example:
         >>> rig = FrictionReadings([200.0] * 3, [150.0, 151.0, 149.5], [1.6] * 3, [1.6] * 3)
@@ -118,19 +115,20 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
         <FrictionRig: mu = 0.06946 (0.06641 to 0.07251), 3 readings of readings>
     """
     y, known = readings.coefficient, known_variance(readings)
-    count = len(y)
+    count, test = len(y), constancy(readings)
     line = fit_line(np.ones((count, 1)), y, known)
-    test = constancy(readings)
-    off = outliers(_explained(readings, test), y, known)
+    # Readings far off by their turn or load are no outliers if a constant is not enough.
+    varies = np.isfinite([0.0, test.by_turn, test.by_load]) & (test.enough is False)
+    varies[0] = True
+    off = outliers(design(readings)[:, varies], y, known)
     left = np.delete(np.arange(count), off)
     without = fit_line(np.ones((len(left), 1)), y[left], known[left])
     alone = count == 1 and known[0] == 0.0
-    error = float("nan") if alone else float(np.sqrt(line.covariance[0, 0]))
     return FrictionRig(
         readings=readings,
         coefficient=float(line.values[0]),
         interval=mean_interval(y, known),
-        standard_error=error,
+        standard_error=float("nan") if alone else float(np.sqrt(line.covariance[0, 0])),
         spread=float(np.std(y, ddof=1)) if count > 1 else float("nan"),
         scatter=float(np.sqrt(line.rest * count / max(count - 1, 1))),
         outliers=off,
@@ -139,10 +137,50 @@ def friction_rig(readings: FrictionReadings) -> FrictionRig:
     )
 
 
-def _explained(readings: FrictionReadings, test: Constancy) -> NDArray[np.float64]:
-    """What readings may depend on without being outliers: nothing, where a constant is enough."""
-    told = [True, not np.isnan(test.by_turn), not np.isnan(test.by_load)]
-    return design(readings)[:, told if test.enough is False else [True, False, False]]
+def friction_document(rig: FrictionRig) -> dict[str, Any]:
+    """Return an estimate as a document for `notchflex.results.files.json.write_json`.
 
+    Args:
+        rig: The estimate.
 
-__all__ = ["FrictionRig", "friction_rig"]
+    Returns:
+        `coefficient`, `interval_95`, `standard_error`, `spread`, `scatter`, `outliers` (numbers of
+        readings from 1), `without_outliers`, `constant` (the test), the result in `words`, and
+        every reading with its own coefficient.
+    """
+    readings, test = rig.readings, rig.constancy
+    rows: list[dict[str, Any]] = []
+    for number in range(len(readings)):
+        row: dict[str, Any] = {"line": readings.lines[number]} if readings.lines else {}
+        for column, (name, (value, deviation)) in enumerate(COLUMNS.items()):
+            scale = DEGREES if value.endswith("_deg") else 1.0
+            row[value] = getattr(readings, name)[number] * scale
+            row[deviation] = readings.deviation[number, column] * scale
+        row["coefficient"] = readings.coefficient[number]
+        row["coefficient_sd"] = readings.coefficient_deviation[number]
+        rows.append(row)
+    return {
+        "program": "notchflex",
+        "version": __version__,
+        "data": readings.source,
+        "coefficient": rig.coefficient,
+        "interval_95": rig.interval,
+        "standard_error": rig.standard_error,
+        "spread": rig.spread,
+        "scatter": rig.scatter,
+        "outliers": [number + 1 for number in rig.outliers],
+        "without_outliers": rig.without_outliers,
+        "constant": {
+            "enough": test.enough,
+            "statistic": test.statistic,
+            "degrees_of_freedom": test.degrees_of_freedom,
+            "p_value": test.p_value,
+            "by_turn_per_rad": test.by_turn,
+            "by_turn_standard_error": test.by_turn_error,
+            "by_log_load": test.by_load,
+            "by_log_load_standard_error": test.by_load_error,
+        },
+        "words": rig.words,
+        "ignored_columns": readings.ignored,
+        "readings": rows,
+    }

@@ -25,30 +25,29 @@ Readings = Float[np.ndarray, "*n"]
 def coefficient_from_weights(
     weight_1: ArrayLike, weight_2: ArrayLike, turn_1: ArrayLike, turn_2: ArrayLike
 ) -> Readings:
-    """Coefficient of friction of readings of the two-weight rig (Liu 2022, eq. 21).
+    """Return the coefficient of friction of readings of the two-weight rig (Liu 2022, eq. 21).
 
     Args:
         weight_1: Weight that pulls, in any unit, (n,).
         weight_2: Weight that is just about to be lifted, in the same unit; no more than the other.
-        turn_1: Angle by which the string turns over the first edge, rad, 0 to less than pi.
-        turn_2: The same over the second edge, rad.
+        turn_1: Turn of the string over the first edge, rad, 0 to less than pi, (n,).
+        turn_2: Turn over the second edge, rad, (n,).
 
     Returns:
         The coefficient, (n,).
 
     Raises:
-        InputError: A reading is impossible; the message tells which, counted from 1.
+        InputError: A reading is impossible; the message names it, counted from 1.
 
     Example:
         >>> mu = coefficient_from_weights(200.0, [150.0, 200.0], 0.5 * np.pi, 0.5 * np.pi)
         >>> mu.round(4).tolist()
         [0.0718, 0.0]
     """
-    values = [np.asarray(v, float) for v in (weight_1, weight_2, turn_1, turn_2)]
-    m1, m2, a1, a2 = np.broadcast_arrays(*values)
-    found = impossible(m1, m2, a1, a2)
-    if found is not None:
-        raise InputError.OUT_OF_RANGE(f"reading {found[0] + 1}: {found[1]}")
+    m1, m2, a1, a2 = _floats(weight_1, weight_2, turn_1, turn_2)
+    wrong = impossible(m1, m2, a1, a2)
+    if wrong is not None:
+        raise InputError.OUT_OF_RANGE(f"reading {wrong[0] + 1}: {wrong[1]}")
     b1, b2 = np.tan(0.5 * a1), np.tan(0.5 * a2)
     part = (m1 - m2) / (m1 + m2)
     total = b1 + b2
@@ -58,13 +57,13 @@ def coefficient_from_weights(
 def weight_held(
     weight_1: ArrayLike, coefficient: ArrayLike, turn_1: ArrayLike, turn_2: ArrayLike
 ) -> Readings:
-    """Smaller weight that the larger one is just about to lift: the inverse of eq. 21.
+    """Return the weight that the larger one is just about to lift: the inverse of eq. 21.
 
     Args:
         weight_1: Weight that pulls, in any unit, (n,).
         coefficient: Coefficient of friction, one or one a reading.
-        turn_1: Angle by which the string turns over the first edge, rad.
-        turn_2: The same over the second edge, rad.
+        turn_1: Turn of the string over the first edge, rad, (n,).
+        turn_2: Turn over the second edge, rad, (n,).
 
     Returns:
         The weight, in the unit of the other, (n,).
@@ -76,8 +75,7 @@ def weight_held(
         >>> print(f"{weight_held(200.0, 0.15, 1.5, 1.2):.3f} g")
         122.858 g
     """
-    values = [np.asarray(v, float) for v in (weight_1, coefficient, turn_1, turn_2)]
-    m1, mu, a1, a2 = np.broadcast_arrays(*values)
+    m1, mu, a1, a2 = _floats(weight_1, coefficient, turn_1, turn_2)
     law = CornerLaw(constant(mu))
     if not np.asarray(law.valid(constant(a1), constant(a2))).all():
         raise InputError.OUT_OF_RANGE(
@@ -94,13 +92,10 @@ def slopes_of_coefficient(
     weight_2: Readings,
     turn_1: Readings,
     turn_2: Readings,
-) -> Float[np.ndarray, "numbers n"]:
-    """How the coefficient changes with each of the four numbers of a reading.
+) -> Float[np.ndarray, "4 n"]:
+    """Return derivatives of the coefficient by the weights, and by the turns per rad.
 
     By the implicit function theorem from ln(m1 / m2) = 2 artanh(mu b1) + 2 artanh(mu b2).
-
-    Returns:
-        Per unit of weight 1, of weight 2, and per rad of either turn.
     """
     b1, b2 = np.tan(0.5 * turn_1), np.tan(0.5 * turn_2)
     by_1, by_2 = 2.0 / (1.0 - (coefficient * b1) ** 2), 2.0 / (1.0 - (coefficient * b2) ** 2)
@@ -109,10 +104,14 @@ def slopes_of_coefficient(
     return np.stack([1.0 / weight_1, -1.0 / weight_2, *(-by for by in by_turns)]) / by_coefficient
 
 
+def _floats(*values: ArrayLike) -> tuple[Readings, ...]:
+    return np.broadcast_arrays(*(np.asarray(value, float) for value in values))
+
+
 def impossible(
     weight_1: Readings, weight_2: Readings, turn_1: Readings, turn_2: Readings
 ) -> tuple[int, str] | None:
-    """Find the first reading that cannot be: its number from 0, and the rest of the sentence."""
+    """Return number (from 0) and reason of the first impossible reading; None if there is none."""
     m1, m2, a1, a2 = (np.ravel(value) for value in (weight_1, weight_2, turn_1, turn_2))
     checks = (
         (~(m1 > 0.0) | ~(m2 > 0.0), "both weights must be above 0."),
@@ -133,12 +132,4 @@ def impossible(
         (a1 + a2 == 0.0, "the string does not turn (0 deg over both edges), which tells nothing."),
     )
     wrong = [(int(np.argmax(bad)), words) for bad, words in checks if bad.any()]
-    return min(wrong, key=lambda one: one[0]) if wrong else None
-
-
-__all__ = [
-    "coefficient_from_weights",
-    "impossible",
-    "slopes_of_coefficient",
-    "weight_held",
-]
+    return min(wrong, key=lambda reading: reading[0]) if wrong else None

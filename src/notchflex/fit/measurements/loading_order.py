@@ -26,12 +26,12 @@ _BRANCHES, _STEPS = 4, 2
 
 
 class Fall(NamedTuple):
-    """A command that falls: rows of its highest and its lowest value, counted in its pull.
+    """A command that falls within its pull.
 
     Attributes:
-        top: The last row before it.
-        start: The first row near the lowest value.
-        bottom: The row of the lowest value.
+        top: Row of its highest value, before the fall.
+        start: The first row near its lowest value.
+        rows: Rows behind the highest value, down to the lowest.
         kind: "unloading" if readings lie between the two; in one step "restart" if the next pull
             begins there, "unloaded" if nothing is commanded there; else, and where a pull turns at
             nearly every row, "unclear".
@@ -39,20 +39,20 @@ class Fall(NamedTuple):
 
     top: int
     start: int
-    bottom: int
+    rows: Int[np.ndarray, " n"]
     kind: Literal["unloading", "restart", "unloaded", "unclear"]
 
 
 @dataclass(frozen=True)
 class Order:
-    """What the order of rows says.
+    """How rows were loaded, as their order shows.
 
     Attributes:
         from_rest: Whether every row is a pull from rest.
         pull: Label of the pull of every row.
-        unclear: Row that falls neither gradually nor to a new pull, its command (such as
-            "force", from what, to what); None where the order is clear.
-        words: How the rows were understood, "" where they rise only.
+        unclear: A row that falls neither gradually nor to a new pull: its number, the command, the
+            values before and in it; None if the order is clear.
+        words: How the rows were understood, "" if they only rise.
     """
 
     from_rest: bool
@@ -79,19 +79,11 @@ def commands_of(
 
 
 def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows: int) -> Order:
-    """Tell pulls from rest and loading paths apart by the order of the rows.
+    """Distinguish pulls from rest and loading paths by the order of the rows.
 
     A command that only rises within its pull is a pull from rest. One that falls step by step is
     unloading: the rows of each pull are one path. One that rises step by step and falls in one step
-    to where it began is the next pull from rest.
-
-    Args:
-        commands: What was commanded, P values each.
-        pull: Label of the pull of every row; None where the table has none.
-        rows: P.
-
-    Returns:
-        What the order says.
+    to where it began is the next pull from rest. `pull` holds the labels of the rows, if known.
 
     Example:
         >>> up, loop = np.array([0.0, 1.0, 2.0, 0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0, 1.0, 0.0])
@@ -104,18 +96,19 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
     begins: set[int] = set()
     falling = ""
     for name, values in commands:
-        for mine, fall in _falls_of_pulls(values, labels):
+        for fall in _falls(values, labels):
             if fall.kind == "unloading":
                 falling = falling or name
             elif fall.kind == "restart":
-                begins.add(int(mine[fall.start]))
+                begins.add(fall.start)
             elif fall.kind == "unclear":
-                first, last = (float(values[mine[row]]) for row in (fall.top, fall.start))
-                return Order(True, labels, (int(mine[fall.start]), name, first, last))
+                unclear = fall.start, name, float(values[fall.top]), float(values[fall.start])
+                return Order(True, labels, unclear)
     if pull is None:
         number = np.cumsum([row in begins for row in range(rows)]) + 1
         labels = tuple(str(one) for one in number)
     count = len(set(labels))
+    words = ""
     if falling:
         each = "each pull" if count > 1 else "the pull"
         words = (
@@ -123,26 +116,19 @@ def loading_order(commands: Sequence[Command], pull: Sequence[str] | None, rows:
             "path, in their order, with friction history; give --from-rest if every row was "
             "loaded from rest"
         )
-        return Order(False, labels, words=words)
-    words = ""
-    if begins and pull is None:
+    elif begins and pull is None:
         words = (
             f"the {commands[0][0]} begins again {len(begins)} time{'s' * (len(begins) > 1)}, so "
             f"the rows are taken as {count} pulls, each row loaded from rest; give --path if they "
             "are one loading path"
         )
-    return Order(True, labels, words=words)
+    return Order(not falling, labels, words=words)
 
 
 def branches(commands: Sequence[Command], pull: Sequence[str]) -> Int[np.ndarray, " p"]:
-    """Tell the loading rows (1) from the unloading rows (-1) of every pull, in their order.
+    """Distinguish loading rows (1) and unloading rows (-1) of every pull, in their order.
 
-    Args:
-        commands: As for `loading_order`.
-        pull: Label of the pull of every row.
-
-    Returns:
-        P numbers; 0 where one tendon is loaded while another one is unloaded.
+    0 stands where one tendon is loaded while another one is unloaded.
 
     Example:
         >>> loop = np.array([0.0, 1.0, 2.0, 1.0, 0.0])
@@ -151,69 +137,68 @@ def branches(commands: Sequence[Command], pull: Sequence[str]) -> Int[np.ndarray
     """
     total = np.zeros(len(pull), int)
     for _, values in commands:
-        way = np.isfinite(values).astype(int)
-        for mine, fall in _falls_of_pulls(values, pull):
+        known = np.isfinite(values)
+        branch = known.astype(int)
+        for fall in _falls(values, pull):
             if fall.kind != "restart":
-                way[mine[fall.top + 1 : fall.bottom + 1]] = -1
-        if np.ptp(values[np.isfinite(values)]) > 0.0:
-            total += way
+                branch[fall.rows] = -1
+        if np.ptp(values[known]) > 0.0:
+            total += branch
     return np.sign(total)
 
 
 def turning_points(values: Float[np.ndarray, " n"], least: float) -> list[int]:
-    """Rows at which a command turns back by more than `least`; the first rise is no turn."""
+    """Return the rows at which a command turns back by more than `least`, but for a first rise."""
     points: list[int] = []
-    way, farthest = 1.0, 0  # rising, and the farthest row that way since the last turn
-    for place, value in enumerate(values):
-        gone = way * (value - values[farthest])
-        if gone > 0.0:
-            farthest = place
-        elif gone < -least:
+    sign, farthest = 1.0, 0  # rising, and the farthest row that way since the last turn
+    for row, value in enumerate(values):
+        change = sign * (value - values[farthest])
+        if change > 0.0:
+            farthest = row
+        elif change < -least:
             if farthest > 0:
                 points.append(farthest)
-            way, farthest = -way, place
+            sign, farthest = -sign, row
     return points
 
 
-def _falls_of_pulls(
-    values: Float[np.ndarray, " p"], pull: Sequence[str]
-) -> Iterator[tuple[Int[np.ndarray, " n"], Fall]]:
-    """Yield every fall of a command with the rows of its pull in which it is commanded."""
+def _falls(values: Float[np.ndarray, " p"], pull: Sequence[str]) -> Iterator[Fall]:
+    """Yield every fall of a command in the pulls in which it is commanded."""
     known = np.isfinite(values)
-    reach = float(np.ptp(values[known])) if known.any() else 0.0
-    if reach == 0.0:
+    span = float(np.ptp(values[known])) if known.any() else 0.0
+    if span == 0.0:
         return
     labels = np.array(pull)
     for label in dict.fromkeys(pull):
-        mine = np.flatnonzero(known & (labels == label))
-        for fall in _falls(values[mine], reach):
-            yield mine, fall
+        rows = np.flatnonzero(known & (labels == label))
+        for top, start, bottom, kind in _falls_of_pull(values[rows], span):
+            yield Fall(int(rows[top]), int(rows[start]), rows[top + 1 : bottom + 1], kind)
 
 
-def _falls(values: Float[np.ndarray, " n"], reach: float) -> Iterator[Fall]:
-    points = [0, *turning_points(values, TURN * reach), len(values) - 1]
+def _falls_of_pull(
+    values: Float[np.ndarray, " n"], span: float
+) -> Iterator[tuple[int, int, int, Literal["unloading", "restart", "unloaded", "unclear"]]]:
+    points = [0, *turning_points(values, TURN * span), len(values) - 1]
     shuffled = len(points) > _BRANCHES and len(values) - 1 < _STEPS * (len(points) - 1)
     began = 0  # where the present pull began
-    for number, (top, bottom) in enumerate(pairwise(points)):
+    ends = [*points[2:], -1]  # of the next rise; none follows the last branch
+    for (top, bottom), end in zip(pairwise(points), ends, strict=True):
         depth = values[top] - values[bottom]
-        if depth < _FALL * reach:
+        if depth < _FALL * span:
             continue
-        near = values[top : bottom + 1] <= values[bottom] + _BETWEEN * depth
-        start = top + int(np.argmax(near))
-        if _has_between(values[top : bottom + 1]):
-            yield Fall(top, start, bottom, "unclear" if shuffled else "unloading")
-        elif depth >= _JUMP * reach:
-            again = values[start] <= values[began] + _AGAIN * reach
-            rise = (
-                values[bottom : points[number + 2] + 1] if number + 2 < len(points) else values[:0]
-            )
-            if again and _has_between(values[began : top + 1]) and _has_between(rise):
-                yield Fall(top, start, bottom, "restart")
+        branch = values[top : bottom + 1]
+        start = top + int(np.argmax(branch <= values[bottom] + _BETWEEN * depth))
+        if _has_between(branch):
+            yield top, start, bottom, "unclear" if shuffled else "unloading"
+        elif depth >= _JUMP * span:
+            again = values[start] <= values[began] + _AGAIN * span
+            next_rise = values[bottom : end + 1]
+            if again and _has_between(values[began : top + 1]) and _has_between(next_rise):
+                yield top, start, bottom, "restart"
                 began = start
-            elif abs(values[bottom]) <= TURN * reach:
-                yield Fall(top, start, bottom, "unloaded")
             else:
-                yield Fall(top, start, bottom, "unclear")
+                unloaded = abs(values[bottom]) <= TURN * span
+                yield top, start, bottom, "unloaded" if unloaded else "unclear"
 
 
 def _has_between(values: Float[np.ndarray, " n"]) -> bool:
@@ -223,6 +208,3 @@ def _has_between(values: Float[np.ndarray, " n"]) -> bool:
     low, high = float(np.min(values)), float(np.max(values))
     margin = _BETWEEN * (high - low)
     return bool(((values > low + margin) & (values < high - margin)).any())
-
-
-__all__ = ["TURN", "Order", "branches", "commands_of", "loading_order", "turning_points"]

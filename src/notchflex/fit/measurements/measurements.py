@@ -1,8 +1,8 @@
-"""What was measured on a robot, and what was done to it: the rows that constants are fitted to."""
+"""Measurements of a robot, with the loads under which they were made."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,35 +24,37 @@ OBSERVED = (
 )
 """Quantities that can be measured."""
 
+# Axes of their arrays, rows included, and the last axis of vectors.
+_AXES = {"total_angle": 1, "axis_points": 3}
+_VECTORS = ("tip_position", "tip_rotation", "axis_points")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Measurements:
     """P rows of measurements of a robot of n notches and t tendons. Units mm, N, rad.
 
     Attributes:
-        source: Where they came from.
-        load: What was done, P steps: tension or stroke of every tendon as the model is given it,
-            NaN where the other is given; the external loads of each row. A measured tension
-            below 0 is the offset of a sensor, and 0 N in the model.
-        pull: Label of the pull that each row belongs to, P of them.
-        from_rest: True where every row is a pull from rest; False where the rows of a pull, in
-            their order, are one path with memory of friction.
-        observed: What was measured by name, the rows as leading axis, NaN where it was not:
+        source: Where they come from.
+        load: Loads of the model, P steps: tension or stroke of every tendon, NaN where the other is
+            given; external loads. A measured tension below 0 is the offset of a sensor, and 0 N
+            in the model.
+        pull: Label of the pull of every row, P of them.
+        from_rest: True if every row is a pull from rest; False if the rows of a pull, in their
+            order, are one path with friction history.
+        observed: Measured quantities by name, rows as leading axis, NaN where not measured:
             "notch_angle" (P, n) and "total_angle" (P,) rad, "tip_position" (P, 3) mm,
             "tip_rotation" (P, 3) as rotation vectors in the world rad, "tip_tension" (P, t) N in
             the last span of every tendon, "axis_points" (P, m, 3) mm on the tube axis.
-        deviation: Standard deviations of what was measured, in the same shapes; NaN, or not there,
-            where not known.
-        axis_at: How far from the base the points on the axis lie when the robot is straight, mm,
-            (m,).
-        measured_tension: Tensions as they were measured, N, (P, t); those of `load` if left out.
+        deviation: Their standard deviations, in the same shapes; NaN, or left out, if unknown.
+        axis_at: Distances of the points on the axis from the base of the straight robot, mm, (m,).
+        measured_tension: Tensions as measured, N, (P, t); those of `load` by default.
         ignored: Columns of the file that were not used.
-        order: How the order of the rows was understood, where neither the file nor the caller says
-            whether they are from rest; "" where there is nothing to say.
+        order: How the order of the rows was understood if neither the file nor the caller says
+            whether they are from rest; "" if there is nothing to say.
 
     Raises:
-        InputError: Shapes that do not fit each other, numbers that are not finite, a standard
-            deviation that is not positive.
+        InputError: Shapes that do not match, numbers that are not finite, a standard deviation
+            that is not positive.
 
     Example:
         >>> from notchflex import pull
@@ -75,35 +77,40 @@ class Measurements:
     order: str = ""
 
     def __post_init__(self) -> None:
-        """Check everything, and bring it to arrays of floats."""
+        """Check everything, and convert it to arrays of floats."""
         rows = len(self.load)
-        axis_at = np.array(self.axis_at, float, ndmin=1)
-        tension = np.array(self.measured_tension, float, ndmin=2)
-        if not tension.size:
-            tension = self.load.tension
-        clipped = np.maximum(tension, 0.0)
+        checked: dict[str, Any] = {
+            "axis_at": np.array(self.axis_at, float, ndmin=1),
+            "measured_tension": np.array(self.measured_tension, float, ndmin=2),
+            "pull": tuple(str(label) for label in self.pull),
+        }
+        if not checked["measured_tension"].size:
+            checked["measured_tension"] = self.load.tension
+        clipped = np.maximum(checked["measured_tension"], 0.0)
         if not np.array_equal(clipped, self.load.tension, equal_nan=True):
             raise InputError.CONFLICT(
                 "the measured tensions are not those of the load; it has the same, 0 N where they "
                 "are negative"
             )
-        pull = tuple(str(label) for label in self.pull)
-        if len(pull) != rows:
-            raise InputError.WRONG_SHAPE(
-                f"{rows} rows need a label of their pull each; got {len(pull)}"
-            )
-        observed = {name: _checked(value, name, rows) for name, value in self.observed.items()}
-        if not any(np.isfinite(value).any() for value in observed.values()):
+        check_labels(checked["pull"], rows, "rows")
+        for name in ("observed", "deviation"):
+            tables = getattr(self, name)
+            checked[name] = {key: _checked(value, key, rows) for key, value in tables.items()}
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        self._check_numbers()
+
+    def _check_numbers(self) -> None:
+        if not any(np.isfinite(value).any() for value in self.observed.values()):
             raise InputError.NO_DATA(f"nothing is measured; give some of {', '.join(OBSERVED)}")
-        points = observed.get("axis_points")
-        if (0 if points is None else points.shape[1]) != len(axis_at):
+        points = self.observed.get("axis_points")
+        if (0 if points is None else points.shape[1]) != len(self.axis_at):
             raise InputError.MISSING_VALUE(
                 "axis_points need axis_at, how far from the base each of them lies on the straight "
                 "robot, mm"
             )
-        deviation = {name: _checked(value, name, rows) for name, value in self.deviation.items()}
-        for name, value in deviation.items():
-            if name not in observed or value.shape != observed[name].shape:
+        for name, value in self.deviation.items():
+            if name not in self.observed or value.shape != self.observed[name].shape:
                 raise InputError.WRONG_SHAPE(
                     f"the deviation of {name} must have the shape of what is observed"
                 )
@@ -112,29 +119,19 @@ class Measurements:
                     f"a standard deviation of {name} is {np.nanmin(value):g}; give it above 0, or "
                     "NaN where it is not known"
                 )
-        taken: dict[str, Any] = {
-            "axis_at": axis_at,
-            "measured_tension": tension,
-            "pull": pull,
-            "observed": observed,
-            "deviation": deviation,
-        }
-        for name, value in taken.items():
-            object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.load)
 
     def __eq__(self, other: object) -> bool:
-        """Whether the same was done and measured; where it was read from does not matter."""
+        """Whether loads and measurements are the same; the source does not matter."""
         if not isinstance(other, Measurements):
             return NotImplemented
-        plain = ("pull", "from_rest")
         mine, its = self._arrays, other._arrays
         return (
-            all(getattr(self, name) == getattr(other, name) for name in plain)
-            and self.load.external == other.load.external
+            (self.pull, self.from_rest, self.load.external)
+            == (other.pull, other.from_rest, other.load.external)
             and mine.keys() == its.keys()
             and all(np.array_equal(mine[name], its[name], equal_nan=True) for name in mine)
         )
@@ -151,13 +148,12 @@ class Measurements:
         }
 
     def __repr__(self) -> str:
-        """How many rows and pulls, and what was measured."""
-        pulls = len(self.pulls)
+        """Return how many rows and pulls there are, and what was measured."""
         way = "each from rest" if self.from_rest else "each pull one path"
         known = f"; deviations of {', '.join(self.deviation)}" if self.deviation else ""
         return (
             f"<Measurements of {self.source}: {_count(len(self), 'row')} of "
-            f"{_count(pulls, 'pull')}, {way}; {', '.join(self.observed)}{known}>"
+            f"{_count(len(self.pulls), 'pull')}, {way}; {', '.join(self.observed)}{known}>"
         )
 
     @property
@@ -177,21 +173,21 @@ class Measurements:
 
     @property
     def values(self) -> int:
-        """How many numbers were measured."""
+        """Number of measured numbers."""
         return sum(int(np.isfinite(value).sum()) for value in self.observed.values())
 
     def taken(self, rows: ArrayLike | slice) -> Measurements:
-        """Some of the rows.
+        """Return some of the rows.
 
         Args:
             rows: Their numbers from 0, a slice, or a truth value for every row.
 
         Raises:
-            InputError: No row is left, or none of which anything was measured.
+            InputError: No row is left, or nothing was measured in those left.
         """
-        if not isinstance(rows, slice) and not np.size(rows):
-            rows = slice(0)
-        which = np.arange(len(self))[rows if isinstance(rows, slice) else np.asarray(rows)]
+        if not isinstance(rows, slice):
+            rows = np.asarray(rows) if np.size(rows) else slice(0)
+        which = np.arange(len(self))[rows]
         if not len(which):
             raise InputError.NO_DATA(f"no row of {self.source} is left; take at least one")
         return replace(
@@ -204,7 +200,7 @@ class Measurements:
         )
 
     def of_pulls(self, labels: Sequence[str]) -> Measurements:
-        """The rows of some of the pulls.
+        """Return the rows of some of the pulls.
 
         Raises:
             InputError: There is no pull of such a label.
@@ -224,16 +220,28 @@ def rows_of(load: LoadPath, rows: Sequence[int] | NDArray[np.intp]) -> LoadPath:
     return LoadPath(load.tension[which], load.stroke[which], load.base_rotation, external)
 
 
-def _checked(value: Any, name: str, rows: int) -> NDArray[np.float64]:
-    axes = {"total_angle": 1, "axis_points": 3}
-    if name not in OBSERVED:
-        raise InputError.UNKNOWN_NAME(
-            f"`{name}` is nothing that is measured; there are {', '.join(OBSERVED)}"
+def check_labels(labels: Sequence[str], count: int, what: str) -> None:
+    """Raise InputError unless every row has the label of its pull."""
+    if len(labels) != count:
+        raise InputError.WRONG_SHAPE(
+            f"{count} {what} need a label of their pull each; got {len(labels)}"
         )
+
+
+def check_quantities(names: Iterable[str]) -> None:
+    """Raise InputError if a quantity cannot be measured."""
+    for name in names:
+        if name not in OBSERVED:
+            raise InputError.UNKNOWN_NAME(
+                f"`{name}` is nothing that is measured; there are {', '.join(OBSERVED)}"
+            )
+
+
+def _checked(value: Any, name: str, rows: int) -> NDArray[np.float64]:
+    check_quantities([name])
     array = np.array(value, float)
-    last = {"tip_position": (3,), "tip_rotation": (3,), "axis_points": (3,)}.get(name, ())
-    fits = array.ndim == axes.get(name, 2) and len(array) == rows
-    if not fits or (last and array.shape[-1:] != last):
+    fits = array.ndim == _AXES.get(name, 2) and len(array) == rows
+    if not fits or (name in _VECTORS and array.shape[-1] != 3):
         raise InputError.WRONG_SHAPE(f"{name} of {rows} rows cannot have the shape {array.shape}")
     if np.isinf(array).any():
         raise InputError.NOT_FINITE(
@@ -244,6 +252,3 @@ def _checked(value: Any, name: str, rows: int) -> NDArray[np.float64]:
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
-
-
-__all__ = ["OBSERVED", "Measurements", "rows_of"]

@@ -1,17 +1,22 @@
-"""Measurements made from the model: what tests and benchmarks fit to, its constants being known."""
+"""Measurements simulated with the model, whose constants are then known, and its rows solved."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
-from notchflex.analysis import axis_points
+from notchflex.analysis import axis_points, simulate, solve_each
 from notchflex.errors import InputError
-from notchflex.fit.measurements.measurements import OBSERVED, Measurements
-from notchflex.fit.model.solved_rows import solved_rows
+from notchflex.fit.measurements.measurements import (
+    Measurements,
+    check_labels,
+    check_quantities,
+    rows_of,
+)
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.load_path import load_path
 from notchflex.results.quantities.registry import spans_of
@@ -34,24 +39,20 @@ def simulate_measurements(
     pull: Sequence[str] | None = None,
     from_rest: bool = True,
 ) -> Measurements:
-    """Make measurements from the model, with Gaussian noise.
+    """Simulate measurements with the model, with Gaussian noise.
 
     Args:
         robot: The robot.
-        load: What is done to it, P steps.
+        load: The loads, P steps.
         observed: What is measured, by the names of `Measurements.observed`.
-        deviation: Standard deviation of the noise, rad, mm or N, by the same names; what is not
-            named has no noise, and no deviation in the result.
-        seed: Of the noise: a number, or a generator to draw from.
-        axis_at: Where points on the axis are measured, mm; for "axis_points".
-        pull: Label of the pull of every step; all of one if left out.
+        deviation: Standard deviation of the noise, rad, mm or N, by the same names; 0 by default.
+        seed: Seed of the noise, or a random generator.
+        axis_at: Distances of the points on the axis from the base, mm; for "axis_points".
+        pull: Label of the pull of every step; one pull by default.
         from_rest: True if every step is a pull from rest, False if each pull is one path.
 
-    Returns:
-        The measurements.
-
     Raises:
-        InputError: A name that is none, a deviation that is not positive, a place beyond the robot.
+        InputError: An unknown name, a deviation that is not positive, a point beyond the robot.
         ConvergenceError: A step has no equilibrium.
 
     Example:
@@ -62,32 +63,19 @@ def simulate_measurements(
         notch_angle>
     """
     noise = dict(deviation or {})
-    wrong = [name for name in (*observed, *noise) if name not in OBSERVED]
-    if wrong:
-        raise InputError.UNKNOWN_NAME(
-            f"`{wrong[0]}` is nothing that is measured; there are {', '.join(OBSERVED)}"
-        )
-    for name, value in noise.items():
-        if name not in observed or not 0.0 < value < np.inf:
-            raise InputError.OUT_OF_RANGE(
-                f"the deviation of {name} must be positive and {name} be observed; got {value:g}"
-            )
+    _check_noise(observed, noise)
     path = load_path(load, robot.number_of_tendons)
-    labels = ("1",) * len(path) if pull is None else tuple(str(label) for label in pull)
-    if len(labels) != len(path):
-        raise InputError.WRONG_SHAPE(
-            f"{len(path)} steps need a label of their pull each; got {len(labels)}"
-        )
+    labels = ("1",) * len(path) if pull is None else tuple(map(str, pull))
+    check_labels(labels, len(path), "steps")
     random = np.random.default_rng(seed)
 
     def read(states: EquilibriumPath) -> dict[str, NDArray[np.float64]]:
         return modelled(states.raise_if_failed(), observed, axis_at)
 
-    model = solved_rows(robot, path, labels, from_rest, read)
     values: dict[str, NDArray[np.float64]] = {}
-    for name, exact in model.items():
+    for name, exact in solved_rows(robot, path, labels, from_rest, read).items():
         noisy = exact + noise.get(name, 0.0) * random.standard_normal(exact.shape)
-        values[name] = _told(noisy, name)
+        values[name] = _as_read(noisy, name)
     return Measurements(
         source="synthetic",
         load=path,
@@ -95,51 +83,64 @@ def simulate_measurements(
         from_rest=from_rest,
         observed=values,
         deviation={
-            name: np.full(values[name].shape, _told(spread, name)) for name, spread in noise.items()
+            name: np.full(values[name].shape, _as_read(one, name)) for name, one in noise.items()
         },
         axis_at=np.array(axis_at, float) if "axis_points" in observed else np.zeros(0),
     )
 
 
+def solved_rows(
+    robot: Robot,
+    load: LoadPath,
+    pull: Sequence[str],
+    from_rest: bool,
+    read: Callable[[EquilibriumPath], Mapping[str, NDArray[Any]]],
+) -> dict[str, NDArray[Any]]:
+    """Solve P rows, from rest or as steps of the paths of their pulls, and read arrays by name.
+
+    `read` returns arrays of solved states, steps as leading axis; some may not have converged.
+    """
+    if from_rest:
+        return dict(read(solve_each(robot, load)))
+    results: dict[str, NDArray[Any]] = {}
+    labels = np.array(pull)
+    for label in dict.fromkeys(pull):
+        rows = np.flatnonzero(labels == label)
+        for name, part in read(simulate(robot, rows_of(load, rows))).items():
+            empty = np.empty((len(load), *part.shape[1:]), part.dtype)
+            results.setdefault(name, empty)[rows] = part
+    return results
+
+
 def modelled(
     path: EquilibriumPath, observed: Sequence[str], axis_at: ArrayLike = ()
 ) -> dict[str, NDArray[np.float64]]:
-    """What would be measured on solved states, by the names of `Measurements.observed`.
-
-    Args:
-        path: The states, s steps.
-        observed: Names of what is wanted.
-        axis_at: Where points on the axis lie on the straight robot, mm.
-
-    Returns:
-        By name, steps as leading axis, in the shapes of `Measurements.observed`.
-    """
-    made = {
-        "notch_angle": lambda: path.notch_angle,
-        "total_angle": lambda: path.total_angle,
-        "tip_position": lambda: path.tip_position,
-        "tip_rotation": lambda: rotation_vectors(path.tip_rotation),
+    """Return what would be measured on solved states, as in `Measurements.observed`."""
+    derived: dict[str, Callable[[], Any]] = {
+        "tip_rotation": lambda: Rotation.from_matrix(path.tip_rotation).as_rotvec(),
         "tip_tension": lambda: _tip_tension(path),
         "axis_points": lambda: axis_points(path, axis_at),
     }
-    return {name: np.asarray(made[name]()) for name in observed}
+    return {
+        name: np.asarray(derived[name]() if name in derived else getattr(path, name))
+        for name in observed
+    }
 
 
-def rotation_vectors(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotation vectors (s, 3), rad, of rotations (s, 3, 3) of up to half a turn."""
-    from scipy.spatial.transform import Rotation
+def _check_noise(observed: Sequence[str], noise: Mapping[str, float]) -> None:
+    check_quantities((*observed, *noise))
+    for name, value in noise.items():
+        if name not in observed or not 0.0 < value < np.inf:
+            raise InputError.OUT_OF_RANGE(
+                f"the deviation of {name} must be positive and {name} be observed; got {value:g}"
+            )
 
-    return Rotation.from_matrix(np.asarray(rotation)).as_rotvec()
 
-
-def _told(value: Any, name: str) -> Any:
-    """A value as a file can hold it: angles that have a number of degrees read back equal."""
+def _as_read(value: Any, name: str) -> Any:
+    """A value as it is read from a file: an angle that a number of degrees gives exactly."""
     return np.radians(np.degrees(value)) if name in _ANGLES else value
 
 
 def _tip_tension(path: EquilibriumPath) -> NDArray[np.float64]:
     last = [spans_of(path, tendon) - 1 for tendon in range(path.span_tension.shape[1])]
     return path.span_tension[:, np.arange(len(last)), last]
-
-
-__all__ = ["modelled", "rotation_vectors", "simulate_measurements"]

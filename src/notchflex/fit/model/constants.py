@@ -3,38 +3,41 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from notchflex.errors import InputError
-from notchflex.fit.model.rows import SENSOR
 from notchflex.robot import Robot
 from notchflex.robot.value_names import described_at, number_at
 
 _EACH_NOTCH = "[each]"
-_EACH_ROBOT = "each:"
+_EACH_ROBOT = "each"
 
-# Where a search looks for what the user gives no limits for: lengths are known to a tolerance,
-# angles to some degrees, friction lies between none and its load, all else within a factor.
+# Where a search looks without limits of the user: lengths vary by a tolerance, angles by some
+# degrees, all else by a factor.
 _TOLERANCE, _TURN, _FACTOR = 0.2, 10.0, 4.0
+# Unit, least value, and where a search looks, of the numbers of the measurement.
+_SENSOR = {
+    "sensor.force_offset": ("N", -math.inf, -0.1, 0.1),
+    "sensor.stroke_slack": ("mm", 0.0, 0.0, 0.5),
+}
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A number to be found.
+    """A constant to be fitted.
 
     Args:
         name: A value of the robot file (`material.elastic_modulus`, `notch[2].depth`), shared by
-            all robots of the fit; with a robot's label before it (`A:friction.coefficient`) of one
-            robot; with `each:` one for every robot; with `notch[each].` one for every notch. Of the
+            all robots of the fit; with a label before it (`A:friction.coefficient`) of one robot;
+            with `each:` one for every robot; with `notch[each].` one for every notch. Of the
             measurement: `sensor.force_offset` (what the gauge shows at no force, N) and
             `sensor.stroke_slack` (stroke that only takes up slack, mm).
-        lower: Least value allowed, in the unit of the robot file; what a robot allows where not
-            given.
-        upper: Greatest value allowed.
-        prior: Mean and standard deviation of what is known beforehand.
+        lower: Least value allowed, in the unit of the robot file; by default that of the robot.
+        upper: Greatest value allowed, likewise.
+        prior: Mean and standard deviation of prior knowledge.
 
     Raises:
         InputError: The limits are in the wrong order, or the prior has no width.
@@ -75,10 +78,10 @@ class Unknown:
     """A constant of a fit, and the robots' numbers that it sets.
 
     Attributes:
-        name: As told to the user.
+        name: Name that is shown.
         unit: Unit of its value, "" for a pure number.
         sets: Labels of robots and the names of their numbers.
-        lower: Least value, -inf where there is none.
+        lower: Least value, -inf if there is none.
         upper: Greatest value.
         start: Its value in the robots as they are.
         first: Least value that a search starts from.
@@ -98,96 +101,84 @@ class Unknown:
 
     @property
     def scale(self) -> float:
-        """A size that its changes are compared with."""
+        """A typical size of its changes."""
         return self.last - self.first
 
     def among(self, labels: Collection[str]) -> Unknown:
-        """The same constant of only some of the robots.
+        """Return the same constant of some of the robots.
 
         Raises:
             InputError: None of them has it.
         """
-        own = tuple(place for place in self.sets if place[0] in labels)
-        if not own:
+        sets = tuple(one for one in self.sets if one[0] in labels)
+        if not sets:
             raise InputError.TOO_FEW_DATA(
                 f"`{self.name}` belongs to {self.sets[0][0]} alone; without it there is nothing "
                 "to find it from"
             )
-        return replace(self, sets=own)
+        return replace(self, sets=sets)
 
     def shared_with(self, label: str) -> Unknown:
-        """The same constant for a robot that was not in the fit; one of other robots sets none."""
-        own = tuple(place for place in self.sets if place[0] == label)
-        if not own and ":" not in self.name:
-            own = ((label, self.sets[0][1]),)
-        return replace(self, sets=own)
+        """Return the same constant of a robot outside the fit; one of other robots sets nothing."""
+        sets = tuple(one for one in self.sets if one[0] == label)
+        if not sets and ":" not in self.name:
+            sets = ((label, self.sets[0][1]),)
+        return replace(self, sets=sets)
 
 
 def unknowns(
     robots: Mapping[str, Robot], fit: Sequence[str | Constant] | str
 ) -> tuple[Unknown, ...]:
-    """The constants of a fit.
-
-    Args:
-        robots: The robots by label.
-        fit: Names or constants.
+    """Return the constants of a fit of robots by label.
 
     Raises:
-        InputError: A name is none, is given twice, or belongs to no robot.
+        InputError: A name is unknown, is given twice, or belongs to no robot.
     """
-    if "each" in robots:
+    if _EACH_ROBOT in robots:
         raise InputError.CONFLICT(
             "no robot can be called each: `each:` stands for every robot of the fit"
         )
-    given = (fit,) if isinstance(fit, str | Constant) else tuple(fit)
-    if not given:
+    constants = (fit,) if isinstance(fit, str | Constant) else tuple(fit)
+    if not constants:
         raise InputError.NO_DATA("fit names no constant; name one, such as friction.coefficient")
-    found: list[Unknown] = []
-    for one in given:
-        found += _expanded(robots, one if isinstance(one, Constant) else Constant(one))
-    taken: dict[tuple[str, str], str] = {}
-    for one in found:
-        for place in one.sets:
-            if place in taken:
-                raise InputError.CONFLICT(
-                    f"`{place[1]}` of {place[0]} is set by `{taken[place]}` and by `{one.name}`; "
-                    "fit it once"
-                )
-            taken[place] = one.name
-    return tuple(found)
+    every: list[Unknown] = []
+    set_by: dict[tuple[str, str], str] = {}
+    for constant in constants:
+        constant = constant if isinstance(constant, Constant) else Constant(constant)
+        for label, path in _expanded(robots, constant.name.strip()):
+            name = f"{label}:{path}" if label else path
+            owners = {label: robots[label]} if label else robots
+            every.append(_unknown(owners, path, replace(constant, name=name)))
+            for place in every[-1].sets:
+                if place in set_by:
+                    raise InputError.CONFLICT(
+                        f"`{path}` of {place[0]} is set by `{set_by[place]}` and by `{name}`; "
+                        "fit it once"
+                    )
+                set_by[place] = name
+    return tuple(every)
 
 
-def _expanded(robots: Mapping[str, Robot], constant: Constant) -> list[Unknown]:
-    """One constant as written, or the several that it stands for."""
-    name = constant.name.strip()
-    label, colon, path = name.partition(":")
+def _expanded(robots: Mapping[str, Robot], name: str) -> Iterator[tuple[str, str]]:
+    """Yield label and number of every constant that a name stands for; "" is all robots."""
+    before, colon, path = name.partition(":")
     if not colon:
-        label, path = "", name
-    if name.startswith(_EACH_ROBOT):
-        own = (replace(constant, name=f"{one}:{path}") for one in robots)
-        return [unknown for one in own for unknown in _expanded(robots, one)]
-    if label and label not in robots:
-        raise InputError.UNKNOWN_NAME(
-            f"`{name}`: no robot of this fit is called {label}; there are {', '.join(robots)}"
-        )
-    if _EACH_NOTCH in path:
-        if not label and len(robots) > 1:
-            return _expanded(robots, replace(constant, name=_EACH_ROBOT + path))
-        one = robots[label or next(iter(robots))]
-        before = f"{label}:" if label else ""
-        notches = range(1, one.number_of_notches + 1)
-        paths = (path.replace(_EACH_NOTCH, f"[{notch}]") for notch in notches)
-        own = (replace(constant, name=before + each) for each in paths)
-        return [unknown for one in own for unknown in _expanded(robots, one)]
-    return [_unknown({label: robots[label]} if label else robots, path, constant)]
+        before, path = "", name
+    each = before == _EACH_ROBOT or (not before and _EACH_NOTCH in path and len(robots) > 1)
+    for label in robots if each else [before]:
+        if label and label not in robots:
+            raise InputError.UNKNOWN_NAME(
+                f"`{name}`: no robot of this fit is called {label}; there are {', '.join(robots)}"
+            )
+        robot = robots[label or next(iter(robots))]
+        for notch in range(robot.number_of_notches if _EACH_NOTCH in path else 1):
+            yield label, path.replace(_EACH_NOTCH, f"[{notch + 1}]")
 
 
 def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant) -> Unknown:
-    lower, upper = -math.inf, math.inf
-    if path in SENSOR:
-        unit, start = ("N", 0.0) if path == SENSOR[0] else ("mm", 0.0)
-        first, last = (-0.1, 0.1) if path == SENSOR[0] else (0.0, 0.5)
-        lower = lower if path == SENSOR[0] else 0.0
+    if path in _SENSOR:
+        unit, lower, first, last = _SENSOR[path]
+        start, upper = 0.0, math.inf
     else:
         start = math.fsum(number_at(robot, path) for robot in robots.values()) / len(robots)
         number = described_at(next(iter(robots.values())), path)
@@ -199,10 +190,17 @@ def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant) -> Unkn
     last = min(last, upper) if constant.upper is None else upper
     if not first < last:  # a limit on the far side of where a search would look
         first, last = max(lower, first - 1.0), min(upper, first + 1.0)
-    start = min(max(start, lower), upper)
-    sets = tuple((label, path) for label in robots)
-    name = constant.name.strip()
-    return Unknown(name, unit, sets, lower, upper, start, first, last, constant.prior)
+    return Unknown(
+        name=constant.name,
+        unit=unit,
+        sets=tuple((label, path) for label in robots),
+        lower=lower,
+        upper=upper,
+        start=min(max(start, lower), upper),
+        first=first,
+        last=last,
+        prior=constant.prior,
+    )
 
 
 def _is_finite(value: object) -> bool:
@@ -224,6 +222,3 @@ def _range(path: str, unit: str, value: float) -> tuple[float, float]:
         return value - _TOLERANCE * abs(value), value + _TOLERANCE * abs(value)
     ends = (value / _FACTOR, value * _FACTOR)
     return min(ends), max(ends)
-
-
-__all__ = ["Constant", "Unknown", "unknowns"]

@@ -1,24 +1,20 @@
-"""Model less measurement at every number that was measured, and how that changes."""
+"""Model less measurement at every measured number, with derivatives."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from notchflex._jax import constant
-from notchflex.fit.measurements.measurements import Measurements
-from notchflex.fit.model.rows import Predicted
+from notchflex.fit.measurements.measurements import OBSERVED, Measurements
+from notchflex.fit.model.rows import OUTPUTS, Predicted
 from notchflex.mechanics.motion import left_slope
 
 ANGLES = ("notch_angle", "total_angle")
 LENGTHS = ("tip_position", "axis_points")
-
-# What of the model they need, where it is not of the same name.
-_OUTPUTS = {"tip_tension": "span_tension"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,15 +24,15 @@ class Residuals:
     Attributes:
         values: Model less measurement (rad, mm, N), (R,).
         slopes: Their derivatives by the constants, (R, k).
-        sample: Which measurement each belongs to, by number.
-        robot: Which robot.
-        row: Which row of the measurement.
-        quantity: Which of `OBSERVED`.
-        part: Which of its components (a notch, a coordinate).
-        pull: Which pull, counted over all measurements.
-        point: Which point in space, for coordinates; each number alone otherwise.
-        rows: How many rows the measurements of that robot have.
-        given: Standard deviation given with the measurement; NaN where there is none.
+        sample: Number of the measurements that each belongs to.
+        robot: Number of the robot.
+        row: Row of the measurements.
+        quantity: Number in `OBSERVED`.
+        part: Component of the quantity (a notch, a coordinate).
+        pull: Pull, counted over all measurements.
+        point: Point in space, for coordinates; of its own for each other number.
+        rows: Number of rows measured of that robot.
+        given: Standard deviation given with the measurement; NaN if there is none.
     """
 
     values: Float[np.ndarray, " r"]
@@ -52,28 +48,31 @@ class Residuals:
     given: Float[np.ndarray, " r"]
 
     def __len__(self) -> int:
-        """How many numbers were measured."""
+        """Number of measured numbers."""
         return len(self.values)
 
+    def of(self, sample: int, quantity: str) -> np.ndarray:
+        """Whether each number belongs to a quantity of some measurements, (R,)."""
+        return (self.sample == sample) & (self.quantity == OBSERVED.index(quantity))
 
-class Misfit(NamedTuple):
-    """Model less measurement of one quantity, rows and components, and its slopes in front."""
-
-    values: Float[np.ndarray, "p c"]
-    slopes: Float[np.ndarray, "k p c"]
-
-
-def outputs_for(quantities: tuple[str, ...]) -> tuple[str, ...]:
-    """Outputs of the model that measured quantities are compared with."""
-    return tuple(dict.fromkeys(_OUTPUTS.get(name, name) for name in quantities))
+    def root_mean_squares(self) -> dict[str, float]:
+        """Root mean square by quantity (rad, mm, N)."""
+        return {
+            OBSERVED[number]: float(np.sqrt(np.mean(self.values[self.quantity == number] ** 2)))
+            for number in np.unique(self.quantity)
+        }
 
 
-def misfit(name: str, measured: Measurements, predicted: Predicted) -> Misfit:
-    """Model less measurement of one quantity; NaN where nothing was measured."""
-    seen, output = measured.observed[name], _OUTPUTS.get(name, name)
-    values, slopes = predicted.values[output], predicted.slopes.get(output)
-    if slopes is None:
-        slopes = np.zeros((0, *values.shape))
+def misfit(
+    name: str, measured: Measurements, predicted: Predicted
+) -> tuple[Float[np.ndarray, "p c"], Float[np.ndarray, "k p c"]]:
+    """Return model less measurement of a quantity, rows by components, and its derivatives.
+
+    Both are NaN where nothing was measured.
+    """
+    seen, output = measured.observed[name], OUTPUTS.get(name, name)
+    values = predicted.values[output]
+    slopes = predicted.slopes.get(output, np.zeros((0, *values.shape)))
     if name == "tip_rotation":
         return _turned(seen, values, slopes)
     if name == "tip_tension":
@@ -81,22 +80,19 @@ def misfit(name: str, measured: Measurements, predicted: Predicted) -> Misfit:
         tendons = np.arange(len(last))
         values, slopes = values[:, tendons, last], slopes[:, :, tendons, last]
     values = (values - seen).reshape(len(seen), -1)
-    return Misfit(values, slopes.reshape(len(slopes), *values.shape))
+    return values, slopes.reshape(len(slopes), *values.shape)
 
 
 def _turned(
     seen: Float[np.ndarray, "p 3"],
     rotation: Float[np.ndarray, "p 3 3"],
     slopes: Float[np.ndarray, "k p 3 3"],
-) -> Misfit:
-    """Rotation vectors from the measured to the model's orientation, and their slopes."""
+) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "k p 3"]]:
+    """Rotation vectors from the measured to the model's orientation, and their derivatives."""
     turned = Rotation.from_matrix(rotation) * Rotation.from_rotvec(np.nan_to_num(seen)).inv()
     vector = turned.as_rotvec()
     spin = slopes @ np.swapaxes(rotation, -1, -2)
     turn = np.stack([spin[..., 2, 1], spin[..., 0, 2], spin[..., 1, 0]], axis=-1)
     by_turn = np.linalg.inv(np.asarray(left_slope(constant(vector))))
     values = np.where(np.isnan(seen), np.nan, vector)
-    return Misfit(values, np.einsum("pij,kpj->kpi", by_turn, turn))
-
-
-__all__ = ["ANGLES", "LENGTHS", "Misfit", "Residuals", "misfit", "outputs_for"]
+    return values, np.einsum("pij,kpj->kpi", by_turn, turn)

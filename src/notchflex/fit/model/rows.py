@@ -1,7 +1,4 @@
-"""What a robot is predicted to do at every measured row, and how that changes with its numbers.
-
-Rows are steps of the forward model: each from rest, or those of each pull as one path.
-"""
+"""A robot at every measured row, as a function of some of its numbers, with derivatives."""
 
 from __future__ import annotations
 
@@ -14,28 +11,28 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._jax import constant
-from notchflex.analysis.axis_points import AxisPlaces, points_on_axis
+from notchflex.analysis.axis_points import AxisPlaces, axis_places, points_on_axis
 from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
 from notchflex.analysis.derivatives.numbers import slope
-from notchflex.fit.measurements.measurements import rows_of
+from notchflex.fit.measurements.measurements import Measurements, rows_of
 from notchflex.loads.load_path import LoadPath
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.newton import Settings
 
-SENSOR = ("sensor.force_offset", "sensor.stroke_slack")
-"""Numbers of the measurement itself: what a force gauge shows at no force (N), and the stroke that
-only takes up slack (mm)."""
+SENSOR = {"sensor.force_offset": "tension", "sensor.stroke_slack": "stroke"}
+"""Numbers of the measurement itself, and the command that each is subtracted from: what a force
+gauge shows at no force (N), and the stroke that only takes up slack (mm)."""
+
+# Outputs of the model that measured quantities are compared with, if of another name.
+OUTPUTS = {"tip_tension": "span_tension"}
 _BODIES = ("body_position", "body_rotation")
 
 
 class Predicted(NamedTuple):
-    """Outputs at every row, in the world.
+    """Outputs at every row, in the world, by name; rows are the leading axis.
 
-    Attributes:
-        values: By name, rows as leading axis.
-        converged: Whether the row was solved, (P,).
-        slopes: By name, numbers and then rows as leading axes.
+    `slopes` are derivatives, with the numbers in front; empty if a row was not solved.
     """
 
     values: dict[str, np.ndarray]
@@ -44,116 +41,106 @@ class Predicted(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """A robot under the loads of a measurement, as a function of some of its numbers.
+class Sample:
+    """Measurements of one robot, and the model of their rows.
 
     Attributes:
+        label: Label of the robot.
         robot: The robot as it is.
-        load: Loads of all rows.
-        paths: Rows of every path, in order, each path from rest.
+        measured: The measurements.
         names: Numbers that vary: of the robot by name, or of `SENSOR`.
-        outputs: What is predicted, by names of `EquilibriumPath`; "axis_points" for
-            those at `places`.
-        measured: Tension (N) or stroke (mm) as measured, rows by tendons; tensions may be those of
-            a gauge with an offset, below 0 too.
-        places: Points of the tube axis; None where none are asked.
-        settings: How hard the solver tries.
+        columns: Number of the constant that each of them is.
+        pulls: Pull of every row, counted over all measurements.
+        settings: Settings of the solver.
     """
 
+    label: str
     robot: Robot
-    load: LoadPath
-    paths: tuple[tuple[int, ...], ...]
+    measured: Measurements
     names: tuple[str, ...]
-    outputs: tuple[str, ...]
-    measured: Float[np.ndarray, "p t"]
-    places: AxisPlaces | None = None
-    settings: Settings = DEFAULT
+    columns: tuple[int, ...]
+    pulls: Int[np.ndarray, " p"]
+    settings: Settings
 
-    @cached_property
-    def own(self) -> tuple[str, ...]:
-        """Names of the robot's numbers among those that vary."""
-        return tuple(name for name in self.names if name not in SENSOR)
-
-    @cached_property
-    def model(self) -> ForwardModel:
-        """The model of these rows."""
-        starts = np.cumsum([0, *map(len, self.paths)])[:-1]
-        from_rest = np.isin(np.arange(len(self._order)), starts)
-        load = rows_of(self.load, self._order)
-        return ForwardModel(self.robot, load, self.settings, from_rest=from_rest)
-
-    def robot_with(self, numbers: Sequence[float] | np.ndarray) -> Robot:
-        """The robot with other numbers, in the order of `names`.
+    def robot_with(self, values: Float[np.ndarray, " k"]) -> Robot:
+        """Return the robot with other values of all constants.
 
         Raises:
-            InputError: No robot can have them.
+            InputError: The robot cannot have them.
         """
-        values = dict(zip(self.names, map(float, numbers), strict=True))
-        own = {name: values[name] for name in self.own}
-        return self.robot.with_values(own) if own else self.robot
+        numbers = zip(self.names, values[list(self.columns)].tolist(), strict=True)
+        of_robot = {name: value for name, value in numbers if name not in SENSOR}
+        return self.robot.with_values(of_robot) if of_robot else self.robot
 
-    def at(self, numbers: Float[np.ndarray, " k"]) -> Predicted:
-        """Outputs at every row, and their derivatives by all numbers.
-
-        Args:
-            numbers: In the order of `names`.
+    def predict(self, values: Float[np.ndarray, " k"]) -> Predicted:
+        """Return outputs at every row for values of all constants.
 
         Raises:
-            InputError: No robot can have these numbers.
+            InputError: The robot cannot have them.
         """
-        robot, load = self.robot_with(numbers), self._load(numbers)
-        path = self.model.solve(robot, load)
-        names = tuple(name for name in self.outputs if name != "axis_points")
-        if self.places is not None:
-            names = tuple(dict.fromkeys((*names, *_BODIES)))
-        values = {name: np.asarray(path.quantity(name)) for name in names}
+        robot, load = self.robot_with(values), self._load(values)
+        path = self._model.solve(robot, load)
+        names = [OUTPUTS.get(name, name) for name in self.measured.observed]
+        solved = tuple(name for name in names if name != "axis_points")
+        if self._places is not None:
+            solved = tuple(dict.fromkeys((*solved, *_BODIES)))
+        outputs = {name: np.asarray(path.quantity(name)) for name in solved}
         slopes: dict[str, np.ndarray] = {}
         if self.names and path.converged.all():
             changes = [self._change(path, load, name) for name in self.names]
-            slopes = self.model.derivatives(path, changes, names)
-        if self.places is not None:
-            places, bodies = self.places, [values[name] for name in _BODIES]
-            values["axis_points"] = _points(places, bodies)
+            slopes = self._model.derivatives(path, changes, solved)
+        if self._places is not None:
+            bodies = [outputs[name] for name in _BODIES]
+            outputs["axis_points"] = _points(self._places, bodies)
             if slopes:
                 moves = zip(*(slopes[name] for name in _BODIES), strict=True)
-                every = [_points_slope(places, bodies, move) for move in moves]
-                slopes["axis_points"] = np.stack(every)
+                along = [_points_slope(self._places, bodies, move) for move in moves]
+                slopes["axis_points"] = np.stack(along)
         back = np.argsort(self._order)
         return Predicted(
-            {name: values[name][back] for name in self.outputs},
+            {name: outputs[name][back] for name in names},
             path.converged[back],
-            {name: slopes[name][:, back] for name in self.outputs if name in slopes},
+            {name: slopes[name][:, back] for name in names if name in slopes},
         )
 
     @cached_property
     def _order(self) -> Int[np.ndarray, " p"]:
-        """Rows in the order in which they are solved, path by path."""
-        return np.concatenate([np.array(path) for path in self.paths])
-
-    def _load(self, numbers: Float[np.ndarray, " k"]) -> LoadPath:
-        """The loads that the robot had: the measured ones less what the sensor adds."""
-        load = self.model.load
-        given = dict(zip(self.names, numbers, strict=True))
-        for name, field in zip(SENSOR, ("tension", "stroke"), strict=True):
-            if name in given:
-                true = np.maximum(self._shown - given[name], 0.0)
-                load = replace(
-                    load, **{field: np.where(np.isnan(getattr(load, field)), np.nan, true)}
-                )
-        return load
+        """Rows in the order in which they are solved, pull by pull."""
+        number = [self.measured.pulls.index(label) for label in self.measured.pull]
+        return np.argsort(number, kind="stable")
 
     @cached_property
-    def _shown(self) -> Float[np.ndarray, "p t"]:
-        return self.measured[self._order]
+    def _model(self) -> ForwardModel:
+        labels = np.array(self.measured.pull)[self._order]
+        from_rest = np.append(True, labels[1:] != labels[:-1]) | self.measured.from_rest
+        load = rows_of(self.measured.load, self._order)
+        return ForwardModel(self.robot, load, self.settings, from_rest=from_rest)
+
+    @cached_property
+    def _places(self) -> AxisPlaces | None:
+        if "axis_points" not in self.measured.observed:
+            return None
+        return axis_places(self.robot, self.measured.axis_at)
+
+    def _load(self, values: Float[np.ndarray, " k"]) -> LoadPath:
+        """The loads of the robot: the measured ones less what the sensor adds."""
+        load, measured = self._model.load, self.measured
+        shown = {"tension": measured.measured_tension, "stroke": measured.load.stroke}
+        for name, column in zip(self.names, self.columns, strict=True):
+            if name in SENSOR:
+                command = SENSOR[name]
+                true = np.maximum(shown[command][self._order] - values[column], 0.0)
+                true = np.where(np.isnan(getattr(load, command)), np.nan, true)
+                load = replace(load, **{command: true})
+        return load
 
     def _change(self, path: EquilibriumPath, load: LoadPath, name: str) -> Change:
         if name not in SENSOR:
-            return self.model.change(path.robot, load, name)
-        field = "tension" if name == SENSOR[0] else "stroke"
-        value = getattr(load, field)
+            return self._model.change(path.robot, load, name)
+        value = getattr(load, SENSOR[name])
         # Loads are linear in tension and stroke; below 0 N the robot has none.
-        more = replace(load, **{field: np.where(value > 0.0, value + 1.0, value)})
-        return Change(-self.model.load_change(path, more), None)
+        more = replace(load, **{SENSOR[name]: np.where(value > 0.0, value + 1.0, value)})
+        return Change(-self._model.load_change(path, more), None)
 
 
 def _points(places: AxisPlaces, bodies: Sequence[np.ndarray]) -> Float[np.ndarray, "p m 3"]:
@@ -168,10 +155,7 @@ def _points_slope(
     size = max(float(np.max(np.abs(one))) for one in move) or 1.0
 
     def points(part: float) -> np.ndarray:
-        moved = [at + part / size * by for at, by in zip(bodies, move, strict=True)]
+        moved = [pose + part / size * change for pose, change in zip(bodies, move, strict=True)]
         return _points(places, moved)
 
     return size * slope(points, 0.0)
-
-
-__all__ = ["SENSOR", "Predicted", "Rows"]

@@ -1,42 +1,21 @@
-"""All measurements of a fit, and the model's rows that go with them."""
+"""All measurements of a fit as one list of residuals."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.analysis.axis_points import AxisPlaces, axis_places
 from notchflex.errors import InputError
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import Unknown
-from notchflex.fit.model.residuals import Residuals, misfit, outputs_for
-from notchflex.fit.model.rows import Rows
+from notchflex.fit.model.residuals import Residuals, misfit
+from notchflex.fit.model.rows import Sample
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """One measurement of one robot, and the rows of the model that go with it.
-
-    Attributes:
-        label: The robot's.
-        robot: The robot as it is.
-        measured: What was measured.
-        rows: The model.
-        columns: Which constant each number of `rows` is.
-        pulls: Which pull each row belongs to, counted over all measurements.
-    """
-
-    label: str
-    robot: Robot
-    measured: Measurements
-    rows: Rows
-    columns: tuple[int, ...]
-    pulls: tuple[int, ...]
 
 
 @dataclass(eq=False)
@@ -44,11 +23,11 @@ class Samples:
     """All measurements of a fit.
 
     Attributes:
-        every: One per measurement.
+        every: The measurements, with their models.
         unknowns: The constants.
-        solves: How many rows were solved so far.
-        failed: Rows that were not solved in the last try: measurement and row.
-        refused: Why no robot could have the values of the last try, "" where one could.
+        solves: Number of rows solved so far.
+        failed: Rows that were not solved at the last values: source and row.
+        refused: Why no robot can have the last values, "" if it can.
     """
 
     every: tuple[Sample, ...]
@@ -65,121 +44,88 @@ class Samples:
         unknowns: tuple[Unknown, ...],
         settings: Settings | None = None,
     ) -> Samples:
-        """Lay out all measurements of all robots."""
+        """Collect all measurements of all robots."""
         every: list[Sample] = []
         pulls = 0
         for label, robot in robots.items():
-            mine = [
-                (number, path)
-                for number, unknown in enumerate(unknowns)
+            numbers = [
+                (path, column)
+                for column, unknown in enumerate(unknowns)
                 for owner, path in unknown.sets
                 if owner == label
             ]
+            names = tuple(path for path, _ in numbers)
+            columns = tuple(column for _, column in numbers)
             for measured in measurements[label]:
-                labels = {pull: number for number, pull in enumerate(dict.fromkeys(measured.pull))}
-                own = tuple(pulls + labels[pull] for pull in measured.pull)
-                pulls += len(labels)
-                by_stroke = ~np.isnan(measured.load.stroke)
-                rows = Rows(
-                    robot=robot,
-                    load=measured.load,
-                    paths=_paths(measured),
-                    names=tuple(path for _, path in mine),
-                    outputs=outputs_for(tuple(measured.observed)),
-                    measured=np.where(by_stroke, measured.load.stroke, measured.measured_tension),
-                    places=_places(robot, measured),
-                    settings=settings or DEFAULT,
+                pull = pulls + np.array([measured.pulls.index(one) for one in measured.pull])
+                pulls += len(measured.pulls)
+                every.append(
+                    Sample(label, robot, measured, names, columns, pull, settings or DEFAULT)
                 )
-                columns = tuple(number for number, _ in mine)
-                every.append(Sample(label, robot, measured, rows, columns, own))
         return cls(tuple(every), unknowns)
+
+    def of_robot(self, label: str) -> list[Measurements]:
+        """Return the measurements of a robot."""
+        return [one.measured for one in self.every if one.label == label]
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """What was measured."""
+        """The measured quantities."""
         return tuple(dict.fromkeys(name for one in self.every for name in one.measured.observed))
 
     def residuals(self, values: Float[np.ndarray, " k"]) -> Residuals | None:
-        """Model less measurement; None where a robot cannot be, or rows have no solution."""
+        """Return model less measurement; None if no robot has the values, or a row is unsolved."""
         self.failed, self.refused = [], ""
-        parts: list[dict[str, np.ndarray]] = []
-        for number, sample in enumerate(self.every):
-            own = np.asarray(values, float)[list(sample.columns)]
+        residuals: list[np.ndarray] = []
+        slopes: list[np.ndarray] = []
+        for sample in self.every:
             try:
-                predicted = sample.rows.at(own)
+                predicted = sample.predict(np.asarray(values, float))
             except InputError as problem:
                 self.refused = str(problem)
                 return None
             self.solves += len(predicted.converged)
-            rows = np.flatnonzero(~predicted.converged)
-            self.failed += [(sample.measured.source, int(row)) for row in rows]
+            unsolved = np.flatnonzero(~predicted.converged).tolist()
+            self.failed += [(sample.measured.source, row) for row in unsolved]
             if self.failed:
                 continue
-            for name in sample.measured.observed:
-                found = misfit(name, sample.measured, predicted)
-                parts.append(self._laid_out(number, sample, name, found.values, found.slopes))
+            for name, seen in sample.measured.observed.items():
+                known = np.isfinite(seen).reshape(len(seen), -1)
+                off, by_numbers = misfit(name, sample.measured, predicted)
+                residuals.append(off[known])
+                by_constants = np.zeros((len(residuals[-1]), len(self.unknowns)))
+                by_constants[:, list(sample.columns)] = by_numbers[:, known].T
+                slopes.append(by_constants)
         if self.failed:
             return None
-        return self._joined(parts)
+        return Residuals(np.concatenate(residuals), np.concatenate(slopes), **self._layout)
 
-    def _laid_out(
-        self,
-        number: int,
-        sample: Sample,
-        name: str,
-        values: np.ndarray,
-        slopes: np.ndarray,
-    ) -> dict[str, np.ndarray]:
-        """One quantity of one measurement as a list of numbers; what was not measured goes."""
-        known = np.isfinite(values)
-        row, part = np.nonzero(known)
-        count = len(row)
+    @cached_property
+    def _layout(self) -> dict[str, np.ndarray]:
+        """What each measured number belongs to."""
         labels = list(dict.fromkeys(one.label for one in self.every))
-        sides = 3 if name in ("tip_position", "axis_points") else 1
-        width = -(-values.shape[1] // sides)
-        total = sum(len(one.measured.pull) for one in self.every if one.label == sample.label)
-        given = np.full(values.shape, np.nan)
-        if name in sample.measured.deviation:
-            given = sample.measured.deviation[name].reshape(values.shape)
-        every = np.zeros((count, len(self.unknowns)))
-        every[:, list(sample.columns)] = slopes[:, known].T
-        return {
-            "values": values[known],
-            "slopes": every,
-            "sample": np.full(count, number),
-            "robot": np.full(count, labels.index(sample.label)),
-            "row": row,
-            "quantity": np.full(count, OBSERVED.index(name)),
-            "part": part,
-            "pull": np.array(sample.pulls, int)[row],
-            "point": row * width + part // sides,
-            "rows": np.full(count, total),
-            "given": given[known],
-        }
-
-    def _joined(self, parts: list[dict[str, np.ndarray]]) -> Residuals:
-        points = 0
-        for part in parts:
-            part["point"] = part["point"] + points
-            points = int(part["point"].max(initial=points - 1)) + 1
-        joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-        # Numbered without gaps, so that groups can be counted.
-        joined["point"] = np.unique(joined["point"], return_inverse=True)[1]
-        return Residuals(**joined)
-
-
-def _places(robot: Robot, measured: Measurements) -> AxisPlaces | None:
-    if "axis_points" not in measured.observed:
-        return None
-    return axis_places(robot, measured.axis_at)
-
-
-def _paths(measured: Measurements) -> tuple[tuple[int, ...], ...]:
-    """Rows of every path: each alone where all are from rest, else those of each pull."""
-    rows = range(len(measured.pull))
-    if measured.from_rest:
-        return tuple((row,) for row in rows)
-    return tuple(tuple(row for row in rows if measured.pull[row] == one) for one in measured.pulls)
-
-
-__all__ = ["Sample", "Samples"]
+        parts: list[dict[str, np.ndarray]] = []
+        for number, sample in enumerate(self.every):
+            total = sum(map(len, self.of_robot(sample.label)))
+            for name, seen in sample.measured.observed.items():
+                known = np.isfinite(seen)
+                row, part = np.nonzero(known.reshape(len(seen), -1))
+                deviation = sample.measured.deviation.get(name, np.full(seen.shape, np.nan))
+                same = {
+                    "sample": number,
+                    "robot": labels.index(sample.label),
+                    "quantity": OBSERVED.index(name),
+                    "rows": total,
+                }
+                parts.append(
+                    {key: np.full(len(row), value) for key, value in same.items()}
+                    | {"row": row, "part": part, "pull": sample.pulls[row]}
+                    | {"point": part // 3 if name in ("tip_position", "axis_points") else part}
+                    | {"given": deviation[known]}
+                )
+        layout = {key: np.concatenate([one[key] for one in parts]) for key in parts[0]}
+        # Number the points of all measurements without gaps.
+        levels = [layout[key] for key in ("sample", "quantity", "row", "point")]
+        points = np.ravel_multi_index(levels, [int(one.max(initial=0)) + 1 for one in levels])
+        layout["point"] = np.unique(points, return_inverse=True)[1]
+        return layout

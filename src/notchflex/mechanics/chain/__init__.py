@@ -3,6 +3,7 @@
 from notchflex.mechanics.chain.chain import Chain, Shaped, assemble, flexure_states, laws, shape_of
 from notchflex.mechanics.chain.pad import padded
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
+from notchflex.mechanics.chain.sites import sites_of
 from notchflex.mechanics.chain.structure import structural
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "laws",
     "padded",
     "shape_of",
+    "sites_of",
     "structural",
     "tendons_in_plane",
 ]

@@ -13,10 +13,12 @@ from notchflex._jax import constant, jax, jnp
 from notchflex._pytree import Pytree, static
 from notchflex.mechanics.chain.mass import body_lengths, body_masses
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
+from notchflex.mechanics.chain.sites import sites_of
 from notchflex.mechanics.contact import ContactGroup, build_contacts
 from notchflex.mechanics.flexure import (
     FlexureState,
     Rod,
+    Site,
     fibre_stretch,
     flattened,
     flexure_state,
@@ -61,6 +63,8 @@ class Chain(Pytree):
         elastic: Stiffness of the modes of each flexure against each other, N mm, where the
             material is linear; None where the law of the material must be asked.
         contact_stiffness: Stiffness of each notch at its lips in the free robot, N/mm.
+        contact_flexibility: Flexibility of the lips of each closed notch, mm/N; None where all are
+            rigid.
         closing_force: Force that would close a notch by that stiffness, mean of all, N.
         stroke_stiffness: How fast the tension of a tendon answers its stroke, roughly, N/mm.
         frame: Rotation from the frame in which flexures, tendons and lips are given to that of the
@@ -90,6 +94,7 @@ class Chain(Pytree):
     stiffness: Float[Array, "n modes"]
     elastic: Float[Array, "n modes modes"] | None
     contact_stiffness: Float[Array, " n"]
+    contact_flexibility: Float[Array, " n"] | None
     closing_force: Float[Array, ""]
     stroke_stiffness: Float[Array, ""]
     frame: Float[Array, "3 3"] | None
@@ -203,12 +208,15 @@ def laws(part: Material | Friction, shaped: Shaped) -> dict[str, Any]:
     law = section_law(part)
     elastic = _elastic(shaped.alike, law)[shaped.which]
     stiffness = np.einsum("nmm->nm", elastic)
+    stop = shaped.rods.stop_flexibility
+    linear = law.is_linear and not shaped.alike.section.softens
     contact_stiffness = 1.0 / np.sum(shaped.lip_slope / stiffness, axis=-1)
     return {
         "law": law,
         "stiffness": constant(stiffness),
-        "elastic": constant(elastic) if law.is_linear else None,
+        "elastic": constant(elastic) if linear else None,
         "contact_stiffness": constant(contact_stiffness),
+        "contact_flexibility": None if stop is None else constant(stop / contact_stiffness),
         "closing_force": constant(contact_stiffness @ shaped.height / len(contact_stiffness)),
         "stroke_stiffness": constant(contact_stiffness.sum() / len(contact_stiffness) ** 2),
     }
@@ -243,7 +251,8 @@ class Shaped(NamedTuple):
 def shape_of(robot: Robot, level: str, refinement: int) -> Shaped:
     """What of a robot's chain follows from its shape alone."""
     chord = robot.friction.turns_with_chord
-    return _shaped(robot.tube, robot.notches, robot.tendon, level, refinement, chord)
+    sites = sites_of(robot)
+    return _shaped(robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord)
 
 
 # A search for constants of the material or of friction assembles one shape hundreds of times.
@@ -251,17 +260,19 @@ def shape_of(robot: Robot, level: str, refinement: int) -> Shaped:
 def _shaped(
     tube: Tube,
     notches: tuple[Notch, ...],
+    sites: tuple[Site | None, ...],
     tendons: tuple[Tendon, ...],
     level: str,
     refinement: int,
     turns_with_chord: bool,
 ) -> Shaped:
     # Notches that are alike are worked out once.
-    unlike = {notch: _flexure(notch, tube, level, refinement) for notch in dict.fromkeys(notches)}
+    placed = tuple(zip(notches, sites, strict=True))
+    unlike = {each: _flexure(*each, tube, level, refinement) for each in dict.fromkeys(placed)}
     own_rods, free_poses = zip(*unlike.values(), strict=True)
     alike = stack(own_rods)
-    number = {notch: index for index, notch in enumerate(unlike)}
-    which = [number[notch] for notch in notches]
+    number = {each: index for index, each in enumerate(unlike)}
+    which = [number[each] for each in placed]
     rods = jax.tree.map(lambda leaf: leaf[which], alike)
     body_length = constant(body_lengths(tube, notches))
     lead = body_length[:-1, None] * _UP
@@ -286,9 +297,13 @@ def _shaped(
 
 
 @lru_cache(maxsize=512)
-def _flexure(notch: Notch, tube: Tube, level: str, refinement: int) -> tuple[Rod, Motion]:
+def _flexure(
+    notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int
+) -> tuple[Rod, Motion]:
     """A flexure and its pose in the free robot."""
-    made = with_level(rod(notch, tube, refinement), level)
+    # Kinds whose ends are rigid need not know of sites.
+    whole = rod(notch, tube, refinement) if site is None else rod(notch, tube, refinement, site)
+    made = with_level(whole, level)
     return made, free_pose(made)
 
 

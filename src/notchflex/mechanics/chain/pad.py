@@ -78,6 +78,7 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         stiffness=np.concatenate([chain.stiffness, np.ones((more, chain.stiffness.shape[1]))]),
         elastic=None if chain.elastic is None else _elastic(chain.elastic, more),
         contact_stiffness=longer(chain.contact_stiffness),
+        contact_flexibility=jax.tree.map(longer, chain.contact_flexibility),
         notch_frame=longer(chain.notch_frame),
         contacts=contacts,
     )

@@ -4,7 +4,7 @@ from notchflex._packages import import_all
 from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.plane import flattened
-from notchflex.mechanics.flexure.registry import rod
+from notchflex.mechanics.flexure.registry import Site, rod
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.rod_kinematics import (
     free_pose,
@@ -31,6 +31,7 @@ __all__ = [
     "Elastica",
     "FlexureState",
     "Rod",
+    "Site",
     "elastica",
     "fibre_slope",
     "fibre_stretch",

@@ -5,12 +5,19 @@ h there; s = h - ybar theta at the tube axis (eq. 3) and the closing angle h / (
 Under a tendon alone its moment is constant, so one mode of bending is exact and its amplitude is
 the elastic angle. Other loads add a linear part of bending, both for the strong axis, and torsion
 about the shear centre. Shear and stretch, small in a short arc, are left out.
+
+With elastic ends (`ends = "shell"`) the compliance of the rings is spread over the arc, and the
+neutral axis moves to where an axial force and bending do not couple.
 """
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
+from notchflex._jax import constant
+from notchflex.mechanics.ends import NotchStiffness, notch_stiffness
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
     NeutralAxis,
@@ -20,16 +27,35 @@ from notchflex.mechanics.flexure.notch_rod import (
     shifted,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import rod
+from notchflex.mechanics.flexure.registry import Site, rod
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import SECTION_OF_CUT
 from notchflex.robot import ArcNotch, Tube
 
+# Part of the end compliance that follows the material beyond its elastic limit (finite elements).
+MATERIAL_SHARE = 0.25
+
 
 @rod.register
-def _(notch: ArcNotch, tube: Tube, refinement: int = 0) -> Rod:
-    cut = SECTION_OF_CUT[notch.cut](tube.outer_radius, tube.inner_radius, notch.depth)
-    section, centroid = about_neutral_axis(cut), float(cut.centroid)
+def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
+    shape = tube.outer_radius, tube.inner_radius, notch.section_depth(tube)
+    cut = SECTION_OF_CUT[notch.cut](*shape)
+    centroid, section = float(cut.centroid), about_neutral_axis(cut)
+    closure, stop = tube.outer_radius + centroid, 0.0
+    if site is not None:
+        outer, inner, depth = shape
+        law = notch_stiffness(
+            outer, inner, notch.cut, depth, notch.height,
+            site.poisson_ratio, site.proximal, site.distal,
+        )  # fmt: skip
+        if notch.closing == "elastic":
+            closure, stop = closure / law.closing_factor, 1.0 / law.closed_ratio
+        if notch.ends == "shell":
+            centroid -= law.coupling / law.weak
+            centre = constant(law.shear_centre - centroid)
+            ends = _ends(law, notch.height)
+            section = dataclasses.replace(section, shear_centre=centre, ends=ends)
     # Smooth all along: one piece, with a node in its middle. With six nodes a notch that bends by a
     # radian in its plane is right to 1e-15; the turns of one that also bends sideways and twists
     # need ten for 3e-8.
@@ -39,5 +65,19 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0) -> Rod:
     modes = legendre_modes(points, bending, bending, twist, tendon_modes=1, shear_centre=centre)
     free = STRAIGHT + np.radians(notch.precurvature_deg) * modes.basis[..., 0]
     axis = NeutralAxis(points, start=shifted(-centroid), end=shifted(centroid), strain=free)
-    closure = tube.outer_radius + centroid
-    return build_rod(axis, section, modes, closure, direction_deg=notch.direction_deg)
+    return build_rod(
+        axis, section, modes, closure, stop_flexibility=stop, direction_deg=notch.direction_deg
+    )
+
+
+def _ends(stiffness: NotchStiffness, height: float) -> NotchEnds:
+    """Refer the effective lengths and the softening to the arc, over which they are spread."""
+    return NotchEnds(
+        weak=constant(stiffness.weak / height - 1.0),
+        strong=constant(stiffness.strong / height - 1.0),
+        axial=constant(stiffness.axial / height - 1.0),
+        torsion=constant(stiffness.torsion / height - 1.0),
+        odd=constant(0.5 * stiffness.alpha * height),
+        even=constant(0.5 * stiffness.beta * height**2),
+        material_share=constant(MATERIAL_SHARE),
+    )

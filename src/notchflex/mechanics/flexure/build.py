@@ -11,6 +11,7 @@ from jaxtyping import Array
 
 from notchflex._jax import constant, jax
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.material import NotchEnds
 
 LEVELS = ("tendons", "plane", "space")
 """For which loads a chain is assembled: tendons alone, loads in the plane of bending, or any."""
@@ -53,15 +54,25 @@ def stack(rods: Sequence[Rod]) -> Rod:
     nodes = max(rod.length.shape[0] for rod in rods)
     poses = max(rod.step.shape[0] for rod in rods)
     levels = tuple(max(rod.levels[i] for rod in rods) for i in range(3))
+    if any(rod.section.ends is not None for rod in rods):
+        rods = [_with_ends(rod) for rod in rods]
     filled = [_filled(rod, modes, nodes, poses, levels) for rod in rods]
     unused: dict[str, Any] = {
         name: None
-        for name in ("linear_kinematics", "chord")
+        for name in ("linear_kinematics", "chord", "stop_flexibility")
         if not any(np.any(getattr(rod, name)) for rod in filled)
     }
     used = [dataclasses.replace(rod, **unused) if unused else rod for rod in filled]
     together: Rod = jax.tree.map(lambda *leaves: _stacked(np.stack(leaves)), *used)
     return together
+
+
+def _with_ends(rod: Rod) -> Rod:
+    """The rod with ends, rigid ones where it has none."""
+    if rod.section.ends is not None:
+        return rod
+    ends = NotchEnds.rigid(rod.section.area)
+    return dataclasses.replace(rod, section=dataclasses.replace(rod.section, ends=ends))
 
 
 def _stacked(values: np.ndarray) -> Array:

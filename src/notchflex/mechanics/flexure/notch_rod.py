@@ -7,6 +7,8 @@ to the notch's direction and fills the arrays of a `Rod`.
 
 from __future__ import annotations
 
+import dataclasses
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -117,6 +119,7 @@ def build_rod(
     modes: StrainModes,
     closure: float | None = None,
     *,
+    stop_flexibility: float = 0.0,
     direction_deg: float = 0.0,
     linear_kinematics: bool = False,
     has_chord: bool = False,
@@ -130,6 +133,7 @@ def build_rod(
         closure: Distance across the section, from the neutral axis toward the cut, of the fibre
             that has no length left when the notch is closed, mm. None where the notch has no solid
             spine: then the edges of its openings (`Notch.openings`) meet.
+        stop_flexibility: Flexibility of the closed notch over that of the open one.
         direction_deg: Side toward which the notch bends, deg.
         linear_kinematics: Whether displacements are proportional to the strains.
         has_chord: Whether the angle of the chord from start to end is an output (Liu 2022).
@@ -148,9 +152,10 @@ def build_rod(
         curve, curve_end = (Motion(*(part[at] for part in axis.curve)) for at in (slice(-1), -1))
         beside = None
 
-    def at_nodes(values: Array) -> Array:
+    def at_nodes(values: Array, own_axes: int = 0) -> Array:
         each = np.asarray(values)
-        return constant(np.full(nodes, each) if each.ndim == 0 else each[:nodes])
+        alike = each.ndim == own_axes
+        return constant(np.broadcast_to(each, (nodes, *each.shape)) if alike else each[:nodes])
 
     return Rod(
         start_rotation=constant(turned @ axis.start.rotation),
@@ -161,9 +166,13 @@ def build_rod(
         end_offset=constant(axis.end.translation),
         **points.fields(curve, modes.basis, beside),
         reference_strain=constant(strain[:nodes]),
-        section=jax.tree.map(at_nodes, section),
+        section=dataclasses.replace(
+            jax.tree.map(at_nodes, dataclasses.replace(section, fibres=None)),
+            fibres=jax.tree.map(partial(at_nodes, own_axes=1), section.fibres),
+        ),
         closure=constant([closure or 0.0, 0.0]),
         has_closure=constant(float(closure is not None)),
+        stop_flexibility=constant(stop_flexibility),
         linear_kinematics=constant(float(linear_kinematics)),
         chord=constant(float(has_chord)),
         padding_mask=constant(np.zeros(modes.basis.shape[-1])),

@@ -7,20 +7,36 @@ the package imports every file of the folder, so no list is kept.
 from __future__ import annotations
 
 from functools import singledispatch
-from typing import Any
+from typing import Any, NamedTuple
 
+from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.robot import Tube
 
 
+class Site(NamedTuple):
+    """What surrounds a notch whose ends are elastic.
+
+    Attributes:
+        proximal: The ring toward the base.
+        distal: The ring toward the tip.
+        poisson_ratio: Poisson's ratio of the tube.
+    """
+
+    proximal: Side
+    distal: Side
+    poisson_ratio: float
+
+
 @singledispatch
-def rod(notch: Any, tube: Tube, refinement: int = 0) -> Rod:
+def rod(notch: Any, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
     """Rod of one notch.
 
     Args:
         notch: A notch description, such as `notchflex.ArcNotch(...)`.
         tube: The tube it is cut into.
         refinement: 0 has the modes that serve for usual loads; 1, 2 ... has more.
+        site: What surrounds it, where its ends are elastic (`Notch.has_elastic_ends`).
 
     Returns:
         The rod, in mm and rad.
@@ -28,7 +44,7 @@ def rod(notch: Any, tube: Tube, refinement: int = 0) -> Rod:
     Raises:
         TypeError: There is no rod for this kind of description.
     """
-    del tube, refinement
+    del tube, refinement, site
     raise TypeError(
         f"no rod is registered for a notch of type {type(notch).__name__}; "
         "add one to notchflex/mechanics/flexure with @rod.register"

@@ -15,7 +15,7 @@ from __future__ import annotations
 from jaxtyping import Array, Float, Int
 
 from notchflex._pytree import Pytree, static
-from notchflex.mechanics.material.law import FibreSection
+from notchflex.mechanics.material.fibre_section import FibreSection
 
 
 class Rod(Pytree):
@@ -46,6 +46,8 @@ class Rod(Pytree):
         closure: Where a notch with a solid spine closes, across the section from the neutral axis
             (x, y): the fibre that has no length left when the lips meet.
         has_closure: 1 where there is such a fibre, 0 where the notch closes otherwise.
+        stop_flexibility: Flexibility of the closed notch over that of the open one; 0 is a rigid
+            stop, None where all are rigid.
         linear_kinematics: 1 where displacements are proportional to the strains (small deflection);
             None where no flexure of a chain asks for it, so that nothing is computed for it.
         chord: 1 where the angle of the chord from start to end is of interest (Liu 2022); None
@@ -74,6 +76,7 @@ class Rod(Pytree):
     section: FibreSection
     closure: Float[Array, "*n 2"]
     has_closure: Float[Array, "*n"]
+    stop_flexibility: Float[Array, "*n"] | None
     linear_kinematics: Float[Array, "*n"] | None
     chord: Float[Array, "*n"] | None
     padding_mask: Float[Array, "*n modes"]

@@ -1,8 +1,9 @@
 """Materials: how a cross-section answers strain."""
 
 from notchflex._packages import import_all
-from notchflex.mechanics.material.law import FibreSection, Response, SectionLaw, section_law
+from notchflex.mechanics.material.fibre_section import Fibres, FibreSection, NotchEnds
+from notchflex.mechanics.material.law import Response, SectionLaw, section_law
 
 import_all(__name__, __path__)
 
-__all__ = ["FibreSection", "Response", "SectionLaw", "section_law"]
+__all__ = ["FibreSection", "Fibres", "NotchEnds", "Response", "SectionLaw", "section_law"]

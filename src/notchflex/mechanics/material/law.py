@@ -4,45 +4,28 @@ A law lives in a file of its own in this folder and registers itself for its des
 `section_law.register`; the package imports every file of the folder, so no list is kept.
 
 Every material answers the same question for one cross-section of a flexure, so the chain never
-asks which material it is. Memory is there for materials whose answer depends on the past; the
-two laws of today have none and hand it back untouched.
+asks which material it is. A law says how the bending moment follows the curvature; the rest is
+linear, and the ends of the notch are added here, for all laws alike:
+
+    s = kappa / q,   (1 + c w) k + (1 - c) w Phi(k) / (E I) = s,   M = Phi(k) / q
+
+with the curvature k of the section itself, its moment Phi(k), the end compliance w of which a
+share c follows the material, and the flattening q.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
-from functools import singledispatch
+from functools import partial, singledispatch
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
 
-from notchflex._jax import array_module, constant, jax
+from notchflex._jax import array_module, constant, jax, jnp
 from notchflex._pytree import Pytree
-
-
-class FibreSection(Pytree):
-    """What a law needs of a cross-section, about its neutral axis. Units mm.
-
-    The section's x points to the cut side, z along the rod. Leading axes are allowed.
-
-    Attributes:
-        area: Area, mm^2.
-        second_moment_weak: Second moment for bending that closes the notch (about y), mm^4.
-        second_moment_strong: Second moment for sideways bending (about x), mm^4.
-        torsion_constant: Torsion constant, mm^4.
-        shear_centre: Distance of the shear centre from the neutral axis toward the spine, mm.
-        edge_spine: Distance of the outer fibre on the spine from the neutral axis, mm.
-        edge_near: Distance of the farthest fibre on the cut side, mm.
-    """
-
-    area: Float[Array, "*shape"]
-    second_moment_weak: Float[Array, "*shape"]
-    second_moment_strong: Float[Array, "*shape"]
-    torsion_constant: Float[Array, "*shape"]
-    shear_centre: Float[Array, "*shape"]
-    edge_spine: Float[Array, "*shape"]
-    edge_near: Float[Array, "*shape"]
+from notchflex.mechanics.material.fibre_section import FibreSection, NotchEnds
 
 
 class Response(NamedTuple):
@@ -57,28 +40,109 @@ class Response(NamedTuple):
     memory: Any
 
 
+class Bending(NamedTuple):
+    """A section between its ends, bent about the weak axis.
+
+    Attributes:
+        curvature: Curvature of the section itself, beyond that of the free tube, 1/mm.
+        moment: Its moment, N mm.
+        memory: The memory after it.
+    """
+
+    curvature: Float[Array, ""]
+    moment: Float[Array, ""]
+    memory: Any
+
+
+# Of all strains and resultants those of weak-axis bending.
+_WEAK = np.arange(6) == 1
+_POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
+NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
+"""Gauss's rule on 0 ... 1."""
+# When the search for the curvature between the ends stops: its last step, as a part, and tries.
+_CURVATURE_ERROR, _MOST_TRIES = 1e-12, 60
+
+
 class SectionLaw(Pytree, ABC):
     """A material as the chain sees it. Tangents come from the resultants by differentiation.
 
     Attributes:
-        is_linear: Whether `stiffness` says all: what modes resist with is then summed up once.
+        is_linear: Whether the moment of a section is proportional to its curvature.
+        elastic_modulus: Young's modulus in the free robot, MPa.
+        shear_modulus: Shear modulus, MPa.
     """
 
     is_linear: ClassVar[bool] = False
+    elastic_modulus: Float[Array, ""]
+    shear_modulus: Float[Array, ""]
 
     @abstractmethod
+    def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
+        """Moment of a section without ends at a curvature about its weak axis, N mm."""
+
+    @abstractmethod
+    def bending_energy(
+        self, curvature: Float[Array, ""], section: FibreSection, memory: Any
+    ) -> Float[Array, ""]:
+        """Energy that a section without ends holds per length at a curvature, N mm/mm."""
+
+    def bent(self, reduced: Float[Array, ""], section: FibreSection, memory: Any) -> Bending:
+        """Bend a section between its ends by s = kappa / q; for laws without memory."""
+        if section.ends is None:
+            curvature = reduced
+        elif self.is_linear:
+            curvature = reduced / (1.0 + section.ends.weak)
+        else:
+            curvature = _between_ends(self, section, reduced)
+        return Bending(curvature, self.moment(curvature, section), memory)
+
     def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
         """Resultants of a cross-section under given strains (beyond those of the free tube)."""
+        elastic = elastic_resultants(self.elastic_modulus, self.shear_modulus, section, strain)
+        q = 1.0 if section.ends is None else section.ends.flattening(strain[1])
+        bending = self.bent(strain[1] if section.ends is None else strain[1] / q, section, memory)
+        moment = bending.moment if section.ends is None else bending.moment / q
+        return Response(jnp.where(_WEAK, moment, elastic), bending.memory)
 
-    @abstractmethod
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Energy stored per length under given strains, N mm/mm."""
+        """Energy stored per length under given strains, N mm/mm.
 
-    @abstractmethod
+        The area under the moment over the curvature, and the elastic rest. Of a law with
+        hysteresis it is what fibres, ends and flattening hold; the rest of the area is dissipated.
+        """
+        elastic = elastic_resultants(self.elastic_modulus, self.shear_modulus, section, strain)
+        others = 0.5 * jnp.where(_WEAK, 0.0, elastic) @ strain
+        ends, curvature = section.ends, strain[1]
+        if ends is None:
+            return others + self.bending_energy(curvature, section, memory)
+        bending = self.bent(curvature / ends.flattening(curvature), section, memory)
+        held = (1.0 + ends.material_share * ends.weak) * self.bending_energy(
+            bending.curvature, section, memory
+        )
+        rigidity = self.elastic_modulus * section.second_moment_weak
+        held += 0.5 * (1.0 - ends.material_share) * ends.weak * bending.moment**2 / rigidity
+        return others + held + self._flattening_energy(curvature, section, ends)
+
+    def _flattening_energy(
+        self, curvature: Float[Array, ""], section: FibreSection, ends: NotchEnds
+    ) -> Float[Array, ""]:
+        """Work of the moment beyond that on fibres and ends: of Phi kappa q' / q^2 over kappa."""
+
+        def add(total: Array, node: Array) -> tuple[Array, None]:
+            at = node[0] * curvature
+            q, slope = ends.flattening(at), ends.odd + 2.0 * ends.even * at
+            moment = self.bent(at / q, section, ()).moment
+            return total + node[1] * curvature * moment * at * slope / q**2, None
+
+        return jax.lax.scan(
+            add, jnp.zeros_like(curvature), constant(np.stack([NODES, WEIGHTS], -1))
+        )[0]
+
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Resultants per strain in the free robot, of a section or of many."""
+        return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
 
     def tangent(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
@@ -87,13 +151,56 @@ class SectionLaw(Pytree, ABC):
         return jax.jacfwd(lambda varied: self.respond(varied, section, memory).resultants)(strain)
 
 
+def _imbalance(law: SectionLaw, section: FibreSection, reduced: Array, curvature: Array) -> Array:
+    """What a section of a curvature and its ends bend beyond s together."""
+    ends = section.ends
+    assert ends is not None
+    elastic = law.moment(curvature, section) / (law.elastic_modulus * section.second_moment_weak)
+    share = ends.material_share
+    return (1.0 + share * ends.weak) * curvature + (1.0 - share) * ends.weak * elastic - reduced
+
+
+def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Float[Array, ""]:
+    """Curvature of a section between its ends: Newton's method, kept within bounds.
+
+    The last step alone is differentiated, from a point that is held still.
+    """
+    still = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced))
+    ends, aim = still[1].ends, still[2]
+
+    def slope(curvature: Array) -> tuple[Array, Array]:
+        return jax.jvp(partial(_imbalance, *still), (curvature,), (jnp.ones_like(curvature),))
+
+    def proceed(search: tuple[Array, ...]) -> Array:
+        curvature, _, _, step, tries = search
+        return (jnp.abs(step) > _CURVATURE_ERROR * jnp.abs(curvature)) & (tries < _MOST_TRIES)
+
+    def iterate(search: tuple[Array, ...]) -> tuple[Array, ...]:
+        curvature, least, most, _, tries = search
+        beyond, by = slope(curvature)
+        least, most = (
+            jnp.where(beyond < 0.0, curvature, least),
+            jnp.where(beyond > 0.0, curvature, most),
+        )
+        new = curvature - beyond / by
+        new = jnp.where((new >= least) & (new <= most), new, 0.5 * (least + most))
+        return new, least, most, new - curvature, tries + 1
+
+    # A section that carries nothing leaves the whole curvature to the part that follows it.
+    far, none = aim / (1.0 + ends.material_share * ends.weak), jnp.zeros_like(aim)
+    start = aim / (1.0 + ends.weak)
+    begin = start, jnp.minimum(far, none), jnp.maximum(far, none), start, jnp.zeros((), int)
+    found = jax.lax.while_loop(proceed, iterate, begin)[0]
+    return found - _imbalance(law, section, reduced, found) / slope(found)[1]
+
+
 def elastic_resultants(
     elastic_modulus: float | Array,
     shear_modulus: float | Array,
     section: FibreSection,
     strain: Float[Array, " 6"],
 ) -> Float[Array, "*shape 6"]:
-    """Resultants of a linear elastic section about its neutral axis.
+    """Resultants of a linear elastic section about its neutral axis, with its ends.
 
     The axes through the centroid are principal, so bending and stretch do not couple. Shear
     along y acts at the shear centre, `shear_centre` on the spine's side, where the section's
@@ -111,12 +218,16 @@ def elastic_resultants(
     """
     xp = array_module(*jax.tree.leaves((elastic_modulus, shear_modulus, section)), strain)
     about_x, about_y, twist, along_x, along_y, stretch = (strain[place] for place in range(6))
+    if (ends := section.ends) is not None:
+        about_x, about_y = about_x / (1.0 + ends.strong), about_y / (1.0 + ends.weak)
+        stretch = stretch / (1.0 + ends.axial)
+    free_twist = twist if ends is None else twist / (1.0 + ends.torsion)
     shear = shear_modulus * section.area
     across = shear * (along_y - section.shear_centre * twist)
     resultants = [
         elastic_modulus * section.second_moment_strong * about_x,
         elastic_modulus * section.second_moment_weak * about_y,
-        shear_modulus * section.torsion_constant * twist - section.shear_centre * across,
+        shear_modulus * section.torsion_constant * free_twist - section.shear_centre * across,
         shear * along_x,
         across,
         elastic_modulus * section.area * stretch,
@@ -129,7 +240,8 @@ def elastic_stiffness(
 ) -> Float[Array, "*shape 6 6"]:
     """Resultants per strain of a linear elastic section, or of many; see `elastic_resultants`."""
     xp = array_module(*jax.tree.leaves(section))
-    every = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], section)
+    plain = dataclasses.replace(section, fibres=None)
+    every = jax.tree.map(lambda leaf: xp.asarray(leaf)[..., None], plain)
     by_strain = elastic_resultants(elastic_modulus, shear_modulus, every, constant(np.eye(6)))
     return by_strain.swapaxes(-1, -2)
 

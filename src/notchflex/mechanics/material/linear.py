@@ -7,38 +7,26 @@ from typing import Any
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant
-from notchflex.mechanics.material.law import (
-    FibreSection,
-    Response,
-    SectionLaw,
-    elastic_resultants,
-    elastic_stiffness,
-    section_law,
-)
+from notchflex.mechanics.material.fibre_section import FibreSection
+from notchflex.mechanics.material.law import SectionLaw, section_law
 from notchflex.robot import Linear
 
 
 class LinearLaw(SectionLaw):
-    """Hooke's law. Moduli in MPa."""
+    """Hooke's law."""
 
     is_linear = True
-    elastic_modulus: Float[Array, ""]
-    shear_modulus: Float[Array, ""]
 
-    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
-        """Constant stiffness."""
-        return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
+    def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
+        """Moment in proportion to the curvature."""
+        return self.elastic_modulus * section.second_moment_weak * curvature
 
-    def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
-        """Resultants in proportion to the strains."""
-        moduli = self.elastic_modulus, self.shear_modulus
-        return Response(elastic_resultants(*moduli, section, strain), memory)
-
-    def energy(
-        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
+    def bending_energy(
+        self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Half the product of resultants and strains."""
-        return 0.5 * strain @ self.respond(strain, section, memory).resultants
+        """Half the product of moment and curvature."""
+        del memory
+        return 0.5 * curvature * self.moment(curvature, section)
 
 
 @section_law.register

@@ -10,24 +10,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jnp
-from notchflex.mechanics.material.law import (
-    FibreSection,
-    Response,
-    SectionLaw,
-    elastic_resultants,
-    elastic_stiffness,
-    section_law,
-)
+from notchflex.mechanics.material.fibre_section import FibreSection
+from notchflex.mechanics.material.law import NODES, WEIGHTS, SectionLaw, section_law
 from notchflex.robot import Superelastic
-
-_POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
-_NODES, _WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
-# Of all strains and resultants those of weak-axis bending.
-_WEAK = np.arange(6) == 1
 
 
 class SuperelasticLaw(SectionLaw):
@@ -37,13 +25,11 @@ class SuperelasticLaw(SectionLaw):
     stretch) stays on the linear branch, of which the paper says nothing.
     """
 
-    elastic_modulus: Float[Array, ""]
     superelastic_modulus: Float[Array, ""]
     transition_strain: Float[Array, ""]
     plastic_strain: Float[Array, ""]
     plastic_modulus: Float[Array, ""]
     plastic_exponent: Float[Array, ""]
-    shear_modulus: Float[Array, ""]
 
     def _branches(self, strain: Float[Array, ""]) -> tuple[Array, Array, Array]:
         """A strain split into its parts on the three branches, each with the strain's sign."""
@@ -71,7 +57,7 @@ class SuperelasticLaw(SectionLaw):
         # The integral of exp(b/x) has no elementary form (it is x exp(b/x) + b E1(-b/x), and
         # E1 is slow here); Gauss's rule is right to 1e-9 for strains up to ten times -b.
         safe = jnp.where(plastic == 0.0, 1.0, plastic)
-        hardening = safe * (jnp.exp(self.plastic_exponent / (safe * _NODES)) @ _WEIGHTS)
+        hardening = safe * (jnp.exp(self.plastic_exponent / (safe * NODES)) @ WEIGHTS)
         return (
             0.5 * at_transition * linear
             + 0.5 * (at_transition + at_plastic) * superelastic
@@ -79,31 +65,18 @@ class SuperelasticLaw(SectionLaw):
             + jnp.where(plastic == 0.0, 0.0, self.plastic_modulus * hardening)
         )
 
-    def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
-        """Stiffness on the linear branch."""
-        return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
+    def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
+        """Moment taken from the outer fibre on the spine."""
+        stress = self.stress(curvature * section.edge_spine)
+        return section.second_moment_weak / section.edge_spine * stress
 
-    def _elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Array:
-        """Resultants on the linear branch."""
-        moduli = self.elastic_modulus, self.shear_modulus
-        return jnp.asarray(elastic_resultants(*moduli, section, strain))
-
-    def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
-        """Resultants with the weak-axis moment taken from the outer fibre on the spine."""
-        stress = self.stress(strain[1] * section.edge_spine)
-        moment = section.second_moment_weak / section.edge_spine * stress
-        return Response(jnp.where(_WEAK, moment, self._elastic(strain, section)), memory)
-
-    def energy(
-        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
+    def bending_energy(
+        self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Area under the moment over the curvature, and the elastic rest."""
+        """Area under the moment over the curvature."""
         del memory
-        others = jnp.where(_WEAK, 0.0, self._elastic(strain, section))
-        density = self.energy_density(strain[1] * section.edge_spine)
-        return 0.5 * others @ strain + (
-            section.second_moment_weak / section.edge_spine**2 * density
-        )
+        density = self.energy_density(curvature * section.edge_spine)
+        return section.second_moment_weak / section.edge_spine**2 * density
 
 
 @section_law.register

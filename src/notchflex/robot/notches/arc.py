@@ -23,6 +23,14 @@ class ArcNotch(Notch):
         depth: Depth of the cut [mm], from the outer surface opposite the spine.
         height: Height of the notch along the tube [mm].
         uncut_length: Uncut length behind the notch, toward the tip [mm].
+        ends: "rigid" (beam theory of the arc between rigid rings, as in the papers) or "shell"
+            (the rings beside the notch yield and the arc flattens; checked against finite
+            elements).
+        depth_at: Where the depth of an "on-axis" cut was read, which decides the angle of its
+            radial edges: "outer", "mid-wall" or "inner" surface.
+        closing: "rigid" (the lips meet at height / (r_o + centroid), as in the papers, and do not
+            yield) or "elastic" (the angle and the stiffness of the closed notch from finite
+            elements).
         direction_deg: Side toward which the notch bends [deg].
         precurvature_deg: Angle of the notch when nothing pulls [deg].
         repeat: How many equal notches follow one another.
@@ -48,11 +56,46 @@ class ArcNotch(Notch):
     height: Annotated[Float, quantity("mm", "height of the notch along the tube", above=0)]
     _: KW_ONLY
     kind: Literal["arc"] = "arc"
+    ends: Annotated[
+        Literal["rigid", "shell"],
+        Field(
+            description='"rigid" (beam theory of the arc between rigid rings) or "shell" (the '
+            "rings beside the notch yield, the arc flattens)"
+        ),
+    ] = "rigid"
+    depth_at: Annotated[
+        Literal["outer", "mid-wall", "inner"],
+        Field(
+            description="surface at which the depth of an on-axis cut was read: "
+            '"outer", "mid-wall" or "inner"'
+        ),
+    ] = "outer"
+
+    closing: Annotated[
+        Literal["rigid", "elastic"],
+        Field(
+            description='"rigid" (at height / (outer radius + centroid), then stiff) or "elastic" '
+            "(at the angle, and with the stiffness beyond, of finite elements)"
+        ),
+    ] = "rigid"
 
     @property
     def spine_cut(self) -> tuple[float, bool]:
         """Depth of the cut [mm], and whether its edges are radial."""
         return self.depth, self.cut == "on-axis"
+
+    @property
+    def has_elastic_ends(self) -> bool:
+        """Whether its stiffness depends on the rings beside it."""
+        return self.ends == "shell" or self.closing == "elastic"
+
+    def section_depth(self, tube: Tube) -> float:
+        """Return the depth at the outer surface that gives the same section [mm]."""
+        if self.cut == "off-axis" or self.depth_at == "outer":
+            return self.depth
+        outer, inner = tube.outer_radius, tube.inner_radius
+        read = inner if self.depth_at == "inner" else 0.5 * (outer + inner)
+        return outer + (self.depth - outer) * outer / read
 
     def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
         """Find a cut that goes through the tube, and a precurvature beyond any closing angle."""
@@ -61,6 +104,16 @@ class ArcNotch(Notch):
                 "depth",
                 f"is {self.depth} mm; it must be greater than 0 and less than the outer diameter, "
                 f"{tube.outer_diameter} mm.",
+            )
+            return
+        if self.depth_at != "outer" and self.cut == "off-axis":
+            yield "depth_at", 'is for cuts "on-axis"; leave it out for an "off-axis" cut.'
+            return
+        if not 0.0 < self.section_depth(tube) < tube.outer_diameter:
+            yield (
+                "depth",
+                f"is {self.depth} mm, read at the {self.depth_at} surface; there its edges would "
+                "not meet the tube. Read it at the outer surface, or use another depth.",
             )
             return
         if not self._open(tube):
@@ -87,5 +140,6 @@ class ArcNotch(Notch):
         """
         from notchflex.mechanics.section import SECTION_OF_CUT  # it loads JAX
 
-        left = SECTION_OF_CUT[self.cut](tube.outer_radius, tube.inner_radius, self.depth)
+        depth = self.section_depth(tube)
+        left = SECTION_OF_CUT[self.cut](tube.outer_radius, tube.inner_radius, depth)
         return self.height / (tube.outer_radius + float(left.centroid))

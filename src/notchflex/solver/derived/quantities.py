@@ -29,6 +29,9 @@ from notchflex.solver.programs.pytree_layout import PytreeLayout
 
 # A state whose moments are off by this part of the largest is none.
 MODES_FAIL = 0.35
+# Part of the end compliance of a notch that lies beyond its faces: by finite elements, middle
+# notches of wrists A and B at every load (3.0 % and 4.1 % of the angle).
+_BEYOND_FACES = 0.086
 # A state whose turns are known worse is none, rad.
 _DOUBT = 2e-6
 
@@ -55,6 +58,24 @@ def notch_angle(state: SolvedState) -> Array:
     It includes the precurvature; the order is from base to tip.
     """
     return notch_angles(state.chain, state.relative.rotation)
+
+
+@Quantity("state", "edge angle", r"\theta_{\mathrm{e},j}", "deg", key="edge_angle_deg",
+          column="notch_{notch}_edge_deg", per=("notch",), optional=True)  # fmt: skip
+def edge_angle(state: SolvedState) -> Array:
+    """Angle between the two faces of a notch, as a photograph shows it.
+
+    With elastic ends it is less than the notch angle, which moves the tip: part of the elastic
+    angle lies in the rings beyond the faces.
+    """
+    chain, flexure = state.chain, state.at.flexure
+    ends = chain.rods.section.ends
+    angles = state.quantity("notch_angle")
+    if ends is None:
+        return angles
+    beyond = _BEYOND_FACES * ends.weak / (1.0 + ends.weak)
+    curvature = in_space(flexure.strain)[..., 1]
+    return angles - jnp.einsum("ni,ni,ni->n", chain.rods.length, beyond, curvature)
 
 
 @Quantity("state", "chord angle", r"\psi_j", "deg", key="chord_angle_deg",
@@ -257,15 +278,22 @@ def bend_possible(state: SolvedState) -> Array:
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",
           column="stored_energy_Nmm")  # fmt: skip
 def stored_energy(state: SolvedState) -> Array:
-    """Elastic energy held by flexures and stretched tendons."""
+    """Elastic energy held by flexures, lips that press and stretched tendons."""
     chain, base_tension = state.chain, state.solved.point.base_tension
     strain = in_space(state.at.flexure.strain)
     density = jax.vmap(jax.vmap(chain.law.energy))(strain, chain.rods.section, chain.memory)
     in_gap, beside_body = state.tensions
     in_tendons = in_gap**2 * state.by_tendon("natural_gap")
     in_tendons = in_tendons + beside_body**2 * state.by_tendon("body_length")
+    in_lips = jnp.zeros(())
+    if chain.contact_flexibility is not None:
+        forces = jnp.stack(
+            [jnp.sum(one**2, axis=-1) for one in state.solved.point.unknowns.contact_force]
+        )
+        in_lips = 0.5 * jnp.sum(chain.contact_flexibility * forces)
     return (
-        jnp.sum(chain.rods.length * density)
+        in_lips
+        + jnp.sum(chain.rods.length * density)
         + 0.5 * jnp.sum(in_tendons * state.by_tendon("visits") * state.compliance)
         + 0.5 * jnp.sum(base_tension**2 * chain.free_length / chain.axial_stiffness)
     )

@@ -8,22 +8,16 @@ from notchflex.robot.materials.softening import Softening
 class SofteningLaw(law.SectionLaw):
     """Softening in the plane of bending, linear otherwise."""
 
-    modulus: float
-    shear_modulus: float
     limit: float
 
-    def stiffness(self, section):
-        return law.elastic_stiffness(self.modulus, self.shear_modulus, section)
+    def moment(self, curvature, section):
+        linear = self.elastic_modulus * section.second_moment_weak * curvature
+        return linear * (1.0 - (curvature * section.edge_spine / self.limit) ** 2 / 3.0)
 
-    def respond(self, strain, section, memory):
-        linear = law.elastic_resultants(self.modulus, self.shear_modulus, section, strain)
-        part = (strain[1] * section.edge_spine / self.limit) ** 2
-        return law.Response(linear.at[1].multiply(1.0 - part / 3.0), memory)
-
-    def energy(self, strain, section, memory):
-        linear = law.elastic_resultants(self.modulus, self.shear_modulus, section, strain)
-        part = (strain[1] * section.edge_spine / self.limit) ** 2
-        return 0.5 * linear @ strain - linear[1] * strain[1] * part / 12.0
+    def bending_energy(self, curvature, section, memory):
+        linear = self.elastic_modulus * section.second_moment_weak * curvature
+        part = (curvature * section.edge_spine / self.limit) ** 2
+        return linear * curvature * (0.5 - part / 12.0)
 
 
 @law.section_law.register

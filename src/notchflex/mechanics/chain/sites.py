@@ -1,0 +1,38 @@
+"""The rings beside every notch, as notches with elastic ends need them."""
+
+from __future__ import annotations
+
+from notchflex.mechanics.chain.mass import body_lengths
+from notchflex.mechanics.ends import Side
+from notchflex.mechanics.flexure import Site
+from notchflex.robot import Robot
+
+
+def sites_of(robot: Robot) -> tuple[Site | None, ...]:
+    """Find what surrounds every notch; None for notches that do not depend on it.
+
+    The base is held by a rigid plate at its length before the first notch. The ring behind the last
+    notch is free. Where neighbours differ, each takes the ring between them as if both were its own
+    kind.
+
+    Args:
+        robot: The robot, n notches.
+
+    Returns:
+        n sites, base to tip.
+    """
+    notches = robot.notches
+    if not any(notch.has_elastic_ends for notch in notches):
+        return (None,) * len(notches)
+    lengths = [float(length) for length in body_lengths(robot.tube, notches)]
+    last = len(notches) - 1
+    ratio = robot.material.poisson_ratio
+
+    def site(index: int) -> Site:
+        before, behind = lengths[index], lengths[index + 1]
+        proximal = Side("clamped" if index == 0 else "between", before)
+        return Site(proximal, Side("free" if index == last else "between", behind), ratio)
+
+    return tuple(
+        site(index) if notch.has_elastic_ends else None for index, notch in enumerate(notches)
+    )

@@ -1,0 +1,6 @@
+"""Stiffness of a notch with the rings that it ends in: end compliance, flattening, torsion."""
+
+from notchflex.mechanics.ends.effective_notch import NotchStiffness as NotchStiffness
+from notchflex.mechanics.ends.effective_notch import notch_stiffness as notch_stiffness
+from notchflex.mechanics.ends.side import Side as Side
+from notchflex.mechanics.ends.validity import validity as validity

@@ -1,0 +1,154 @@
+r"""Edge compliance of an uncut ring: a thin cylindrical shell under edge loads in harmonics.
+
+The displacements $u\cos n\varphi$ (along the tube), $v\sin n\varphi$ (around) and
+$w\cos n\varphi$ (outward) are polynomials of degree 18 of the distance z from the loaded edge. The
+strains are those of Sanders' shell,
+
+$$\varepsilon_z = u',\quad \varepsilon_\varphi = \frac{nv + w}{r},\quad \gamma = v' - \frac{nu}{r},
+\quad \kappa_z = -w'',\quad \kappa_\varphi = \frac{nv + n^2 w}{r^2},\quad
+\kappa_{z\varphi} = \frac{nu}{2r^2} + \frac{3v'}{2r} + \frac{2nw'}{r}$$
+
+with the stiffnesses $t/(1-\nu^2)$ and $t^3/12(1-\nu^2)$, those of γ and κ_zφ times (1 − ν)/2.
+
+The polynomials are integrals of Legendre's from the far edge: the derivatives in the energy are
+then nearly orthogonal, and a condition at the far edge leaves out one polynomial.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+HARMONICS = 41  # n = 0 ... 40
+_DEGREE = 18
+_COUNT = _DEGREE + 1  # polynomials of each displacement
+
+
+def _polynomials(integrals: int) -> np.ndarray:
+    """Integrate Legendre polynomials of x = z / length from the far edge, x = 1.
+
+    Args:
+        integrals: How many times; as many Taylor terms at the far edge come first.
+
+    Returns:
+        Values and two derivatives at the loaded edge x = 0 and at the points of a Gauss rule, shape
+        (3, 1 + points, polynomials).
+    """
+    legendre = np.polynomial.legendre
+    at = np.concatenate([[-1.0], _GAUSS[0]])
+    series = [np.array([1.0]), np.array([-0.5, 0.5])][:integrals]
+    for k in range(_COUNT - integrals):
+        unit = np.sqrt(2.0 * k + 1.0) * np.eye(k + 1)[k]
+        series.append(legendre.legint(unit, integrals, lbnd=1.0, scl=0.5))
+    return np.array(
+        [[legendre.legval(at, legendre.legder(s, d, 2.0)) for s in series] for d in range(3)]
+    ).transpose(0, 2, 1)
+
+
+_GAUSS = np.polynomial.legendre.leggauss(_COUNT)  # exact for products of two polynomials
+_IN_SURFACE, _OUTWARD = _polynomials(1), _polynomials(2)
+
+
+def _strains() -> np.ndarray:
+    """Write strains as sums over powers: of n (0 to 2), and of the derivative (0 to 2).
+
+    Returns:
+        Array (power of n, derivative, strain, displacement) of factors, for r = 1.
+    """
+    factors = np.zeros((3, 3, 6, 3))
+    u, v, w = range(3)
+    axial, around, shear, along, across, twist = range(6)
+    for power, derivative, strain, displacement, factor in (
+        (0, 1, axial, u, 1.0),
+        (1, 0, around, v, 1.0),
+        (0, 0, around, w, 1.0),
+        (0, 1, shear, v, 1.0),
+        (1, 0, shear, u, -1.0),
+        (0, 2, along, w, -1.0),
+        (1, 0, across, v, 1.0),
+        (2, 0, across, w, 1.0),
+        (1, 0, twist, u, 0.5),
+        (0, 1, twist, v, 1.5),
+        (1, 1, twist, w, 2.0),
+    ):
+        factors[power, derivative, strain, displacement] = factor
+    return factors
+
+
+def _energies() -> np.ndarray:
+    """Integrate the products of strains that the energy is made of, for r = 1.
+
+    Returns:
+        Array (part, power of ν, power of radius / length, power of n, row, column): the stiffness
+        of displacements × polynomials. Parts are the membrane and bending.
+    """
+    size = 3 * _COUNT
+    tables = np.stack([_IN_SURFACE, _IN_SURFACE, _OUTWARD])[:, :, 1:]
+    strains = np.einsum("pdsk,kdgi->pdsgki", _strains(), tables).reshape(3, 3, 6, _COUNT, size)
+    plane = np.array([np.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
+    found = np.zeros((2, 2, 5, 5, size, size))
+    for part, of in enumerate((strains[:, :, :3], strains[:, :, 3:])):
+        stresses = np.einsum("mst,g,pdtgj->mpdsgj", plane, 0.5 * _GAUSS[1], of)
+        for p, d, q, e in np.ndindex(3, 3, 3, 3):
+            product = np.einsum("sgi,msgj->mij", of[p, d], stresses[:, q, e])
+            found[part, :, d + e, p + q] += product
+    return found
+
+
+def _held(boundary: str) -> np.ndarray:
+    """Say which polynomials are left out of each harmonic, shape (harmonics, 3 × polynomials)."""
+    held = np.zeros((HARMONICS, 3, _COUNT), dtype=bool)
+    held[0, 1] = True  # no torsion
+    if boundary == "clamped":
+        held[:, :, 0] = held[:, 2, 1] = True
+    elif boundary == "between":
+        held[:, 0, 0] = held[:, 2, 1] = held[1, 1, 0] = True
+    else:  # free, but for the motions of a rigid ring
+        held[:2, 0, 0] = held[1, 2, 0] = True
+    return held.reshape(HARMONICS, -1)
+
+
+_ENERGIES = _energies()
+_POWERS = np.arange(HARMONICS, dtype=float)[:, None] ** np.arange(5)
+_HELD = {boundary: _held(boundary) for boundary in ("between", "clamped", "free")}
+# Axial displacement and slope at the loaded edge of every polynomial, shape (3 × polynomials, 2).
+_EDGE = np.zeros((3 * _COUNT, 2))
+_EDGE[:_COUNT, 0] = _IN_SURFACE[0, 0]
+_EDGE[2 * _COUNT :, 1] = _OUTWARD[1, 0]
+
+
+def edge_compliance(
+    radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
+) -> np.ndarray:
+    """Compute how edge loads of each harmonic move the edge that they act on.
+
+    Args:
+        radius: Mean radius r, mm.
+        wall: Wall t, mm.
+        length: From the loaded edge to the plane of symmetry, clamp or free end, mm.
+        poisson_ratio: Poisson's ratio ν.
+        boundary: "between" (the plane of symmetry between two notches), "clamped" or "free"
+            (the motions of a rigid ring held at the far edge).
+
+    Returns:
+        Displacement away from the ring and slope of the outward displacement along z, per unit of
+        tension and of moment in N/mm and N with a Young's modulus of 1, shape (harmonics, 2, 2).
+    """
+    ratio = radius / length
+    one = 1.0
+    # Strains of the membrane come per 1/r, those of bending per 1/r².
+    parts = np.stack([one, wall**2 / (12.0 * radius**2)])
+    material = np.stack([one, one * poisson_ratio])
+    slopes = np.stack([one, ratio, ratio**2, ratio**3, ratio**4])
+    factors = np.einsum("a,b,c->abc", parts, material, slopes).ravel()
+    held = _HELD[boundary]
+    free = (~held[:, :, None] & ~held[:, None, :]).astype(float)
+    by_power = (factors @ _ENERGIES.reshape(20, -1)).reshape(5, -1)
+    stiffness = (_POWERS @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
+    stiffness = free * stiffness + np.eye(3 * _COUNT) * held[:, :, None]
+    edge = np.stack([_EDGE[:, 0] * one, _EDGE[:, 1] * ratio], axis=-1)
+    loads = np.where(held[:, :, None], 0.0, edge[None])
+    flexibility = np.swapaxes(loads, 1, 2) @ np.linalg.solve(stiffness, loads)
+    # Displacements are of order r² per N/mm over E t length; slopes have one r less.
+    unit = np.stack([radius, one])
+    scale = (1.0 - poisson_ratio**2) / (wall * length)
+    return flexibility * (scale * np.outer(unit, unit)[None])

@@ -1,0 +1,19 @@
+"""What lies beyond an edge of a notch: the uncut ring and what holds its far edge."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+
+class Side(NamedTuple):
+    """The uncut ring beside a notch.
+
+    Attributes:
+        boundary: "between" two notches, "clamped" to a rigid plate (the base), or "free" (the
+            ring beyond the last notch).
+        length: Uncut length c from the edge of the notch to the next notch, to the plate or to
+            the free end, mm.
+    """
+
+    boundary: Literal["between", "clamped", "free"]
+    length: float

@@ -1,0 +1,76 @@
+r"""Torsion of a notch whose ends hold its section against warping, and its shear.
+
+Vlasov's theory of thin-walled bars with an elastic spring for the warping at either end. The twist
+of a torque T is $T\ell/(GJ)$ with
+
+$$\ell = h + t\,(3.11 - 1.60\,a) - \frac{2}{k\,(\coth(kh/2) + \lambda_w k)},\qquad
+k = \sqrt{GJ/EC_w},$$
+
+the second term for what the arc's shear does in the rings, the third for the warping. The two
+numbers and the spring λ_w were fitted to cells of chains of equal notches.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from notchflex.mechanics.ends.edge_loads import Arc
+from notchflex.mechanics.section import Section
+
+
+def warping_constant(arc: Arc) -> float:
+    """Compute the warping constant C_w of the arc about its shear centre.
+
+    Args:
+        arc: The arc of wall that the cut leaves.
+
+    Returns:
+        C_w of the middle line and of the wall, mm⁶.
+    """
+    r, t, a = arc.radius, arc.wall, arc.half_angle
+    sine, cosine = np.sin(a), np.cos(a)
+    line = a**3 - 6.0 * (sine - a * cosine) ** 2 / (a - sine * cosine)
+    return 2.0 / 3.0 * t * r**5 * line + (2.0 * a * r * t) ** 3 / 144.0
+
+
+def torsion_length(
+    arc: Arc,
+    outer: float,
+    height: float,
+    poisson_ratio: float,
+    section: Section,
+) -> float:
+    """Compute the length ℓ of free torsion that twists as much as the notch with its ends.
+
+    Args:
+        arc: The arc of wall that the cut leaves.
+        outer: Outer radius, mm.
+        height: Height h of the notch, mm.
+        poisson_ratio: Poisson's ratio ν.
+        section: The section that the cut leaves; its torsion constant is J.
+
+    Returns:
+        The length, mm: twist = T ℓ/(G J).
+    """
+    t, a, diameter = arc.wall, arc.half_angle, 2.0 * outer
+    shear_over_young = 0.5 / (1.0 + poisson_ratio)
+    rate = np.sqrt(shear_over_young * section.torsion_constant / warping_constant(arc))
+    width = 2.0 * a * arc.radius / diameter
+    spring = 0.004 * diameter * (t / diameter) ** -1.98 * np.exp(0.16 * width)
+    held = 2.0 / (rate * (1.0 / np.tanh(0.5 * rate * height) + spring * rate))
+    return height + t * (3.11 - 1.60 * a) - held
+
+
+def shear_centre(arc: Arc, height: float, section: Section) -> float:
+    """Compute the distance of the centre of twist from the tube axis, toward the spine.
+
+    Args:
+        arc: The arc of wall that the cut leaves.
+        height: Height h of the notch, mm.
+        section: The section that the cut leaves.
+
+    Returns:
+        The distance, mm: that of the section, moved out by the ends of short notches.
+    """
+    width = 2.0 * arc.half_angle * arc.radius
+    return float(section.shear_centre) * (1.0 + 0.027 * width / (height + 0.72 * width))

@@ -1,0 +1,89 @@
+"""A cross-section of a flexure as a material law sees it."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._pytree import Pytree
+
+
+class NotchEnds(Pytree):
+    """How the rings that a notch ends in add to the compliance of its section.
+
+    Compliances are parts of that of the section along the length of the flexure: a stiffness is
+    that of the section over 1 + part. A part may be negative, above -1, where the ends stiffen.
+
+    Attributes:
+        weak: Part added in the bending of the notch.
+        strong: In sideways bending.
+        axial: In stretch.
+        torsion: In torsion.
+        odd: Flattening by bending: the distance of the fibres falls to 1/q of their own,
+            q = 1 + odd * kappa + even * kappa^2, at the elastic curvature kappa about the weak
+            axis (positive closes), mm.
+        even: Its even part, mm^2.
+        material_share: Share of `weak` that follows the material; the rest stays elastic.
+    """
+
+    weak: Float[Array, "*shape"]
+    strong: Float[Array, "*shape"]
+    axial: Float[Array, "*shape"]
+    torsion: Float[Array, "*shape"]
+    odd: Float[Array, "*shape"]
+    even: Float[Array, "*shape"]
+    material_share: Float[Array, "*shape"]
+
+    @classmethod
+    def rigid(cls, like: Float[Array, "*shape"]) -> NotchEnds:
+        """Return ends that add nothing, in the shape of an array."""
+        return cls(*(np.zeros(np.shape(like)) for _ in range(7)))  # pyright: ignore
+
+    def flattening(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
+        """By how much the distances of the fibres shrink at a curvature: q."""
+        return 1.0 + curvature * (self.odd + curvature * self.even)
+
+
+class Fibres(Pytree):
+    """Fibres of a section, for laws that sum up their stresses.
+
+    Attributes:
+        arm: Distance of each fibre from the neutral axis, positive toward the spine, mm.
+        area: Its area, mm^2.
+    """
+
+    arm: Float[Array, "*shape fibres"]
+    area: Float[Array, "*shape fibres"]
+
+
+class FibreSection(Pytree):
+    """What a law needs of a cross-section, about its neutral axis. Units mm.
+
+    The section's x points to the cut side, z along the rod. Leading axes are allowed.
+
+    Attributes:
+        area: Area, mm^2.
+        second_moment_weak: Second moment for bending that closes the notch (about y), mm^4.
+        second_moment_strong: Second moment for sideways bending (about x), mm^4.
+        torsion_constant: Torsion constant, mm^4.
+        shear_centre: Distance of the shear centre from the neutral axis toward the spine, mm.
+        edge_spine: Distance of the outer fibre on the spine from the neutral axis, mm.
+        edge_near: Distance of the farthest fibre on the cut side, mm.
+        ends: Compliance of the ends of the notch; None where no flexure of a chain has any.
+        fibres: Its fibres; None where the material does not ask for them.
+    """
+
+    area: Float[Array, "*shape"]
+    second_moment_weak: Float[Array, "*shape"]
+    second_moment_strong: Float[Array, "*shape"]
+    torsion_constant: Float[Array, "*shape"]
+    shear_centre: Float[Array, "*shape"]
+    edge_spine: Float[Array, "*shape"]
+    edge_near: Float[Array, "*shape"]
+    ends: NotchEnds | None = None
+    fibres: Fibres | None = None
+
+    @property
+    def softens(self) -> bool:
+        """Whether any flattens as it bends; for plain arrays."""
+        return self.ends is not None and bool(np.any(self.ends.odd) or np.any(self.ends.even))

@@ -1,0 +1,148 @@
+"""A section law between the ends of a notch, against closed forms and independent solutions."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+import notchflex as nf
+from notchflex._jax import jax
+from notchflex.mechanics.flexure import rod, stack
+from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
+
+ENDS = NotchEnds(
+    weak=0.6, strong=0.3, axial=0.2, torsion=-0.4, odd=0.4, even=0.25, material_share=0.25
+)
+SECTION = FibreSection(
+    area=0.125,
+    second_moment_weak=5.8e-4,
+    second_moment_strong=2.0e-2,
+    torsion_constant=5.0e-4,
+    shear_centre=0.7,
+    edge_spine=0.1235,
+    edge_near=0.177,
+    ends=ENDS,
+)
+PLAIN = dataclasses.replace(SECTION, ends=None)
+LINEAR = section_law(nf.Linear(60000.0))
+SUPERELASTIC = section_law(nf.Superelastic(10000.0, 3000.0, 0.028))
+
+
+respond = jax.jit(lambda law, strain, section: law.respond(strain, section, ()).resultants)
+energy = jax.jit(lambda law, strain, section: law.energy(strain, section, ()))
+
+
+def bending(curvature: float) -> np.ndarray:
+    return np.array([0.0, curvature, 0.0, 0.0, 0.0, 0.0])
+
+
+def moment(law: SectionLaw, curvature: float, section: FibreSection = SECTION) -> float:
+    return float(respond(law, bending(curvature), section)[1])
+
+
+def flattening(curvature: float) -> float:
+    return 1.0 + 0.4 * curvature + 0.25 * curvature**2
+
+
+def test_a_linear_notch_is_the_closed_form() -> None:
+    for curvature in (-1.2, -0.3, 0.05, 0.9):
+        q = flattening(curvature)
+        expected = 60000.0 * 5.8e-4 * curvature / (1.6 * q**2)
+        assert moment(LINEAR, curvature) == pytest.approx(expected, rel=1e-14)
+
+
+def potential(curvature: float) -> float:
+    """Energy of a linear notch: the integral of K0 kappa / q^2 in closed form."""
+    b, e = 0.4, 0.25
+    root = np.sqrt(4.0 * e - b**2)
+
+    def angle(at: float) -> float:
+        return 2.0 / root * np.arctan((2.0 * e * at + b) / root)
+
+    by_q = (2.0 + b * curvature) / flattening(curvature)
+    held = (2.0 - by_q - b * (angle(curvature) - angle(0.0))) / root**2
+    return 60000.0 * 5.8e-4 / 1.6 * held
+
+
+def test_energy_of_a_linear_notch_is_its_potential() -> None:
+    for curvature in (-1.2, -0.3, 0.05, 0.9):
+        held = float(energy(LINEAR, bending(curvature), SECTION))
+        assert held == pytest.approx(potential(curvature), rel=1e-12)
+
+
+@pytest.mark.parametrize("curvature", [-1.6, -0.2, 0.3, 0.7, 1.6])
+def test_a_superelastic_notch_solves_the_law_of_its_ends(curvature: float) -> None:
+    def missing(own: float) -> float:
+        part = moment(SUPERELASTIC, own, PLAIN) / (10000.0 * 5.8e-4)
+        return (1.0 + 0.25 * 0.6) * own + 0.75 * 0.6 * part - curvature / flattening(curvature)
+
+    own = brentq(missing, -2.0, 2.0, xtol=1e-15)
+    expected = moment(SUPERELASTIC, own, PLAIN) / flattening(curvature)
+    assert moment(SUPERELASTIC, curvature) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", [LINEAR, SUPERELASTIC], ids=["linear", "superelastic"])
+def test_tangents_and_energies_of_a_notch_are_those_of_its_moment(law: SectionLaw) -> None:
+    step = 1e-6
+    for curvature in (-1.1, 0.1, 0.8):
+        ahead, behind = (moment(law, curvature + change) for change in (step, -step))
+        tangent = law.tangent(bending(curvature), SECTION, ())
+        assert float(tangent[1, 1]) == pytest.approx((ahead - behind) / (2 * step), rel=1e-7)
+        work = quad(lambda at: moment(law, at), 0.0, curvature, limit=200, epsrel=1e-8)[0]
+        # The quadrature of the flattening does not know where the material yields.
+        error = 1e-9 if law is LINEAR else 1e-4
+        assert float(energy(law, bending(curvature), SECTION)) == pytest.approx(work, rel=error)
+
+
+def test_derivatives_by_the_ends_are_those_of_the_solution() -> None:
+    step = 1e-6
+    for name in ("weak", "odd", "even", "material_share"):
+
+        def at(change: float, name: str = name) -> FibreSection:
+            ends = dataclasses.replace(ENDS, **{name: getattr(ENDS, name) + change})
+            return dataclasses.replace(SECTION, ends=ends)
+
+        slope = jax.jacrev(lambda by, at=at: respond(SUPERELASTIC, bending(0.8), at(by)))(0.0)
+        ahead, behind = (moment(SUPERELASTIC, 0.8, at(change)) for change in (step, -step))
+        assert float(slope[1]) == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6)
+
+
+def test_without_flattening_the_energy_is_exact_beyond_the_plateau_too() -> None:
+    section = dataclasses.replace(SECTION, ends=dataclasses.replace(ENDS, odd=0.0, even=0.0))
+    step = 1e-5
+    for curvature in (0.2, 0.9, -1.3):
+        ahead, behind = (
+            float(energy(SUPERELASTIC, bending(curvature + change), section))
+            for change in (step, -step)
+        )
+        slope = (ahead - behind) / (2.0 * step)
+        assert slope == pytest.approx(moment(SUPERELASTIC, curvature, section), rel=1e-8)
+
+
+def test_ends_divide_the_stiffness_in_every_direction() -> None:
+    plain, soft = (np.asarray(LINEAR.stiffness(one)) for one in (PLAIN, SECTION))
+    assert soft[0, 0] == pytest.approx(plain[0, 0] / 1.3)
+    assert soft[1, 1] == pytest.approx(plain[1, 1] / 1.6)
+    assert soft[5, 5] == pytest.approx(plain[5, 5] / 1.2)
+    compliance = np.linalg.inv(soft)[2, 2] / np.linalg.inv(plain)[2, 2]
+    assert compliance == pytest.approx(0.6)
+    assert (np.linalg.eigvalsh(soft) > 0.0).all()
+    np.testing.assert_allclose(soft, LINEAR.tangent(np.zeros(6), SECTION, ()), rtol=1e-12)
+
+
+def test_rigid_ends_stand_beside_those_of_another_flexure() -> None:
+    notch = nf.ArcNotch("on-axis", 1.40, 0.8, uncut_length=1.2)
+    plain = rod(notch, nf.Tube(1.62, 1.40))
+    nodes = len(plain.length)
+    ends = NotchEnds(*(np.full(nodes, number) for number in dataclasses.astuple(ENDS)))
+    soft = dataclasses.replace(plain, section=dataclasses.replace(plain.section, ends=ends))
+    both = stack([plain, soft]).section
+    assert both.softens
+    assert both.ends is not None
+    np.testing.assert_array_equal(both.ends.weak[:, 0], [0.0, 0.6])
+    one = dataclasses.replace(plain.section, ends=both.ends)
+    assert not dataclasses.replace(one, ends=NotchEnds.rigid(one.area)).softens
