@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 import notchflex as nf
 from notchflex.plotting import Picture
-from notchflex.plotting.branches import LOADING, UNLOADING
+from notchflex.plotting.curves import LOADING, UNLOADING
 from refusals import refused
 
 

@@ -69,7 +69,7 @@ def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
 
 def test_colours_of_contacts_and_strains():
     from notchflex.plotting.style import BLUE, GREEN, GREY, VERMILLION
-    from notchflex.viewer.scene.colours import BEYOND, METAL, contact_colours, strain_colour
+    from notchflex.viewer.scene.marks import BEYOND, METAL, contact_colours, strain_colour
 
     robot = ready("A").with_value("friction.wrap", "geometric")
     session = Session(robot)

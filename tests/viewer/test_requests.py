@@ -6,7 +6,7 @@ import socket
 import pytest
 
 import notchflex as nf
-from notchflex.viewer.server.serving import refusal
+from notchflex.viewer.server import refusal
 from refusals import refused
 
 viser = pytest.importorskip("viser", reason="the extra `viewer` is not installed")
@@ -14,7 +14,7 @@ viser = pytest.importorskip("viser", reason="the extra `viewer` is not installed
 
 @pytest.fixture(scope="module")
 def port():
-    from notchflex.viewer.server.serving import serve
+    from notchflex.viewer.server import serve
 
     server = serve("127.0.0.1", 18300)
     server.scene.add_frame("/robot")
@@ -125,7 +125,7 @@ def test_a_viser_that_cannot_be_checked_is_not_served(monkeypatch):
         asyncio=types.SimpleNamespace(server=plain), datastructures=websockets.datastructures
     )
     monkeypatch.setattr(infra, "websockets", other)
-    from notchflex.viewer.server.serving import serve
+    from notchflex.viewer.server import serve
 
     with refused("MISSING_PACKAGE"):
         serve("127.0.0.1", 18340)

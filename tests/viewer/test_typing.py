@@ -1,11 +1,13 @@
 """Numbers that are typed while the solver thread shows the current ones."""
 
+import threading
+import time
 from types import SimpleNamespace
 
 import pytest
 
 from notchflex.viewer.page.sliders import NumberField, Slider
-from notchflex.viewer.tasks import Tasks
+from notchflex.viewer.tasks import PAUSE, Tasks
 
 
 class Handle:
@@ -66,3 +68,21 @@ def test_a_jump_of_a_slider_holds_the_robot_at_once(viewer):
         slider._handle.value = value
         slider._handle.run_callback()
         assert viewer.held == held
+
+
+def test_a_slow_hold_does_not_drop_the_number_that_was_typed(viewer):
+    """The event loop may be slow: the solver must not take the number before the robot holds."""
+    order = []
+    slider = Slider(viewer, 0, "tension [N]", (0.0, 10.0), lambda _: order.append("set"))
+    solver = threading.Thread(target=lambda: viewer.tasks.take(timeout=10.0)())
+
+    def slow_hold(number):
+        solver.start()
+        time.sleep(1.5 * PAUSE)
+        order.append("held")
+
+    viewer.targets.hold = slow_hold
+    slider._handle.value = 5.0
+    slider._handle.run_callback()
+    solver.join(20.0)
+    assert order == ["held", "set"]

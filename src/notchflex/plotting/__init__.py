@@ -7,8 +7,9 @@ from notchflex.plotting.drawings.dimensioned import dimensioned_figure
 from notchflex.plotting.fits.calibration import calibration_picture
 from notchflex.plotting.fits.comparison import comparison_figure, comparison_picture
 from notchflex.plotting.fits.friction import friction_picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.path import path_figure, path_picture, state_picture
-from notchflex.plotting.picture import Picture, picture
+from notchflex.plotting.picture import picture
 from notchflex.plotting.style import save
 
 __all__ = [

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex.errors import InputError
-from notchflex.plotting.branches import abscissa
-from notchflex.plotting.curves import notches_panel, total_panel
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.curves import abscissa, notches_panel, total_panel
+from notchflex.plotting.output import Picture
 from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import Area, Faces, Panel, stack
@@ -77,7 +76,8 @@ def save_animation(
     figure.draw_without_rendering()  # arranges the axes, once for all frames
     figure.set_layout_engine("none")
     robot, *curves = figure.axes
-    limits = {name: getattr(robot, f"get_{name}lim")() for name in _axes_of(robot)}
+    names = "xyz" if robot.name == "3d" else "xy"
+    limits = {name: getattr(robot, f"get_{name}lim")() for name in names}
     view = plane_of(path)
     dots = [axes.plot([], [], "o", color=BLACK, markersize=5.0, zorder=9)[0] for axes in curves]
     frame, standing = _durations(len(steps))
@@ -134,10 +134,6 @@ def _dots(path: EquilibriumPath, step: int) -> list[tuple[list[float], list[floa
     total = float(path.total_angle[step]) * QUANTITIES["total_angle"].scale
     notches = [float(one) for one in path.notch_angle[step] * QUANTITIES["notch_angle"].scale]
     return [([x], [total]), ([x] * len(notches), notches)]
-
-
-def _axes_of(axes: Any) -> str:
-    return "xyz" if axes.name == "3d" else "xy"
 
 
 def _limit(axes: Any, limits: dict[str, Any]) -> None:

@@ -13,8 +13,16 @@ from numpy.typing import NDArray
 
 from notchflex._quantity import Quantity
 from notchflex.errors import InputError
-from notchflex.plotting.branches import LOADING, UNLOADING, branches, load_parameter
-from notchflex.plotting.curves import LINE, NEUTRAL, branch_lines, failures
+from notchflex.plotting.curves import (
+    LINE,
+    LOADING,
+    NEUTRAL,
+    UNLOADING,
+    branch_lines,
+    branches,
+    failures,
+    load_parameter,
+)
 from notchflex.plotting.path import robot_shape, state_shape
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
 from notchflex.plotting.sheet import BESIDE, INSIDE, Curve, Mark, Panel

@@ -9,8 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.branches import abscissa, branches, load_parameter
-from notchflex.plotting.curves import COLOUR, converged_only
+from notchflex.plotting.curves import (
+    COLOUR,
+    abscissa,
+    branches,
+    converged_only,
+    load_parameter,
+)
 from notchflex.plotting.sheet import INSIDE, Area, Colour, Panel
 from notchflex.plotting.style import sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.curves import TIP_LABELS
+from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
@@ -112,16 +113,8 @@ def _over_rows(
 
 
 def _tips(tips: NDArray[np.float64], good: NDArray[np.bool_]) -> Panel:
-    quantity = QUANTITIES["tip_position"]
     items: list[Mark] = [dots(tips[good][:, [0, 2]], BLUE, 2.5, hover=True, group="tip")]
     if not good.all():
         name = "not converged"
         items.append(dots(tips[~good][:, [0, 2]], VERMILLION, 2.5, name=name, group=name))
-    unit = f"[{quantity.unit}]"
-    return Panel(
-        items,
-        f"{quantity.title} x {unit}",
-        f"{quantity.title} z {unit}",
-        equal=True,
-        legend="" if good.all() else BESIDE,
-    )
+    return Panel(items, *TIP_LABELS, equal=True, legend="" if good.all() else BESIDE)

@@ -9,9 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from notchflex.plotting.bands import shaded
-from notchflex.plotting.branches import LOADING, UNLOADING, driven_by_stroke, steps_by_branch
-from notchflex.plotting.curves import notches_panel, strain_panel, stroke_panel, total_panel
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.curves import (
+    LOADING,
+    NOTCH_LABEL,
+    UNLOADING,
+    driven_by_stroke,
+    notches_panel,
+    steps_by_branch,
+    strain_panel,
+    stroke_panel,
+    total_panel,
+)
+from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
@@ -145,7 +154,7 @@ def state_shape(path: EquilibriumPath, step: int) -> Panel:
 def notch_angles(path: EquilibriumPath, step: int) -> Panel:
     """Return the angle of every notch in one state, base to tip."""
     quantity = QUANTITIES["notch_angle"]
-    labels = "notch [number], 1 at the base", quantity.label
+    labels = NOTCH_LABEL, quantity.label
     if not path.converged[step]:
         return Panel([Note("not converged")], *labels)
     angle = path.notch_angle[step] * quantity.scale

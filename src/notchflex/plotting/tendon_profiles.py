@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.branches import abscissa, steps_by_branch
-from notchflex.plotting.curves import LINE, NEUTRAL, branch_lines
+from notchflex.plotting.curves import LINE, NEUTRAL, abscissa, branch_lines, steps_by_branch
 from notchflex.plotting.sheet import BESIDE, Colour, Curve, Mark, Panel
 from notchflex.plotting.style import sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES, spans_of

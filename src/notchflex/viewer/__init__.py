@@ -7,18 +7,18 @@ extra; `Viewer` needs them.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from notchflex.viewer.server.address import HOST, PORT, check_host, check_installed, exposed
+from notchflex.viewer.server import HOST, PORT, check_host, check_installed, exposed
 
 if TYPE_CHECKING:
     from notchflex.viewer.controls import Controls
     from notchflex.viewer.session import Session
-    from notchflex.viewer.target_queue import TargetQueue
+    from notchflex.viewer.tasks import TargetQueue
     from notchflex.viewer.viewer import Viewer
 
 __all__ = ["HOST", "PORT", "Controls", "Session", "TargetQueue", "Viewer"]
 __all__ += ["check_host", "check_installed", "exposed"]
 
-_MODULES = {"TargetQueue": "target_queue"}
+_MODULES = {"TargetQueue": "tasks"}
 
 
 def __getattr__(name: str) -> Any:

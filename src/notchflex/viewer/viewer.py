@@ -11,16 +11,13 @@ from threading import Event
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.viewer import parts
-from notchflex.viewer.controls import Controls
+from notchflex.viewer.controls import STRETCH, Controls, reach_of
 from notchflex.viewer.page.page import Page
 from notchflex.viewer.page.readout import beyond
-from notchflex.viewer.reach import STRETCH, reach_of
 from notchflex.viewer.scene.scene import Scene, Shown
-from notchflex.viewer.server.address import HOST, PORT, check_host, check_installed
-from notchflex.viewer.server.serving import bracketed, serve
+from notchflex.viewer.server import HOST, PORT, bracketed, check_host, check_installed, serve
 from notchflex.viewer.session import Session
-from notchflex.viewer.target_queue import TargetQueue
-from notchflex.viewer.tasks import Tasks, WatchedFile
+from notchflex.viewer.tasks import TargetQueue, Tasks, WatchedFile
 
 # A browser does not show more steps a second than this.
 MOST_STEPS = 60.0

@@ -192,11 +192,7 @@ def _strip(notch: StripNotch, robot: Robot, first: bool, following: Notch | None
             ],
             [Dimension(-0.5 * length, 0.5 * length, f"strip\nlength\n{length:.4g}")],
         ],
-        projected=[
-            (vertex, -corner, 0),
-            (line.at, 0.5 * length, 1),
-            (line.at, -0.5 * length, 1),
-        ],
+        projected=[(vertex, -corner, 0), (line.at, 0.5 * length, 1), (line.at, -0.5 * length, 1)],
         section_at=float(cuts[1].edge[0, 0]),
         section_from=corner,
         toward=True,

@@ -16,7 +16,7 @@ from notchflex.plotting.fits.calibration_rows import (
     residual_entries,
     residual_panel,
 )
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import (
     DASHED,
     DOTTED,

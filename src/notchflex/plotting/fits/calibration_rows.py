@@ -24,8 +24,9 @@ MOST_NAMED = 8
 """Of so many notches a legend has the first and the last colour only."""
 
 _OTHERS = dots([], GREY, 3.5, marker="X", name="residuals of others", group="others")
-_KINDS = {"notch_angle": "angle", "total_angle": "angle", "tip_rotation": "angle"}
-_KINDS |= {"tip_tension": "tension"}
+_KINDS = dict.fromkeys(("notch_angle", "total_angle", "tip_rotation"), "angle") | {
+    "tip_tension": "tension"
+}
 
 
 def data_panels(fit: Calibration, label: str) -> Iterator[Panel]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.outline import outline
 from notchflex.plotting.shapes.robot_shape import shape_from_angles
 from notchflex.plotting.sheet import (
@@ -28,15 +28,7 @@ from notchflex.plotting.sheet import (
     dots,
     grid,
 )
-from notchflex.plotting.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    VERMILLION,
-    sequence_colours,
-)
+from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import DEGREES, QUANTITIES
 
 if TYPE_CHECKING:

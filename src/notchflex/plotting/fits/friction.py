@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex._quantity import DEGREES
-from notchflex.plotting.picture import Picture
+from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, Span, dots, grid
 from notchflex.plotting.style import BLUE, GREY, ORANGE, VERMILLION
 

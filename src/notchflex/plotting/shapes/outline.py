@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from notchflex.plotting.shapes.robot_shape import HELD, UP, RobotShape
 from notchflex.robot import Robot
 
+Wall = tuple[float, float] | None
 _CLAMP = 1.7  # half the width of the clamp, in outer radii
 
 
@@ -92,7 +93,7 @@ def body_corners(shape: RobotShape, body: int, view: float) -> list[tuple[float,
     return _body(right, left, tube.outer_radius, reach)
 
 
-def _sides(shape: RobotShape, body: int, view: float) -> list[tuple[float, float] | None]:
+def _sides(shape: RobotShape, body: int, view: float) -> list[Wall]:
     """Return the ends of the wall of a body on the right and the left; None if no wall."""
     return [shape.walls(np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
 
@@ -118,11 +119,8 @@ def _reach(
     The inner radius, or less where a flexure is attached.
     """
     reach = [inner, inner]
-    joined = []
-    if body:
-        joined.append((shape.flexures[body - 1], -1))
-    if body < len(shape.flexures):
-        joined.append((shape.flexures[body], 0))
+    joined = [(shape.flexures[body - 1], -1)] if body else []
+    joined += [(one, 0) for one in shape.flexures[body : body + 1]]
     for one, end in joined:
         edges = np.stack([one.fibre(-one.spine)[end], one.position[end], one.fibre(one.near)[end]])
         local = (edges - shape.position[body]) @ shape.rotation[body] @ across
@@ -133,10 +131,7 @@ def _reach(
 
 
 def _body(
-    right: tuple[float, float] | None,
-    left: tuple[float, float] | None,
-    outer: float,
-    reach: tuple[float, float],
+    right: Wall, left: Wall, outer: float, reach: tuple[float, float]
 ) -> list[tuple[float, float]]:
     """Return the corners of a body (across, along), counter-clockwise from the lower right."""
     if right is None or left is None:
@@ -150,15 +145,6 @@ def _body(
     # Walls that overlap are connected at right angles, others diagonally.
     top = [(reach[0], high), (-reach[1], high)] if high > low else []
     foot = [(-reach[1], low), (reach[0], low)] if high > low else []
-    return [
-        (outer, right[0]),
-        (outer, right[1]),
-        (reach[0], right[1]),
-        *top,
-        (-reach[1], left[1]),
-        (-outer, left[1]),
-        (-outer, left[0]),
-        (-reach[1], left[0]),
-        *foot,
-        (reach[0], right[0]),
-    ]
+    upper = [(outer, right[1]), (reach[0], right[1]), *top, (-reach[1], left[1]), (-outer, left[1])]
+    lower = [(-outer, left[0]), (-reach[1], left[0]), *foot, (reach[0], right[0])]
+    return [(outer, right[0]), *upper, *lower]

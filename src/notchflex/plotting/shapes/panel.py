@@ -8,13 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.branches import by_stroke, driven_by_stroke
-from notchflex.plotting.shapes.applied_loads import (
-    COLOUR,
-    AppliedLoad,
-    applied_loads,
-    out_of_plane,
-)
+from notchflex.plotting.curves import by_stroke, driven_by_stroke
+from notchflex.plotting.shapes.applied_loads import COLOUR, AppliedLoad, applied_loads, out_of_plane
 from notchflex.plotting.shapes.outline import bending_plane, outline, project
 from notchflex.plotting.shapes.robot_shape import FlexureShape, RobotShape, shape_at
 from notchflex.plotting.sheet import (
@@ -112,7 +107,8 @@ def shape_panel(
             items += _from_the_side(shape, view, colour, label, order)
         closed += [shape.lips(int(notch)) for notch in np.flatnonzero(path.closed[step])]
         loads += applied_loads(path, step, shape)
-    top, extent = 3 * len(steps) + 5, _extent(path)
+    top, bodies = 3 * len(steps) + 5, np.diff(path.body_position[0], axis=0)
+    extent = float(np.linalg.norm(bodies, axis=1).sum() + path.robot.tube.outer_diameter)
     if closed:
         points = np.array(closed) if view is None else project(closed, view)
         name = "closed notch"
@@ -124,7 +120,9 @@ def shape_panel(
     if view is None:
         labels = "x [mm]", "y [mm]", "z, along the base [mm]"
         return Panel(items, *labels, title=title, legend=legend)
-    labels = f"across the base, {_across_name(view)} [mm]", "along the base, z [mm]"
+    degrees = round(float(np.degrees(view)), 6) % 360
+    across = {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
+    labels = f"across the base, {across} [mm]", "along the base, z [mm]"
     return Panel(items, *labels, title=title, legend=legend, equal=True, scale="shape")
 
 
@@ -145,17 +143,6 @@ def load_label(path: EquilibriumPath, step: int) -> str:
 def scaled_arrow(one: AppliedLoad, largest: float, longest: float) -> NDArray[np.float64]:
     """Return the arrow of a load [mm]: `longest` for the largest load, never too short to see."""
     return longest * max(one.size / largest, SHORTEST) * one.vector / one.size
-
-
-def _across_name(view: float) -> str:
-    degrees = round(float(np.degrees(view)), 6) % 360
-    return {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
-
-
-def _extent(path: EquilibriumPath) -> float:
-    """Return the approximate length of a robot [mm]."""
-    steps = np.diff(path.body_position[0], axis=0)
-    return float(np.linalg.norm(steps, axis=1).sum() + path.robot.tube.outer_diameter)
 
 
 def _from_the_side(
@@ -236,7 +223,9 @@ def flexure_faces(shape: RobotShape) -> Iterator[Quads]:
     outer = shape.robot.tube.outer_radius
     closes = np.asarray(shape.chain.rods.has_closure) > 0.0
     for one, spine in zip(shape.flexures, closes, strict=True):
-        lines = _spine(one, outer) if spine else _band(one)
+        half = 0.5 * one.area / (one.spine + one.near)
+        band = [(-one.spine, -half), (-one.spine, half), (one.near, half), (one.near, -half)]
+        lines = _spine(one, outer) if spine else [*band, band[0]]
         along = np.stack([one.fibre(across, out) for across, out in lines], axis=1)
         corners = [along[:-1, :-1], along[:-1, 1:], along[1:, 1:], along[1:, :-1]]
         yield np.stack(corners, axis=2).reshape(-1, 4, 3)
@@ -257,9 +246,3 @@ def _spine(one: FlexureShape, outer: float) -> list[tuple[Any, Any]]:
     half = float(np.arccos(np.clip((axis[0] - one.near[0]) / outer, -1.0, 1.0)))
     angles = np.pi + np.linspace(-half, half, 9)
     return [(axis + outer * np.cos(angle), outer * np.sin(angle)) for angle in angles]
-
-
-def _band(one: FlexureShape) -> list[tuple[Any, Any]]:
-    half = 0.5 * one.area / (one.spine + one.near)
-    corners = [(-one.spine, -half), (-one.spine, half), (one.near, half), (one.near, -half)]
-    return [*corners, corners[0]]

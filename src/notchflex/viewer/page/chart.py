@@ -13,11 +13,10 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.branches import branches
-from notchflex.plotting.curves import COLOUR
+from notchflex.plotting.curves import COLOUR, branches
 from notchflex.plotting.sheet import Curve, Mark, Panel, dots
 from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.viewer.scene.colours import TENDON, contact_colours, css
+from notchflex.viewer.scene.marks import TENDON, contact_colours, css
 from notchflex.viewer.session import Session
 
 WIDTH, HEIGHT = 290, 190

@@ -14,7 +14,6 @@ from notchflex.viewer.page import saving
 from notchflex.viewer.page.sliders import Dropdown, NumberField, Slider, add_button
 
 if TYPE_CHECKING:
-    from notchflex.viewer.page.page import Page
     from notchflex.viewer.viewer import Viewer
 
 _BY = {TENSION: "tension [N]", STROKE: "stroke [mm]"}
@@ -190,16 +189,15 @@ class PartControls:
                 field.put(numbers[key].value)
 
 
-def add_robot_folders(page: Page) -> list[Any]:
+def add_robot_folders(viewer: Viewer) -> list[Any]:
     """Add and return the folders "Show", "Robot" and "Save"."""
-    viewer = page.viewer
     gui = viewer.server.gui
     with gui.add_folder("Show", order=5.0, expand_by_default=False) as show:
         for field in dataclasses.fields(viewer.shown):
             _add_switch(viewer, field.name)
         side = "View from the side"
-        add_button(gui, side, lambda _: viewer.ask(lambda: page.look(side=True)))
-        add_button(gui, "View as at first", lambda _: viewer.ask(page.look))
+        add_button(gui, side, lambda _: viewer.ask(lambda: viewer.page.look(side=True)))
+        add_button(gui, "View as at first", lambda _: viewer.ask(viewer.page.look))
     with gui.add_folder("Robot", order=6.0, expand_by_default=False) as robot:
         Dropdown(gui, "ready robot", (_CHOOSE, *list_robots()), lambda name: _load(viewer, name))
         file = gui.add_upload_button("Load a robot file", mime_type=".toml")
@@ -211,9 +209,9 @@ def add_robot_folders(page: Page) -> list[Any]:
 
     def sender(sentence: str, send: Callable[[Any, Viewer], None]) -> Callable[[Any], None]:
         def act(client: Any) -> None:
-            page.busy(sentence)
+            viewer.page.busy(sentence)
             viewer.ask(lambda: send(client, viewer))
-            viewer.ask(page.update)
+            viewer.ask(viewer.page.update)
 
         return act
 

@@ -60,7 +60,7 @@ class Page:
             for order, section in enumerate(parts.SECTIONS, start=3)
         }
         folders = [part.folder for part in self.parts.values()]
-        self._folders = [*self.loads.folders, *folders, *add_robot_folders(self)]
+        self._folders = [*self.loads.folders, *folders, *add_robot_folders(viewer)]
         self.name()
         eye = viewer.scene.eye(viewer.session.pointing)
         camera = viewer.server.initial_camera

@@ -12,7 +12,7 @@ from notchflex.plotting.style import BLUE, VERMILLION
 from notchflex.results.quantities.registry import CONTACT_STATES, QUANTITIES
 from notchflex.robot import Robot
 from notchflex.viewer.page.chart import axis
-from notchflex.viewer.scene.colours import (
+from notchflex.viewer.scene.marks import (
     BEYOND,
     CLOSED,
     CONTACT,

@@ -116,10 +116,10 @@ def _write(axes: Axes, session: Session) -> None:
     look: dict[str, Any] = {"fontsize": 9, "parse_math": False, "transform": axes.transAxes}
     axes.text(0.0, 1.0, "\n".join(lines), va="top", **look)
     ball = {"linestyle": "none", "marker": "o", "markersize": 7}
-    handles = [
-        Line2D([], [], color=colour, label=text, **(ball if mark == BALL else {}))
-        for colour, mark, text in entries(session.robot)
-    ]
+    handles: list[Line2D] = []
+    for colour, mark, text in entries(session.robot):
+        shape: dict[str, Any] = ball if mark == BALL else {}
+        handles.append(Line2D([], [], color=colour, label=text, **shape))
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, -0.02), "ncols": 2}
     axes.legend(handles=handles, fontsize=8, handlelength=1.2, **place)
     allowed = session.robot.material.allowed_strain

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from notchflex.viewer.tasks import PAUSE
+from notchflex.viewer.tasks import PAUSE, Task
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
@@ -39,8 +39,8 @@ class NumberField:
     def _changed(self, value: float) -> None:
         self._send(value, PAUSE)
 
-    def _send(self, value: float, pause: float) -> None:
-        self._viewer.tasks.add(lambda: self._act(value), self._key, pause)
+    def _send(self, value: float, pause: float, now: Task | None = None) -> None:
+        self._viewer.tasks.add(lambda: self._act(value), self._key, pause, now)
         self._shown = value
 
     def put(self, value: float) -> None:
@@ -83,9 +83,10 @@ class Slider(NumberField):
             self._shown = value
             return  # when it is left, the page itself resets what was typed beyond an end
         jump = abs(value - before) > _JUMP * (high - low)
-        self._send(value, PAUSE if jump else 0.0)
-        if jump:  # at once, though the new value may still be typed
-            self._viewer.targets.hold(self._number)
+        if not jump:
+            self._send(value, 0.0)
+        else:  # the robot holds at once, though the new value may still be typed
+            self._send(value, PAUSE, lambda: self._viewer.targets.hold(self._number))
 
     def stretch(self, ends: tuple[float, float]) -> None:
         """Change its ends."""

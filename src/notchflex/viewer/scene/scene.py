@@ -15,11 +15,9 @@ from notchflex.plotting.shapes.interpolation import rotation_of
 from notchflex.plotting.shapes.robot_shape import HELD, RobotShape, shape_at
 from notchflex.results import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.viewer.controls import POINTING, Controls
-from notchflex.viewer.reach import GRAVITY, Reach, round_up
+from notchflex.viewer.controls import GRAVITY, POINTING, Controls, Reach, round_up
 from notchflex.viewer.scene.camera import CameraPose, first_eye, framed, quaternions
-from notchflex.viewer.scene.colours import LOAD, METAL, linear, strain_colour
-from notchflex.viewer.scene.marks import Marks, Shown
+from notchflex.viewer.scene.marks import LOAD, METAL, Marks, Shown, linear, strain_colour
 from notchflex.viewer.scene.solids import PIECES, FlexureSurface, at_rest, body_solids, skins
 
 if TYPE_CHECKING:
@@ -49,13 +47,18 @@ class Scene:
 
     def _build(self) -> None:
         """Add all nodes."""
+        import trimesh
+
         scene, rest, outer = self.server.scene, self.rest, self.robot.tube.outer_radius
         self._add_lights()
         self._root = scene.add_frame(ROOT, show_axes=False)
-        self._bodies = [
-            _solid(scene, f"{ROOT}/body_{number}", *mesh)
-            for number, mesh in enumerate(body_solids(rest))
-        ]
+        self._bodies: list[Any] = []
+        for number, mesh in enumerate(body_solids(rest)):
+            solid = trimesh.Trimesh(*mesh, process=False)
+            shaded = trimesh.graph.smooth_shade(solid, angle=_SMOOTH)
+            name = f"{ROOT}/body_{number}"
+            node = scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
+            self._bodies.append(node)
         self._skins: list[FlexureSurface] = skins(rest)
         self._skins_of: dict[str, list[FlexureSurface]] = {}
         look: dict[str, Any] = {"color": METAL, "flat_shading": True}
@@ -192,12 +195,3 @@ class Scene:
         """Remove all nodes."""
         self._root.remove()
         self._grid.remove()
-
-
-def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
-    """Add a solid with sharp edges and smooth round faces."""
-    import trimesh
-
-    whole = trimesh.Trimesh(vertices, faces, process=False)
-    shaded = trimesh.graph.smooth_shade(whole, angle=_SMOOTH)
-    return scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
