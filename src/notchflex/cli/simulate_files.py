@@ -21,11 +21,7 @@ def write(
 ) -> None:
     """Write what was asked for: JSON and picture of all paths, other files of the first.
 
-    Args:
-        paths: Label to path.
-        outputs: What was asked for.
-        title: The heading of the picture.
-        bands: Bands of tolerances for JSON, CSV and the picture.
+    Bands of tolerances go to JSON, CSV and the picture.
     """
     from notchflex.results.files.csv import write_path_csv
     from notchflex.results.files.dataframe import write_parquet

@@ -53,8 +53,7 @@ def batch_picture(
         >>> picture.cells[-1].panel.x_label
         'tip position x [mm]'
     """
-    first = next(iter(batch.values()))
-    rows = len(first)
+    rows = len(next(iter(batch.values()), ()))
     x = np.arange(1.0, rows + 1.0) if against is None else np.asarray(against, float)
     if x.shape != (rows,):
         raise InputError.WRONG_SHAPE(

@@ -52,10 +52,10 @@ def closing_tensions(
         Tensions (N), NaN where none was found, and statuses (`ClosingStatus`).
     """
     low, high, failed = _bracket(overlap, guess)
-    found = np.isfinite(high)
-    tension, precise = find_roots(overlap, low, np.where(found, high, low))
-    closes = found & precise
-    return np.where(closes, tension, np.nan), statuses(closes, ~found & ~failed)
+    bracketed = np.isfinite(high)
+    tension, precise = find_roots(overlap, low, np.where(bracketed, high, low))
+    closes = bracketed & precise
+    return np.where(closes, tension, np.nan), statuses(closes, ~bracketed & ~failed)
 
 
 def statuses(closes: Bool[np.ndarray, " m"], never: Bool[np.ndarray, " m"]) -> np.ndarray:

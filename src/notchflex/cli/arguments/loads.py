@@ -42,12 +42,7 @@ class TendonCommand(NamedTuple):
 
 
 def tendon_command(option: str, *, negative: bool = False) -> Parameter:
-    """Return the parameter of an option `SPEC` or `TENDON=SPEC` that may be given several times.
-
-    Args:
-        option: Its name.
-        negative: Whether negative numbers are allowed.
-    """
+    """Return the parameter of an option `SPEC` or `TENDON=SPEC` that may be given several times."""
     return converted(partial(_read_command, option, negative), "SPEC", several=True)
 
 
@@ -68,11 +63,6 @@ def load_columns(
     """Return the commanded tensions and strokes of every step.
 
     A single value holds for all steps; longer columns must have one length.
-
-    Args:
-        tension: The commands of `--tension`.
-        stroke: The commands of `--stroke`.
-        tendons: Number of tendons of the robot.
 
     Returns:
         Tensions [N] and strokes [mm], each (S, tendons), NaN where not commanded.

@@ -151,12 +151,7 @@ _NEVER_ASKED = {
 
 
 def commented(text: str, defaulted: Set[str]) -> str:
-    """Mark the values that nobody measured, and explain each key only once.
-
-    Args:
-        text: A robot file in a fresh layout.
-        defaulted: The options whose default was taken.
-    """
+    """Mark the values that nobody measured, and explain each key only once."""
     taken = (_DEFAULTS[option] for option in defaulted if option in _DEFAULTS)
     marks = _NEVER_ASKED | {(section, key): comment for section, key, comment in taken}
     lines: list[str] = []

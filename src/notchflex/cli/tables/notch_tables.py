@@ -28,14 +28,7 @@ SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
 
 
 def print_robot(robot: Robot, title: str, length: float, notches: list[dict[str, Any]]) -> None:
-    """Print what `notchflex show` shows.
-
-    Args:
-        robot: The robot.
-        title: The first line.
-        length: Length of the robot, mm.
-        notches: The rows of `analysis.notch_table`.
-    """
+    """Print what `notchflex show` shows."""
     console = terminal.output()
     tube = robot.tube
     console.print(title, style="bold", soft_wrap=True)

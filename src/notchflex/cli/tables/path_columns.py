@@ -127,9 +127,6 @@ def named_groups(
 def parse_columns(text: str) -> list[str]:
     """Return the quantities that `--columns` names.
 
-    Args:
-        text: Names of the table of quantities, joined by commas.
-
     Example:
         >>> parse_columns("tension, notch_angle")
         ['tension', 'notch_angle']

@@ -70,13 +70,7 @@ def print_path(
 def print_beside(
     paths: Mapping[str, EquilibriumPath], *, columns: Sequence[str] = (), every_row: bool = False
 ) -> None:
-    """Print quantities of several paths under the same loads, side by side.
-
-    Args:
-        paths: Label to path.
-        columns: Quantities to show, by their names; the total angle where none are named.
-        every_row: Whether all steps of a long path are shown.
-    """
+    """Print quantities of several paths under the same loads, side by side."""
     first = next(iter(paths.values()))
     rows, _ = shown_rows(first, every_row=every_row)
     room = terminal.width()
