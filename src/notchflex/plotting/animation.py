@@ -44,11 +44,10 @@ def save_animation(
 ) -> None:
     """Write a path as a GIF: the robot moves, and dots run along its curves.
 
-    It takes four seconds or more; the first and the last frame are shown longer. Of a long path an
-    even selection of steps is shown.
+    It takes four seconds or more; the first and the last frame are shown longer.
 
     Args:
-        path: Solved path.
+        path: Solved path; of a long one an even selection of steps is shown.
         target: Name of a file that ends in .gif; it is written completely or not at all.
         title: Heading; the name of the robot if None.
         progress: Called with the number of finished frames and of all frames.
@@ -76,9 +75,8 @@ def save_animation(
     figure.draw_without_rendering()  # arranges the axes, once for all frames
     figure.set_layout_engine("none")
     robot, *curves = figure.axes
-    names = "xyz" if robot.name == "3d" else "xy"
+    view, names = plane_of(path), "xyz"[: 3 if robot.name == "3d" else 2]
     limits = {name: getattr(robot, f"get_{name}lim")() for name in names}
-    view = plane_of(path)
     dots = [axes.plot([], [], "o", color=BLACK, markersize=5.0, zorder=9)[0] for axes in curves]
     frame, standing = _durations(len(steps))
     writer = PillowWriter(fps=1.0 / frame)  # pyright: ignore[reportArgumentType]
@@ -95,7 +93,7 @@ def save_animation(
                 dot.set_data(*points)
             for _ in range(standing if number in (0, len(steps) - 1) else 1):
                 writer.grab_frame()
-            if progress is not None:
+            if progress:
                 progress(number + 1, len(steps))
 
 
