@@ -50,7 +50,8 @@ def show(
         from notchflex.results.files.json import document_head
 
         notches = notch_table(chosen)
-        bands = closing_bands(chosen, closing(chosen))
+        wanted = outputs.prints_tables or json is not None
+        bands = closing_bands(chosen, closing(chosen)) if wanted else None
         straight = np.zeros((1, chosen.number_of_notches))
         length = float(tip_from_angles(chosen, straight)[0][0, 2])
     more = {} if bands is None else {"tolerances": closing_document(bands)}
