@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from notchflex.mechanics.chain import unchecked_dimensions
+
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
@@ -21,10 +23,12 @@ def path_warnings(path: EquilibriumPath) -> list[str]:
         path: Solved path.
 
     Returns:
-        Sentences on strains beyond what the material is allowed or its law is known for, on
-        unstable equilibria, and on too few strain modes; none if there is nothing to warn of.
+        Sentences on dimensions outside the range that was checked, on strains beyond what the
+        material is allowed or its law is known for, on unstable equilibria, and on too few strain
+        modes; none if there is nothing to warn of.
     """
-    return [*_strains(path), *_unstable(path), *_coarse(path)]
+    outside = unchecked_dimensions(path.robot)
+    return [*outside, *_strains(path), *_unstable(path), *_coarse(path)]
 
 
 def _strains(path: EquilibriumPath) -> Iterator[str]:

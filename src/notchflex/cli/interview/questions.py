@@ -93,7 +93,8 @@ def _ask_part(interview: Interview, section: str, kind: type[T]) -> T:
 def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
     """Ask for the number of notches of a kind, and for their keys: one value, or one for each."""
     kind = _usual_or_asked(interview, "--kind", Notch, "Kind of notch, ")
-    keys = [key for key in fields_of(kind) if key not in ("kind", "repeat")]
+    worded = WORDINGS.get(("notch", kind_of(kind)))
+    keys = list(worded or (key for key in fields_of(kind) if key not in ("kind", "repeat")))
     same = {"cut": _ask(interview, "notch", kind, "cut")} if "cut" in keys else {}
     count: int = interview.ask(
         Question(
@@ -102,7 +103,12 @@ def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
             lambda text: whole(text, at_least=1, at_most=MOST_NOTCHES),
         )
     )
-    columns: dict[str, list[Any]] = {key: [value] * count for key, value in same.items()}
+    # From the drawing, unless told otherwise.
+    further = {"ends": "shell"} if "ends" in fields_of(kind) and "ends" not in keys else {}
+    further |= interview.set_values("notch", but=tuple(keys))
+    columns: dict[str, list[Any]] = {
+        key: [value] * count for key, value in (same | further).items()
+    }
     for key in (key for key in keys if key not in same):
         limits = {"below": tube.outer_diameter} if key == "depth" else {}
         columns[key] = _ask(
@@ -141,9 +147,12 @@ def _ask_tendons(
         Tendon(radius, direction, **further)
         for radius, direction in zip(radii, directions, strict=True)
     ]
-    # Over a strip or a link there is no arc of the wall: such a tendon runs straight.
-    no_arc = any("path" in dict(one.tendon_problems(tendons[0])) for one in notches)
-    if no_arc and "path" not in further:
+    # Over a strip or a link there is no arc of the wall, and in finite elements the tendon of a
+    # wrist spans its notches: such a tendon runs straight.
+    straight = any(
+        "path" in dict(one.tendon_problems(tendons[0])) or one.has_elastic_ends for one in notches
+    )
+    if straight and "path" not in further:
         tendons = [dataclasses.replace(tendon, path="straight") for tendon in tendons]
     return tuple(tendons)
 

@@ -138,7 +138,10 @@ _DEFAULTS = {
 
 _NEVER_ASKED = {
     ("tendon", "axial_stiffness"): "assumed: inextensible",
-    ("tendon", "path"): "assumed: the tendon follows the wall",
+    ("notch", "ends"): "checked against finite elements",
+    ("notch", "depth_at"): "assumed",
+    ("notch", "closing"): "assumed",
+    ("tendon", "path"): "assumed",
     ("tendon", "free_length"): "assumed; without effect on an inextensible tendon",
     ("material", "plastic_strain"): _CODE,
     ("material", "plastic_modulus"): _CODE,
