@@ -7,6 +7,11 @@ from scipy.special import ndtri
 import notchflex as nf
 from notchflex.analysis.uncertainty.assumed import tolerances_of
 from notchflex.analysis.uncertainty.closing_bands import closing_bands
+from notchflex.plotting import picture
+from notchflex.plotting.sheet import Area
+from notchflex.robot import from_table, to_table
+from notchflex.robot.kinds import Material, kinds_of
+from notchflex.robot.tolerance import amount
 from notchflex.robot.value_names import number_at
 
 # Of a normal distribution, 5 % lie below minus this many standard deviations.
@@ -172,6 +177,26 @@ def test_the_file_replaces_what_is_assumed(wrist: nf.Robot):
     assert sizes["notch.depth"] == pytest.approx(0.005 * large.tube.outer_diameter, rel=0.01)
 
 
+@pytest.mark.skipif("nitinol" not in kinds_of(Material), reason="no such kind of material")
+def test_nitinol_has_the_ranges_of_published_tubes(wrist: nf.Robot):
+    table = to_table(wrist)
+    table["material"] = {"kind": "nitinol", "elastic_modulus": 42e3, "plateau_stress": 350.0}
+    table["friction"] = {"kind": "capstan", "coefficient": 0.18}
+    robot = from_table(table)
+    limits = {
+        one.value: [
+            number_at(robot, one.value) + sign * amount(size, number_at(robot, one.value))
+            for sign, size in ((-1.0, one.minus), (1.0, one.plus))
+        ]
+        for one in tolerances_of(robot)[0]
+        if one.sd is None
+    }
+    assert limits["material.elastic_modulus"] == pytest.approx([30e3, 57e3], rel=2e-3)
+    assert limits["material.plateau_stress"] == pytest.approx([260.0, 460.0], rel=2e-3)
+    assert limits["material.plateau_modulus"] == pytest.approx([3e3, 9e3], rel=2e-3)
+    assert limits["friction.coefficient"] == pytest.approx([0.13, 0.19], rel=2e-3)
+
+
 @pytest.mark.parametrize(
     ("options", "code"),
     [
@@ -211,3 +236,16 @@ def test_closing_moves_with_the_tolerances(wrist: nf.Robot, margin):
     )
     margin.within("by depth", found.by_depth - 0.5 * (deeper - shallower), 1e-9, "rad")
     assert closing_bands(nf.load_robot("liu2022"), nf.closing(nf.load_robot("liu2022"))) is None
+
+
+def test_a_picture_shades_the_bands_of_both_branches(wrist: nf.Robot):
+    bands = nf.uncertain(wrist, nf.pull(0.0, 1.0, steps=4).release(), draws=8)
+    total = picture(bands).cells[2].panel
+    areas = [item for item in total.items if isinstance(item, Area)]
+    assert len(areas) == 2
+    corners = areas[0].polygons[0]
+    top = np.degrees(bands["total_angle"].high[3])
+    assert corners[:, 1].max() == pytest.approx(top, rel=1e-12)
+    text = repr(bands)
+    assert text.startswith("Bands of 8 draws over 8 steps")
+    assert "notch.depth" in text
