@@ -61,9 +61,8 @@ def _picture(result: Any) -> Picture:
         Bands: lambda bands: path_picture(bands.path, bands=bands),
         Comparison: comparison_picture,
     }
-    if isinstance(result, Mapping) and all(
-        isinstance(one, EquilibriumPath) for one in result.values()
-    ):
+    is_dict = isinstance(result, Mapping) and not isinstance(result, tuple(kinds))
+    if is_dict and all(isinstance(one, EquilibriumPath) for one in result.values()):
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
     if not isinstance(result, tuple(kinds)):
         from notchflex.fit import Calibration, FrictionRig  # takes a second
@@ -74,6 +73,6 @@ def _picture(result: Any) -> Picture:
         if isinstance(result, kind):
             return describe(result)
     raise InputError.WRONG_TYPE(
-        "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, a "
-        f"Comparison, a Calibration, a FrictionRig or a dict of paths; got {type(result).__name__}."
+        "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, "
+        f"Bands, a Comparison, a Calibration, a FrictionRig or a dict of paths; got {type(result).__name__}."
     )
