@@ -74,5 +74,6 @@ def _picture(result: Any) -> Picture:
             return describe(result)
     raise InputError.WRONG_TYPE(
         "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, "
-        f"Bands, a Comparison, a Calibration, a FrictionRig or a dict of paths; got {type(result).__name__}."
+        "Bands, a Comparison, a Calibration, a FrictionRig or a dict of paths; got "
+        f"{type(result).__name__}."
     )
