@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,20 @@ CUTS = ("on-axis", "off-axis")  # and the cuts 0, 1
 def reference(name: str) -> np.ndarray:
     """Rows of one of the tables that hold numbers only, under a header line with '#'."""
     return np.loadtxt(FOLDER / name, delimiter=",", comments="#", ndmin=2)
+
+
+def named_rows(name: str) -> list[dict[str, Any]]:
+    """Rows of one of the tables with names of columns in its first line, numbers as floats."""
+
+    def value(text: str) -> float | str:
+        try:
+            return float(text)
+        except ValueError:
+            return text
+
+    with (FOLDER / name).open(newline="", encoding="utf-8") as file:
+        lines = (line for line in file if not line.startswith("#"))
+        return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(lines)]
 
 
 def choose(table: np.ndarray, **columns: tuple[int, float]) -> np.ndarray:

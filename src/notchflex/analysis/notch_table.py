@@ -76,7 +76,7 @@ def named_values(notch: Notch) -> dict[str, Any]:
 
 
 def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
-    one = rod(notch, tube, site=site)
+    one = rod(notch, tube) if site is None else rod(notch, tube, site=site)
     section = one.section
     weakest = int(np.argmin(section.second_moment_weak))
     values: dict[str, Any] = {

@@ -303,7 +303,9 @@ def _flexure(
     notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int
 ) -> tuple[Rod, Motion]:
     """A flexure and its pose in the free robot."""
-    made = with_level(rod(notch, tube, refinement, site), level)
+    # Kinds whose ends are rigid need not know of sites.
+    whole = rod(notch, tube, refinement) if site is None else rod(notch, tube, refinement, site)
+    made = with_level(whole, level)
     return made, free_pose(made)
 
 

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from notchflex._jax import array_module, jax
 from notchflex.mechanics.ends.ring import HARMONICS, edge_compliance
+from notchflex.mechanics.ends.side import Side
 from notchflex.mechanics.section import Section, annular_sector
 
 RELAXATION = 0.833
@@ -34,13 +34,13 @@ class Arc(NamedTuple):
         section: The sector of that half angle, whatever the cut.
     """
 
-    radius: jax.Array
-    wall: jax.Array
-    half_angle: jax.Array
+    radius: float
+    wall: float
+    half_angle: float
     section: Section
 
 
-def arc_of(outer: jax.Array, inner: jax.Array, section: Section) -> Arc:
+def arc_of(outer: float, inner: float, section: Section) -> Arc:
     """Replace what the cut leaves by a sector of the same area.
 
     Args:
@@ -51,10 +51,9 @@ def arc_of(outer: jax.Array, inner: jax.Array, section: Section) -> Arc:
     Returns:
         The arc.
     """
-    xp = array_module(outer)
     radius, wall = 0.5 * (outer + inner), outer - inner
-    angle = section.area / (2.0 * radius * wall)
-    return Arc(radius, wall, angle, annular_sector(outer, inner, outer * (1.0 + xp.cos(angle))))
+    angle = float(section.area) / (2.0 * radius * wall)
+    return Arc(radius, wall, angle, annular_sector(outer, inner, outer * (1.0 + np.cos(angle))))
 
 
 class EndCompliance(NamedTuple):
@@ -67,34 +66,38 @@ class EndCompliance(NamedTuple):
         coupling: b_c, mm²: I E times the stretch of the centroid per bending moment.
     """
 
-    weak: jax.Array
-    strong: jax.Array
-    axial: jax.Array
-    coupling: jax.Array
+    weak: float
+    strong: float
+    axial: float
+    coupling: float
 
 
-def _harmonics(arc: Arc) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Fourier coefficients of (N, −M) for bending, bending sideways, tension: (harmonics, 2).
+def arc_harmonics(arc: Arc) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Expand the edge loads of the arc's stress in harmonics.
 
-    Each is for a unit moment or force. `_NORM` holds what the harmonics integrate to.
+    Args:
+        arc: The arc of the notch.
+
+    Returns:
+        Coefficients of (N, −M), shape (harmonics, 2), for a unit moment, a unit moment sideways
+        and a unit tension: in cos nφ, sin nφ, cos nφ.
     """
-    xp = array_module(arc.radius)
     r, t, a = arc.radius, arc.wall, arc.half_angle
     n = np.arange(HARMONICS, dtype=float)
     # Integrals over |φ| < a of cos nφ, cos φ cos nφ, sin φ sin nφ.
-    even = 2.0 * a * xp.sinc(n * (a / np.pi))
-    below, above = a * xp.sinc((n - 1.0) * (a / np.pi)), a * xp.sinc((n + 1.0) * (a / np.pi))
+    even = 2.0 * a * np.sinc(n * (a / np.pi))
+    below, above = a * np.sinc((n - 1.0) * (a / np.pi)), a * np.sinc((n + 1.0) * (a / np.pi))
     cosine, sine = below + above, below - above
     third = t**3 / 12.0
 
-    def loads(constant: jax.Array, varying: jax.Array) -> jax.Array:
+    def loads(constant: np.ndarray, varying: np.ndarray) -> np.ndarray:
         """Loads of the stress `constant` + (1 + ζ/r) `varying`, both over φ in harmonics."""
         force = t * (constant + varying) + third / r**2 * varying
         moment = third / r * (constant + 2.0 * varying)
-        return xp.stack([force, -moment], axis=-1) / _NORM[:, None]
+        return np.stack([force, -moment], axis=-1) / _NORM[:, None]
 
     section = arc.section
-    weak = loads(-section.centroid * even, r * cosine) / section.second_moment_weak
+    weak = loads(-float(section.centroid) * even, r * cosine) / section.second_moment_weak
     strong = loads(0.0 * sine, r * sine) / section.second_moment_strong
     return weak, strong, loads(even, 0.0 * even) / section.area
 
@@ -104,12 +107,11 @@ _RELAXED = np.where(np.arange(HARMONICS) < 2, 1.0, RELAXATION)
 
 
 def end_compliance(
-    outer: jax.Array,
-    inner: jax.Array,
+    outer: float,
+    inner: float,
     arc: Arc,
-    ring_length: jax.Array,
-    poisson_ratio: jax.Array,
-    boundary: str,
+    side: Side,
+    poisson_ratio: float,
     relaxation: np.ndarray = _RELAXED,
 ) -> EndCompliance:
     """Compute the compliance of a ring beyond that of a tube as stiff as a beam of its length.
@@ -118,29 +120,30 @@ def end_compliance(
         outer: Outer radius, mm.
         inner: Inner radius, mm.
         arc: The arc of the notch.
-        ring_length: From the edge to the plane of symmetry, clamp or free end, mm.
+        side: The ring; up to the plane of symmetry where it lies between two notches.
         poisson_ratio: Poisson's ratio ν.
-        boundary: "between", "clamped" or "free".
         relaxation: Factor on each harmonic.
 
     Returns:
-        The added lengths.
+        The added lengths; none where there is no ring.
     """
-    xp = array_module(outer, inner, ring_length, poisson_ratio)
-    weak, strong, axial = _harmonics(arc)
-    flexibility = edge_compliance(arc.radius, arc.wall, ring_length, poisson_ratio, boundary)
+    ring_length = 0.5 * side.length if side.boundary == "between" else side.length
+    if ring_length == 0.0:
+        return EndCompliance(0.0, 0.0, 0.0, 0.0)
+    weak, strong, axial = arc_harmonics(arc)
+    flexibility = edge_compliance(arc.radius, arc.wall, ring_length, poisson_ratio, side.boundary)
     weights = _NORM * relaxation
 
-    def energy(one: jax.Array, other: jax.Array) -> jax.Array:
-        return arc.radius * xp.einsum("n,ni,nij,nj->", weights, one, flexibility, other)
+    def energy(one: np.ndarray, other: np.ndarray) -> float:
+        return arc.radius * np.einsum("n,ni,nij,nj->", weights, one, flexibility, other)
 
     # As a beam, the ring turns by c/(E I_tube) under a moment and gives way by c/(E A_tube).
     bends = ring_length / (0.25 * np.pi * (outer**4 - inner**4))
     stretches = ring_length / (np.pi * (outer**2 - inner**2))
     section, offset = arc.section, arc.section.centroid
     return EndCompliance(
-        weak=section.second_moment_weak * (energy(weak, weak) - bends),
-        strong=section.second_moment_strong * (energy(strong, strong) - bends),
-        axial=section.area * (energy(axial, axial) - stretches - bends * offset**2),
-        coupling=section.second_moment_weak * (energy(weak, axial) - bends * offset),
+        weak=float(section.second_moment_weak * (energy(weak, weak) - bends)),
+        strong=float(section.second_moment_strong * (energy(strong, strong) - bends)),
+        axial=float(section.area * (energy(axial, axial) - stretches - bends * offset**2)),
+        coupling=float(section.second_moment_weak * (energy(weak, axial) - bends * offset)),
     )

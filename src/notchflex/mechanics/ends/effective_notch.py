@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
-from numbers import Real
 from typing import NamedTuple
 
-from jax.typing import ArrayLike
-
-from notchflex._jax import array_module, jax
 from notchflex.mechanics.ends.edge_loads import arc_of, end_compliance
 from notchflex.mechanics.ends.flattening import edge_and_brazier, flattening_numbers
 from notchflex.mechanics.ends.side import Side
@@ -27,7 +22,7 @@ class NotchStiffness(NamedTuple):
 
     The section is the true one of the cut (`annular_sector`, `annular_segment`): its area A,
     second moments I (weak) and I_y (strong), torsion constant J, centroid ȳ. All fields are
-    scalars, differentiable by every number that went in.
+    plain numbers.
 
     Attributes:
         weak: ℓ = h + δ, mm: θ = M ℓ/(E I) at small angles.
@@ -46,25 +41,26 @@ class NotchStiffness(NamedTuple):
         closed_ratio: Stiffness of the closed notch, its lips in contact, over K₀.
     """
 
-    weak: jax.Array
-    strong: jax.Array
-    axial: jax.Array
-    coupling: jax.Array
-    torsion: jax.Array
-    shear_centre: jax.Array
-    alpha: jax.Array
-    beta: jax.Array
-    closing_factor: jax.Array
-    closed_ratio: jax.Array
+    weak: float
+    strong: float
+    axial: float
+    coupling: float
+    torsion: float
+    shear_centre: float
+    alpha: float
+    beta: float
+    closing_factor: float
+    closed_ratio: float
 
 
+@lru_cache(maxsize=1024)
 def notch_stiffness(
-    outer_radius: ArrayLike,
-    inner_radius: ArrayLike,
+    outer_radius: float,
+    inner_radius: float,
     cut: str,
-    depth: ArrayLike,
-    height: ArrayLike,
-    poisson_ratio: ArrayLike,
+    depth: float,
+    height: float,
+    poisson_ratio: float,
     proximal: Side,
     distal: Side,
 ) -> NotchStiffness:
@@ -81,61 +77,35 @@ def notch_stiffness(
         distal: The ring toward the tip.
 
     Returns:
-        The numbers; computed once for each set of plain numbers.
+        The numbers, smooth in every number that goes in; kept for the same ones.
+
+    Example:
+        >>> ring = Side("between", 1.2)
+        >>> round(notch_stiffness(0.81, 0.70, "on-axis", 1.4, 0.8, 0.33, ring, ring).weak, 3)
+        1.291
     """
-    numbers = (outer_radius, inner_radius, depth, height, poisson_ratio)
-    plain = all(isinstance(value, Real) for value in (*numbers, proximal.length, distal.length))
-    compute: Callable[..., NotchStiffness] = _of_plain_numbers if plain else _compute
-    return compute(*numbers, cut, proximal, distal)
-
-
-def _compute(
-    outer_radius: ArrayLike,
-    inner_radius: ArrayLike,
-    depth: ArrayLike,
-    height: ArrayLike,
-    poisson_ratio: ArrayLike,
-    cut: str,
-    proximal: Side,
-    distal: Side,
-) -> NotchStiffness:
-    """Compute what `notch_stiffness` returns."""
     sides = (proximal, distal)
-    numbers = (outer_radius, inner_radius, depth, height, poisson_ratio)
-    lengths = tuple(side.length for side in sides)
-    xp = array_module(*numbers, *lengths)
-    outer, inner, g, h, nu = (xp.asarray(value, dtype=float) for value in numbers)
-    near, far = (xp.asarray(value, dtype=float) for value in lengths)
-    boundaries = (proximal.boundary, distal.boundary)
-
-    section = SECTION_OF_CUT[cut](outer, inner, g)
-    arc = arc_of(outer, inner, section)
-    added = [
-        end_compliance(
-            outer, inner, arc, 0.5 * length if boundary == "between" else length, nu, boundary
-        )
-        for length, boundary in zip((near, far), boundaries, strict=True)
-    ]
-    weak = h + added[0].weak + added[1].weak
-
-    outer_angle, phi, brazier = flattening_numbers(outer, inner, cut, g, nu, section)
-    edge, share = edge_and_brazier(arc.radius, (near, far), boundaries)
-    imposed = 3.0 * nu * h + edge * outer_angle**3 * arc.radius**2 / arc.wall
-    return NotchStiffness(
-        weak=weak,
-        strong=h + added[0].strong + added[1].strong,
-        axial=h + added[0].axial + added[1].axial,
-        coupling=added[0].coupling + added[1].coupling,
-        torsion=torsion_length(arc, outer, h, nu, section),
-        shear_centre=shear_centre(arc, h, section),
-        alpha=arc.radius * phi * imposed / weak**2,
-        beta=share * brazier * h / weak**3,
-        closing_factor=xp.asarray(_CLOSING_FACTOR[cut]),
-        closed_ratio=(
-            _CLOSED_STIFFNESS * arc.wall * arc.radius**2 * weak / section.second_moment_weak
-        ),
+    section = SECTION_OF_CUT[cut](outer_radius, inner_radius, depth)
+    arc = arc_of(outer_radius, inner_radius, section)
+    added = [end_compliance(outer_radius, inner_radius, arc, side, poisson_ratio) for side in sides]
+    weak, strong, axial, coupling = (sum(each) for each in zip(*added, strict=True))
+    length = height + weak
+    outer_angle, phi, brazier = flattening_numbers(
+        outer_radius, inner_radius, cut, depth, poisson_ratio, section
     )
-
-
-# Plain numbers are computed by NumPy, once for each set of them.
-_of_plain_numbers = lru_cache(maxsize=1024)(_compute)
+    edge, share = edge_and_brazier(arc.radius, sides)
+    imposed = 3.0 * poisson_ratio * height + edge * outer_angle**3 * arc.radius**2 / arc.wall
+    closed = _CLOSED_STIFFNESS * arc.wall * arc.radius**2 * length / section.second_moment_weak
+    numbers = NotchStiffness(
+        weak=length,
+        strong=height + strong,
+        axial=height + axial,
+        coupling=coupling,
+        torsion=torsion_length(arc, outer_radius, height, poisson_ratio, section),
+        shear_centre=shear_centre(arc, height, section),
+        alpha=arc.radius * phi * imposed / length**2,
+        beta=share * brazier * height / length**3,
+        closing_factor=_CLOSING_FACTOR[cut],
+        closed_ratio=float(closed),
+    )
+    return NotchStiffness(*map(float, numbers))

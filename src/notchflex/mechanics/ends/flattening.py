@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex._jax import array_module, jax
+from notchflex.mechanics.ends.side import Side
 from notchflex.mechanics.section import Section
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -30,38 +30,35 @@ _BRAZIER = 0.97
 _EDGE_OF_SPECIMEN, _BRAZIER_OF_SPECIMEN = (0.465, 1.51), 0.74
 
 
-def _imposed(factor: float, decay: float, length: jax.Array, radius: jax.Array) -> jax.Array:
+def _imposed(factor: float, decay: float, length: float, radius: float) -> float:
     """What a ring of some length imposes at the edge of the notch, k."""
-    return -factor * array_module(length, radius).expm1(-((length / (decay * radius)) ** 2))
+    return -factor * np.expm1(-((length / (decay * radius)) ** 2))
 
 
-def edge_and_brazier(
-    radius: jax.Array, lengths: tuple[jax.Array, jax.Array], boundaries: tuple[str, str]
-) -> tuple[jax.Array, float]:
+def edge_and_brazier(radius: float, sides: tuple[Side, Side]) -> tuple[float, float]:
     """Average k over the two sides; with the factor c_b on Brazier's flattening.
 
     Args:
         radius: Mean radius r, mm.
-        lengths: Uncut lengths of the two rings, mm.
-        boundaries: Of the two rings.
+        sides: The two rings.
 
     Returns:
         k and c_b.
     """
-    specimen = boundaries == ("clamped", "clamped")
+    specimen = all(side.boundary == "clamped" for side in sides)
     edge = _EDGE_OF_SPECIMEN if specimen else _EDGE
-    both = [_imposed(*edge, length, radius) for length in lengths]
+    both = [_imposed(*edge, side.length, radius) for side in sides]
     return 0.5 * (both[0] + both[1]), _BRAZIER_OF_SPECIMEN if specimen else _BRAZIER
 
 
 def flattening_numbers(
-    outer: jax.Array,
-    inner: jax.Array,
+    outer: float,
+    inner: float,
     cut: str,
-    depth: jax.Array,
-    poisson_ratio: jax.Array,
+    depth: float,
+    poisson_ratio: float,
     section: Section,
-) -> tuple[jax.Array, jax.Array, jax.Array]:
+) -> tuple[float, float, float]:
     """Compute what the shape of the arc does to its flattening.
 
     Args:
@@ -75,73 +72,27 @@ def flattening_numbers(
     Returns:
         Half angle a_o of the arc on the outer surface, rad; φ, without unit; B, mm².
     """
-    xp = array_module(outer, depth, poisson_ratio)
     radius, wall = 0.5 * (outer + inner), outer - inner
-    outer_angle = xp.arccos((depth - outer) / outer)
+    outer_angle = np.arccos((depth - outer) / outer)
     # An off-axis cut beyond the mean radius leaves no arc at mid-wall; `validity` says so.
     a = outer_angle
     if cut == "off-axis":
-        a = xp.arccos(xp.minimum((depth - outer) / radius, 1.0 - 1e-9))
+        a = np.arccos(np.minimum((depth - outer) / radius, 1.0 - 1e-9))
     angle = 0.5 * a * (1.0 + _NODES)
-    slope = xp.sin(a) / a
+    slope = np.sin(a) / a
     bent = (
-        0.5 * (xp.sin(a) ** 2 + xp.sin(angle) ** 2)
-        + slope * (xp.cos(a) - xp.cos(angle))
-        - slope * angle * xp.sin(angle)
+        0.5 * (np.sin(a) ** 2 + np.sin(angle) ** 2)
+        + slope * (np.cos(a) - np.cos(angle))
+        - slope * angle * np.sin(angle)
     )
     first, second = (0.5 * a * (moment @ _WEIGHTS) for moment in (bent, bent**2))
     weak = section.second_moment_weak
-    phi = 2.0 * wall * radius**3 * xp.abs(first) / weak
+    phi = 2.0 * wall * radius**3 * np.abs(first) / weak
     brazier = 48.0 * (1.0 - poisson_ratio**2) * radius**7 * second / (wall * weak)
     return outer_angle, phi, brazier
 
 
-def softening(angle: jax.Array, alpha: jax.Array, beta: jax.Array) -> jax.Array:
-    """Compute q = 1 + αθ/2 + βθ²/2: the moment is K₀ θ/q².
-
-    Args:
-        angle: θ, rad, positive closing; any shape.
-        alpha: α, 1/rad.
-        beta: β, 1/rad².
-
-    Returns:
-        q, of the shape of `angle`.
-    """
-    return 1.0 + 0.5 * angle * (alpha + beta * angle)
-
-
-def moment(angle: jax.Array, alpha: jax.Array, beta: jax.Array) -> jax.Array:
-    """Compute M/K₀ = θ/q², rad; arguments as for `softening`."""
-    return angle / softening(angle, alpha, beta) ** 2
-
-
-def tangent(angle: jax.Array, alpha: jax.Array, beta: jax.Array) -> jax.Array:
-    """Compute the tangent stiffness over K₀, negative past a limit point; as `softening`."""
-    falling = 0.5 * angle * (alpha + 3.0 * beta * angle)
-    return (1.0 - falling) / softening(angle, alpha, beta) ** 3
-
-
-def potential(angle: jax.Array, alpha: jax.Array, beta: jax.Array) -> jax.Array:
-    """Compute the potential U/K₀, rad², by a Gauss rule: right to rounding for every α and β.
-
-    Its integrand has no pole near the angles of a notch, so that the points of the arc do; the
-    closed form above loses digits at small angles and has another branch where D ≤ 0.
-
-    Args:
-        angle: θ, rad, positive closing; any shape.
-        alpha: α, 1/rad.
-        beta: β, 1/rad².
-
-    Returns:
-        The potential, of the shape of `angle`.
-    """
-    total = 0.0 * angle
-    for node, weight in zip(0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS, strict=True):
-        total = total + weight * angle * moment(node * angle, alpha, beta)
-    return total
-
-
-def limit_angle(alpha: jax.Array, beta: jax.Array) -> jax.Array:
+def limit_angle(alpha: float, beta: float) -> float:
     """Compute the closing angle of the largest moment, where 1 − αθ/2 − 3βθ²/2 = 0.
 
     Args:
@@ -151,5 +102,4 @@ def limit_angle(alpha: jax.Array, beta: jax.Array) -> jax.Array:
     Returns:
         The angle, rad.
     """
-    xp = array_module(alpha, beta)
-    return 4.0 / (alpha + xp.sqrt(alpha**2 + 24.0 * beta))
+    return 4.0 / (alpha + np.sqrt(alpha**2 + 24.0 * beta))

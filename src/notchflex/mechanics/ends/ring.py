@@ -18,9 +18,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex._jax import array_module, jax
-from notchflex.mechanics.ends.side import BOUNDARIES
-
 HARMONICS = 41  # n = 0 ... 40
 _DEGREE = 18
 _COUNT = _DEGREE + 1  # polynomials of each displacement
@@ -77,18 +74,24 @@ def _strains() -> np.ndarray:
     return factors
 
 
-def _operator() -> np.ndarray:
-    """Strains at the Gauss points of every polynomial, for r = 1 and z / r = x.
+def _energies() -> np.ndarray:
+    """Integrate the products of strains that the energy is made of, for r = 1.
 
     Returns:
-        Array (derivative, harmonic, strain, point, displacement × polynomial), to be divided by
-        the power `derivative` of length / radius.
+        Array (part, power of ν, power of radius / length, power of n, row, column): the stiffness
+        of displacements × polynomials. Parts are the membrane and bending.
     """
-    n = np.arange(HARMONICS, dtype=float)
-    by_harmonic = np.einsum("pn,pdsk->dnsk", n ** np.arange(3.0)[:, None], _strains())
+    size = 3 * _COUNT
     tables = np.stack([_IN_SURFACE, _IN_SURFACE, _OUTWARD])[:, :, 1:]
-    shape = (3, HARMONICS, 6, _COUNT, 3 * _COUNT)
-    return np.einsum("dnsk,kdgi->dnsgki", by_harmonic, tables).reshape(shape)
+    strains = np.einsum("pdsk,kdgi->pdsgki", _strains(), tables).reshape(3, 3, 6, _COUNT, size)
+    plane = np.array([np.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
+    found = np.zeros((2, 2, 5, 5, size, size))
+    for part, of in enumerate((strains[:, :, :3], strains[:, :, 3:])):
+        stresses = np.einsum("mst,g,pdtgj->mpdsgj", plane, 0.5 * _GAUSS[1], of)
+        for p, d, q, e in np.ndindex(3, 3, 3, 3):
+            product = np.einsum("sgi,msgj->mij", of[p, d], stresses[:, q, e])
+            found[part, :, d + e, p + q] += product
+    return found
 
 
 def _held(boundary: str) -> np.ndarray:
@@ -104,8 +107,9 @@ def _held(boundary: str) -> np.ndarray:
     return held.reshape(HARMONICS, -1)
 
 
-_OPERATOR = _operator()
-_HELD = {boundary: _held(boundary) for boundary in BOUNDARIES}
+_ENERGIES = _energies()
+_POWERS = np.arange(HARMONICS, dtype=float)[:, None] ** np.arange(5)
+_HELD = {boundary: _held(boundary) for boundary in ("between", "clamped", "free")}
 # Axial displacement and slope at the loaded edge of every polynomial, shape (3 × polynomials, 2).
 _EDGE = np.zeros((3 * _COUNT, 2))
 _EDGE[:_COUNT, 0] = _IN_SURFACE[0, 0]
@@ -113,8 +117,8 @@ _EDGE[2 * _COUNT :, 1] = _OUTWARD[1, 0]
 
 
 def edge_compliance(
-    radius: jax.Array, wall: jax.Array, length: jax.Array, poisson_ratio: jax.Array, boundary: str
-) -> jax.Array:
+    radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
+) -> np.ndarray:
     """Compute how edge loads of each harmonic move the edge that they act on.
 
     Args:
@@ -129,36 +133,22 @@ def edge_compliance(
         Displacement away from the ring and slope of the outward displacement along z, per unit of
         tension and of moment in N/mm and N with a Young's modulus of 1, shape (harmonics, 2, 2).
     """
-    xp = array_module(radius, wall, length, poisson_ratio)
     ratio = radius / length
-    rows = _OPERATOR[0] + ratio * _OPERATOR[1] + ratio**2 * _OPERATOR[2]
+    one = 1.0
     # Strains of the membrane come per 1/r, those of bending per 1/r².
-    shear = 0.5 * (1.0 - poisson_ratio)
-    one, nought = xp.ones_like(shear), xp.zeros_like(shear)
-    plane = xp.stack(
-        [
-            xp.stack([one, poisson_ratio, nought]),
-            xp.stack([poisson_ratio, one, nought]),
-            xp.stack([nought, nought, shear]),
-        ]
-    )
-    membrane, bending = rows[:, :3], rows[:, 3:]
-    thin = wall**2 / (12.0 * radius**2)
-    weight = 0.5 * _GAUSS[1]
-
-    def energy(strain: jax.Array) -> jax.Array:
-        stress = xp.einsum("st,g,ntgj->nsgj", plane, weight, strain)
-        flat = (HARMONICS, -1, 3 * _COUNT)
-        return xp.swapaxes(strain.reshape(flat), 1, 2) @ stress.reshape(flat)
-
-    stiffness = energy(membrane) + thin * energy(bending)
+    parts = np.stack([one, wall**2 / (12.0 * radius**2)])
+    material = np.stack([one, one * poisson_ratio])
+    slopes = np.stack([one, ratio, ratio**2, ratio**3, ratio**4])
+    factors = np.einsum("a,b,c->abc", parts, material, slopes).ravel()
     held = _HELD[boundary]
-    free = ~held[:, :, None] & ~held[:, None, :]
-    stiffness = xp.where(free, stiffness, np.eye(3 * _COUNT) * held[:, :, None])
-    edge = _EDGE * xp.stack([one, ratio])
-    loads = xp.where(held[:, :, None], 0.0, edge[None])
-    flexibility = xp.swapaxes(loads, 1, 2) @ xp.linalg.solve(stiffness, loads)
+    free = (~held[:, :, None] & ~held[:, None, :]).astype(float)
+    by_power = (factors @ _ENERGIES.reshape(20, -1)).reshape(5, -1)
+    stiffness = (_POWERS @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
+    stiffness = free * stiffness + np.eye(3 * _COUNT) * held[:, :, None]
+    edge = np.stack([_EDGE[:, 0] * one, _EDGE[:, 1] * ratio], axis=-1)
+    loads = np.where(held[:, :, None], 0.0, edge[None])
+    flexibility = np.swapaxes(loads, 1, 2) @ np.linalg.solve(stiffness, loads)
     # Displacements are of order r² per N/mm over E t length; slopes have one r less.
-    unit = xp.stack([radius, one])
+    unit = np.stack([radius, one])
     scale = (1.0 - poisson_ratio**2) / (wall * length)
-    return flexibility * scale * unit[:, None] * unit[None, :]
+    return flexibility * (scale * np.outer(unit, unit)[None])

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from notchflex._jax import jax
-from notchflex._pytree import Pytree, static
-
-BOUNDARIES = ("between", "clamped", "free")
+from typing import Literal, NamedTuple
 
 
-class Side(Pytree, eq=True):
+class Side(NamedTuple):
     """The uncut ring beside a notch.
 
     Attributes:
@@ -18,5 +15,5 @@ class Side(Pytree, eq=True):
             the free end, mm.
     """
 
-    boundary: str = static()
-    length: float | jax.Array
+    boundary: Literal["between", "clamped", "free"]
+    length: float

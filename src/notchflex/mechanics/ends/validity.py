@@ -56,8 +56,8 @@ def validity(
             f"{outer_radius + inner_radius:.4g} mm, where a solid strip is left: end compliance "
             "found wrong by up to 23 %"
         )
-    check("wall / mean radius", wall, 0.077, 0.47, untested)
-    if 0.077 <= wall < 0.14:
+    check("wall / mean radius", wall, 0.0769, 0.47, untested)
+    if 0.0769 <= wall < 0.14:
         check("wall / mean radius", wall, 0.14, 0.47, ": the moment was found up to 13 % off")
     check("height / mean radius", height / radius, 0.39, 5.3, untested)
     not_checked = ": the softening with the angle was not checked"

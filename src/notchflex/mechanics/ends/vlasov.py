@@ -12,12 +12,13 @@ numbers and the spring λ_w were fitted to cells of chains of equal notches.
 
 from __future__ import annotations
 
-from notchflex._jax import array_module, jax
+import numpy as np
+
 from notchflex.mechanics.ends.edge_loads import Arc
 from notchflex.mechanics.section import Section
 
 
-def warping_constant(arc: Arc) -> jax.Array:
+def warping_constant(arc: Arc) -> float:
     """Compute the warping constant C_w of the arc about its shear centre.
 
     Args:
@@ -26,20 +27,19 @@ def warping_constant(arc: Arc) -> jax.Array:
     Returns:
         C_w of the middle line and of the wall, mm⁶.
     """
-    xp = array_module(arc.radius)
     r, t, a = arc.radius, arc.wall, arc.half_angle
-    sine, cosine = xp.sin(a), xp.cos(a)
+    sine, cosine = np.sin(a), np.cos(a)
     line = a**3 - 6.0 * (sine - a * cosine) ** 2 / (a - sine * cosine)
     return 2.0 / 3.0 * t * r**5 * line + (2.0 * a * r * t) ** 3 / 144.0
 
 
 def torsion_length(
     arc: Arc,
-    outer: jax.Array,
-    height: jax.Array,
-    poisson_ratio: jax.Array,
+    outer: float,
+    height: float,
+    poisson_ratio: float,
     section: Section,
-) -> jax.Array:
+) -> float:
     """Compute the length ℓ of free torsion that twists as much as the notch with its ends.
 
     Args:
@@ -52,17 +52,16 @@ def torsion_length(
     Returns:
         The length, mm: twist = T ℓ/(G J).
     """
-    xp = array_module(arc.radius, height, poisson_ratio)
     t, a, diameter = arc.wall, arc.half_angle, 2.0 * outer
     shear_over_young = 0.5 / (1.0 + poisson_ratio)
-    rate = xp.sqrt(shear_over_young * section.torsion_constant / warping_constant(arc))
+    rate = np.sqrt(shear_over_young * section.torsion_constant / warping_constant(arc))
     width = 2.0 * a * arc.radius / diameter
-    spring = 0.004 * diameter * (t / diameter) ** -1.98 * xp.exp(0.16 * width)
-    held = 2.0 / (rate * (1.0 / xp.tanh(0.5 * rate * height) + spring * rate))
+    spring = 0.004 * diameter * (t / diameter) ** -1.98 * np.exp(0.16 * width)
+    held = 2.0 / (rate * (1.0 / np.tanh(0.5 * rate * height) + spring * rate))
     return height + t * (3.11 - 1.60 * a) - held
 
 
-def shear_centre(arc: Arc, height: jax.Array, section: Section) -> jax.Array:
+def shear_centre(arc: Arc, height: float, section: Section) -> float:
     """Compute the distance of the centre of twist from the tube axis, toward the spine.
 
     Args:
@@ -74,4 +73,4 @@ def shear_centre(arc: Arc, height: jax.Array, section: Section) -> jax.Array:
         The distance, mm: that of the section, moved out by the ends of short notches.
     """
     width = 2.0 * arc.half_angle * arc.radius
-    return section.shear_centre * (1.0 + 0.027 * width / (height + 0.72 * width))
+    return float(section.shear_centre) * (1.0 + 0.027 * width / (height + 0.72 * width))

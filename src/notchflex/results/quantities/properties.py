@@ -79,6 +79,8 @@ class _Quantities:
     """Tendon stroke, mm, shape (t)."""
     notch_angle = Table()
     """Notch angle, rad, shape (n)."""
+    edge_angle = Table()
+    """Edge angle, rad, shape (n)."""
     chord_angle = Table()
     """Chord angle, rad, shape (n)."""
     total_chord_angle = Number()
