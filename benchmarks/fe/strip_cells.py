@@ -11,6 +11,7 @@ with round ends (`Link`) lies between the middles of neighbouring slots of a row
 
 from __future__ import annotations
 
+import os
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -249,8 +250,6 @@ def solve(part: Strip | Link, nodes: np.ndarray, cells: np.ndarray, work: Path) 
 
 
 def _one_thread() -> dict[str, str]:
-    import os
-
     return {**os.environ, "OMP_NUM_THREADS": "1"}
 
 
@@ -299,7 +298,7 @@ def energies(
 def compliance(
     part: Strip | Link, work: Path, fine: float, coarse: float
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Compute E times the compliance of the cell and of the whole between rigid plates, at (0, 0, 0).
+    """Compute E times the compliance, at the origin, of the cell and of the whole.
 
     Returns:
         Both (6, 6), and the number of nodes.
