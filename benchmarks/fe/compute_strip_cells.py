@@ -52,7 +52,7 @@ ENTRIES = [(i, j) for i in range(6) for j in range(i, 6) if (i in (1, 2, 3)) == 
 
 
 def main(kind: str, out: Path) -> None:
-    """Write a row for each part, E times the compliance (1/mm, 1/mm^2, 1/mm^3); go on where left."""
+    """Write E times the compliance (mm) of each part that the table has not yet."""
     parts = STRIPS if kind == "strip" else LINKS
     own = ("depth", "height") if kind == "strip" else ("length", "slot_radius")
     first = ("outer", "inner", "thickness", *own, "nu")

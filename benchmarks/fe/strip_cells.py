@@ -1,7 +1,7 @@
 """Finite elements of a strip between two opposite slots: its compliance, with gmsh and CalculiX.
 
-Half of the tube (x > 0) is meshed with quadratic tetrahedra. One face is held, the other is moved as
-a rigid plate in the six ways, three of them symmetric about x = 0 and three antisymmetric. The
+Half of the tube (x > 0) is meshed with quadratic tetrahedra. One face is held, the other is moved
+as a rigid plate in the six ways, three of them symmetric about x = 0 and three antisymmetric. The
 energies of these fields within the cell of one strip give its compliance, in the six directions
 (ux, uy, uz, rx, ry, rz), at the middle of the strip: y along the strip, z along the tube.
 

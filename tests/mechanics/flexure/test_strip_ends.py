@@ -189,7 +189,7 @@ def test_robots_with_friction_and_loads(name, tensions):
     assert path.total_angle[1] > path.total_angle[0] > 0.0
     assert np.all(path.quantity("dissipation") >= 0.0)
     # The base carries what acts at the tip.
-    force = path.quantity("base_force")
+    force = -path.quantity("base_force")  # that of the base on the robot, turned round
     np.testing.assert_allclose(force[:, :2], np.tile(sideways[:2], (3, 1)), atol=1e-6)
 
 

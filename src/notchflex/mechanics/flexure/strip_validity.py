@@ -50,8 +50,8 @@ across the strip up to 18 %']
             notch.uncut_length / notch.height,
             0.7,
             float("inf"),
-            ": the body between two pairs is a slanting bar, which bends too; pairs that adjoin were "
-            "found 2.1 times as flexible",
+            ": the body between two pairs is a slanting bar, which bends too; pairs that adjoin "
+            "were found 2.1 times as flexible",
         )
     else:
         check("strip length / strip thickness", notch.strip_length / thickness, 1.7, 5.8)
