@@ -33,31 +33,40 @@ class Strip:
     depth: float
     height: float
     nu: float = 0.4
+    pairs: int = 1
+
+    @property
+    def middles(self) -> list[float]:
+        """Heights of the middles of the strips, pairs adjoining, mm."""
+        pitch = self.height + self.thickness
+        return [(k - 0.5 * (self.pairs - 1)) * pitch for k in range(self.pairs)]
 
     @property
     def top(self) -> float:
         """Half the length of the model, mm."""
-        return 0.5 * self.thickness + self.height + BODY * 2.0 * self.outer
+        return self.middles[-1] + 0.5 * self.thickness + self.height + BODY * 2.0 * self.outer
 
     @property
     def cell(self) -> float:
         """Half the length of the cell, mm: to an eighth of the diameter beyond the notches."""
-        return 0.5 * self.thickness + self.height + 0.25 * self.outer
+        return self.middles[-1] + 0.5 * self.thickness + self.height + 0.25 * self.outer
 
     @property
     def tips(self) -> list[tuple[float, float]]:
         """Ends (y, z) of the cuts, where the mesh is fine."""
         y, z = self.depth - self.outer, 0.5 * self.thickness
-        return [(-y, -z), (y, z)]
+        return [(side * y, at + side * z) for at in self.middles for side in (-1.0, 1.0)]
 
     def cuts(self) -> list[int]:
         """Make the solids to cut away."""
         made = []
-        for sign in (1.0, -1.0):
-            tip, z = self.outer - self.depth, -0.5 * self.thickness
-            far = self.outer * 1.2
-            low = z - self.height * (far - tip) / self.depth
-            made.append(_prism([(tip, z), (far, z), (far, low)], sign, 2.0 * self.outer))
+        tip, z, far = self.outer - self.depth, -0.5 * self.thickness, 1.2 * self.outer
+        low = z - self.height * (far - tip) / self.depth
+        for at in self.middles:
+            for sign in (1.0, -1.0):
+                cut = _prism([(tip, z), (far, z), (far, low)], sign, 2.0 * self.outer)
+                gmsh.model.occ.translate([(3, cut)], 0.0, 0.0, at)
+                made.append(cut)
         return made
 
 

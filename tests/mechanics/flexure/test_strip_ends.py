@@ -8,7 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.flexure import Site, flexure_state, relative_pose, rod
-from notchflex.mechanics.flexure.strip_validity import strip_validity
+from notchflex.mechanics.flexure.roots import strip_validity
 from notchflex.mechanics.material import section_law
 from reference_data import named_rows
 

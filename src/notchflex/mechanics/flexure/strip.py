@@ -24,7 +24,7 @@ from notchflex.mechanics.flexure.notch_rod import (
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import Site, rod
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.strip_roots import rooted_strip_rod, sharp_strip
+from notchflex.mechanics.flexure.roots import rooted_strip_rod, sharp_strip
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.robot import StripNotch, Tube

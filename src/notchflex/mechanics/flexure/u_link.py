@@ -22,7 +22,7 @@ from notchflex.mechanics.flexure.notch_rod import (
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import Site, rod
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.strip_roots import rooted_strip_rod, round_strip
+from notchflex.mechanics.flexure.roots import rooted_strip_rod, round_strip
 from notchflex.mechanics.flexure.u_link_geometry import Course, Link
 from notchflex.mechanics.flexure.wrench_modes import wrench_modes
 from notchflex.mechanics.material import FibreSection
