@@ -15,7 +15,13 @@ from notchflex._jax import jax
 from notchflex.mechanics.chain.fibres import with_fibres
 from notchflex.mechanics.flexure import rod
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
-from notchflex.mechanics.section.fibres import Points, sector_fibres, segment_fibres
+from notchflex.mechanics.section.fibres import (
+    FIBRES,
+    Points,
+    gauss_rule,
+    sector_fibres,
+    segment_fibres,
+)
 
 TUBE = nf.Tube(1.62, 1.40)
 ENDS = NotchEnds(
@@ -71,6 +77,15 @@ def test_fibres_make_up_the_section(fibres: Callable[..., Points], depth: float)
     assert area @ arm / area.sum() == pytest.approx(float(own.centroid), rel=1e-4)
     second = area @ (arm - float(own.centroid)) ** 2
     assert second == pytest.approx(float(own.second_moment_weak), rel=1e-3)
+
+
+def test_fibres_keep_the_polynomials_of_the_section() -> None:
+    strips = sector_fibres(0.81, 0.70, 1.40)
+    arm, area = gauss_rule(*strips, FIBRES)
+    for degree in range(2 * FIBRES):
+        expected = strips[1] @ strips[0] ** degree
+        assert area @ arm**degree == pytest.approx(expected, rel=1e-12)
+    assert (area > 0.0).all()
 
 
 def stress(strain: np.ndarray) -> np.ndarray:

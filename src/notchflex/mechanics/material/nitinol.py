@@ -26,12 +26,9 @@ from notchflex.robot import Nitinol
 # Newton's method ends at this imbalance, as a part of the strain of bending, or after many tries.
 _BALANCED, _MOST_TRIES = 1e-13, 16
 # So many fibres at once: programs get longer with more, and slower with fewer.
-_AT_ONCE = 8
+_AT_ONCE = 10
 # A transformed strain this near to a curve goes on along it.
 _ON_CURVE = 1e-12
-
-# Length of a plateau without end, as a strain.
-_ENDLESS = 1e6
 
 
 class _Sums(NamedTuple):
@@ -83,23 +80,24 @@ class _Joint(NamedTuple):
 class NitinolLaw(SectionLaw):
     """Fibres that transform; everything but bending about the weak axis is elastic.
 
+    The transformed strain on a curve is a sum over its kinks: change * (strain - the strain clipped
+    between low and high).
+
     Attributes:
-        onset: Strain from which each segment of the lower and of the upper curve transforms;
-            one curve without hysteresis.
-        low: Strain beyond the onset up to which a segment transforms in compression; 0 in tension.
-        high: The same in tension; 0 in compression.
-        slope: Transformed strain per strain in it.
+        low: Strain in compression where each kink of the lower and of the upper curve lies; one
+            curve without hysteresis.
+        high: The same in tension.
+        change: Change of transformed strain per strain at each kink.
     """
 
-    onset: Float[Array, "curves segments"]
-    low: Float[Array, " segments"]
-    high: Float[Array, " segments"]
-    slope: Float[Array, " segments"]
+    low: Float[Array, "curves kinks"]
+    high: Float[Array, "curves kinks"]
+    change: Float[Array, " kinks"]
 
     @property
     def remembers(self) -> bool:
         """Whether loading and unloading differ."""
-        return self.onset.shape[0] == 2
+        return self.low.shape[0] == 2
 
     def rest(self, section: FibreSection) -> Any:
         """No fibre is transformed."""
@@ -121,14 +119,17 @@ class NitinolLaw(SectionLaw):
         scale = section.edge_near, self.elastic_modulus * section.area
         everything = self, fibres, memory, joint, scale, start
         still = jax.tree.map(jax.lax.stop_gradient, everything)
-        strain, curvature = _settled(*still)
-        _, held, _, fixed, *_ = still
-        sums, transformed, slope = self.sum_fibres(fibres, memory, strain, curvature)
-        slopes: _Sums = jax.tree.map(jax.lax.stop_gradient, sums)
+        strain, curvature, slopes = _settled(*still)
+        _, held, past, fixed, *_ = still
+        sums = jax.tree.map(
+            _derived_from, slopes, self.sum_fibres(fibres, memory, strain, curvature)
+        )
         by_strain, by_curvature = joint.step(curvature, sums, slopes)
         if not isinstance(memory, tuple):
+            own = strain + curvature * fibres.arm
+            slope = self._transformed(jax.lax.stop_gradient(own), past)[1]
             moved = by_strain + by_curvature * held.arm
-            memory = transformed + jax.lax.stop_gradient(slope) * moved
+            memory = self._transformed(own, memory)[0] + jax.lax.stop_gradient(slope) * moved
         return Bending(
             curvature=curvature + by_curvature,
             moment=sums.moment + slopes.mixed * by_strain + slopes.bending * by_curvature,
@@ -137,53 +138,50 @@ class NitinolLaw(SectionLaw):
             strain=strain + by_strain,
         )
 
-    def sum_fibres(
-        self, fibres: Fibres, memory: Any, strain: Array, curvature: Array
-    ) -> tuple[_Sums, Array, Array]:
-        """Sums over the fibres, transformed strain of each and its change with the strain."""
+    def sum_fibres(self, fibres: Fibres, memory: Any, strain: Array, curvature: Array) -> _Sums:
+        """Sums over the fibres."""
 
         def some(array: Array) -> Array:
             return jnp.reshape(array, (-1, _AT_ONCE))
 
-        def add(total: _Sums, some: tuple[Array, Array, Any]) -> tuple[_Sums, tuple[Array, Array]]:
+        def add(total: _Sums, some: tuple[Array, Array, Any]) -> tuple[_Sums, None]:
             arm, area, past = some
             own = strain + curvature * arm
             transformed, slope = self._transformed(own, past)
             force, tangent = area * (own - transformed), area * (1.0 - slope)
-            parts = force, force * arm, tangent, tangent * arm, tangent * arm * arm
+            turning = tangent * arm
+            parts = force, force * arm, tangent, turning, turning * arm
             added = _Sums(*(jnp.sum(part) for part in parts))
-            return jax.tree.map(jnp.add, total, added), (transformed, slope)
+            return jax.tree.map(jnp.add, total, added), None
 
         none = _Sums(*(jnp.zeros_like(strain) for _ in _Sums._fields))
         every = some(fibres.arm), some(fibres.area), jax.tree.map(some, memory)
-        sums, (transformed, slope) = jax.lax.scan(add, none, every)
-        sums = jax.tree.map(lambda total: self.elastic_modulus * total, sums)
-        shape = fibres.arm.shape
-        return sums, jnp.reshape(transformed, shape), jnp.reshape(slope, shape)
+        sums = jax.lax.scan(add, none, every)[0]
+        return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
 
     def _transformed(self, strain: Array, past: Any) -> tuple[Array, Array]:
         """Transformed strain of fibres after a strain, and its change with that strain."""
         if isinstance(past, tuple):
-            return self._curve(strain, jnp.mean(self.onset, axis=0))
-        (lower, by_lower), (upper, by_upper) = (self._curve(strain, at) for at in self.onset)
-        transformed = jnp.where(past < lower, lower, jnp.where(past > upper, upper, past))
+            return self._curve(strain, *self._halfway())
+        (lower, by_lower), (upper, by_upper) = (
+            self._curve(strain, *kinks) for kinks in zip(self.low, self.high, strict=True)
+        )
+        transformed = jnp.clip(past, lower, upper)
         slope = jnp.where(past >= upper - _ON_CURVE, by_upper, 0.0)
         return transformed, jnp.where(past <= lower + _ON_CURVE, by_lower, slope)
 
-    def _curve(self, strain: Array, onset: Array) -> tuple[Array, Array]:
+    def _halfway(self) -> tuple[Array, Array]:
+        """Kinks of the curve halfway between loading and unloading."""
+        return jnp.mean(self.low, axis=0), jnp.mean(self.high, axis=0)
+
+    def _curve(self, strain: Array, low: Array, high: Array) -> tuple[Array, Array]:
         """Transformed strain on a curve, and its slope."""
         transformed, slope = jnp.zeros_like(strain), jnp.zeros_like(strain)
-        for start, low, high, by in self._segments(onset):
-            beyond = strain - start
-            within = jnp.clip(beyond, low, high)
-            transformed = transformed + by * within
-            slope = slope + jnp.where(within == beyond, by, 0.0)
+        for kink in range(self.change.shape[0]):
+            beyond = strain - jnp.clip(strain, low[kink], high[kink])
+            transformed = transformed + self.change[kink] * beyond
+            slope = slope + jnp.where(beyond != 0.0, self.change[kink], 0.0)
         return transformed, slope
-
-    def _segments(self, onset: Array) -> list[tuple[Array, ...]]:
-        """Onset, limits and slope of every segment of a curve."""
-        parts = onset, self.low, self.high, self.slope
-        return [tuple(part[j] for part in parts) for j in range(self.slope.shape[0])]
 
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
@@ -192,38 +190,32 @@ class NitinolLaw(SectionLaw):
         fibres, plain = section.fibres, dataclasses.replace(section, ends=None)
         assert fibres is not None
         bent = self.bent(curvature, plain, memory)
-        strain, halfway = bent.strain + bent.curvature * fibres.arm, jnp.mean(self.onset, axis=0)
+        strain = bent.strain + bent.curvature * fibres.arm
         if isinstance(memory, tuple):
-            return fibres.area @ self._area_under(strain, halfway)
+            return fibres.area @ self._area_under(strain)
         # Where the curve halfway has the same transformed strain.
-        there, transformed = jnp.zeros_like(strain), bent.memory
-        for start, low, high, by in self._segments(halfway):
-            part = jnp.clip(transformed / by, low, high)
-            there = there + jnp.where(part != 0.0, start + part, 0.0)
+        (low, *_), (high, *_) = self._halfway()
+        transformed = bent.memory
+        onset = jnp.where(transformed > 0.0, high, jnp.where(transformed < 0.0, low, 0.0))
+        there = onset + transformed / self.change[0]
         elastic = (strain - transformed) ** 2 - (there - transformed) ** 2
-        held = self._area_under(there, halfway) + 0.5 * self.elastic_modulus * elastic
-        return fibres.area @ held
+        return fibres.area @ (self._area_under(there) + 0.5 * self.elastic_modulus * elastic)
 
-    def _area_under(self, strain: Array, onset: Array) -> Array:
-        """Area under the stress of a curve up to a strain, N mm/mm^3."""
-        area = 0.5 * strain**2
-        for start, low, high, by in self._segments(onset):
-            beyond = strain - start
-            within = jnp.clip(beyond, low, high)
-            area = area - by * within * (beyond - 0.5 * within)
-        return self.elastic_modulus * area
+    def _area_under(self, strain: Array) -> Array:
+        """Area under the stress of the curve halfway up to a strain, N mm/mm^3."""
+        square = strain**2
+        for change, low, high in zip(self.change, *self._halfway(), strict=True):
+            square = square - change * (strain - jnp.clip(strain, low, high)) ** 2
+        return 0.5 * self.elastic_modulus * square
 
     def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
         """Energy per length turned to heat between two memories, N mm/mm; for plain arrays."""
         if not self.remembers or section.fibres is None:
             return super().dissipated(section, before, after)
-        loss = np.zeros(np.shape(after))
-        for lower, upper, low, high, by in zip(
-            *self.onset, self.low, self.high, self.slope, strict=True
-        ):
-            width = self.elastic_modulus * np.abs(upper - lower)
-            change = np.clip(after, by * low, by * high) - np.clip(before, by * low, by * high)
-            loss = loss + 0.5 * width * np.abs(change)
+        loss = 0.0
+        for side, kinks in (np.minimum, self.low), (np.maximum, self.high):
+            change = np.abs(side(after, 0.0) - side(before, 0.0))
+            loss = loss + 0.5 * self.elastic_modulus * np.abs(kinks[1, 0] - kinks[0, 0]) * change
         ends = section.ends
         follows = 1.0 if ends is None else 1.0 + ends.material_share * ends.weak
         return follows * np.sum(loss * section.fibres.area, axis=-1)
@@ -236,10 +228,10 @@ def _settle(
     joint: _Joint,
     scale: tuple[Array, Array],
     start: Array,
-) -> tuple[Array, Array]:
-    """Find strain of the neutral axis and curvature of all sections together, from a curvature.
+) -> tuple[Array, Array, _Sums]:
+    """Find strain of the neutral axis, curvature and sums of all sections, from a curvature.
 
-    Together, so that one condition stops the search, whose sections may have leading axes.
+    All together, so that one condition stops the search; the sections may have leading axes.
     """
     balance = law.sum_fibres
     for _ in start.shape:
@@ -251,57 +243,72 @@ def _settle(
             tries < _MOST_TRIES
         )
 
-    def improve(search: tuple[Array, ...]) -> tuple[Array, ...]:
+    def improve(search: tuple[Any, ...]) -> tuple[Any, ...]:
         """Try a step: the next one where the imbalance falls, half of it where not."""
-        strain, curvature, by_strain, by_curvature, least, tries = search
+        strain, curvature, by_strain, by_curvature, sums, least, tries = search
         trial = strain + by_strain, curvature + by_curvature
-        sums = balance(fibres, memory, *trial)[0]
-        size = joint.size(trial[1], sums, scale)
+        found = balance(fibres, memory, *trial)
+        size = joint.size(trial[1], found, scale)
         falls = size < least
-        new = *trial, *joint.step(trial[1], sums, sums), size
-        old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, least
-        kept = (jnp.where(falls, *pair) for pair in zip(new, old, strict=True))
-        return *kept, tries + 1
+        new = *trial, *joint.step(trial[1], found, found), found, size
+        old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, sums, least
+        return *jax.tree.map(lambda *pair: jnp.where(falls, *pair), new, old), tries + 1
 
     none, far = jnp.zeros_like(start), jnp.full_like(start, jnp.inf)
-    begin = none, start, none, none, far, jnp.zeros((), int)
-    strain, curvature, by_strain, by_curvature, *_ = jax.lax.while_loop(proceed, improve, begin)
-    return strain + by_strain, curvature + by_curvature
+    sums = _Sums(*(none for _ in _Sums._fields))
+    begin = none, start, none, none, sums, far, jnp.zeros((), int)
+    strain, curvature, _, _, sums, *_ = jax.lax.while_loop(proceed, improve, begin)
+    return strain, curvature, sums
 
 
 _settled = jax.custom_batching.custom_vmap(_settle)
 
 
 @_settled.def_vmap
-def _(size: int, batched: Any, law: NitinolLaw, *sections: Any) -> tuple[Any, tuple[bool, bool]]:
+def _(size: int, batched: Any, law: NitinolLaw, *sections: Any) -> tuple[Any, Any]:
+    all_batched = True, True, _Sums._make([True] * len(_Sums._fields))
     if any(jax.tree.leaves(batched[0])):  # rows of a batch that is not one of sections
         axes = jax.tree.map(lambda one: 0 if one else None, list(batched))
-        return jax.vmap(_settle, in_axes=tuple(axes))(law, *sections), (True, True)
+        return jax.vmap(_settle, in_axes=tuple(axes))(law, *sections), all_batched
     every = jax.tree.map(
         lambda one, leaf: leaf if one else jnp.broadcast_to(leaf, (size, *jnp.shape(leaf))),
         list(batched[1:]),
         list(sections),
     )
-    return _settled(law, *every), (True, True)
+    return _settled(law, *every), all_batched
+
+
+@jax.custom_jvp
+def _derived_from(value: Array, varied: Array) -> Array:
+    """A value with the derivatives of another that equals it, and need not be computed."""
+    del varied
+    return value
+
+
+@_derived_from.defjvp
+def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
+    return primals[0], tangents[1]
 
 
 @section_law.register
 def _(material: Nitinol) -> NitinolLaw:
     modulus, hardening = material.elastic_modulus, material.plateau_modulus
-    loading = material.plateau_stress / modulus
-    ratio = material.compression_ratio
-    curves = [(loading, -ratio * loading)]
+    loading, ratio = material.plateau_stress / modulus, material.compression_ratio
+    # A fibre does not fall below loading in tension, nor below unloading in compression.
+    tension, compression = [loading], [-ratio * loading]
     if material.unloading_stress is not None:
         unloading = material.unloading_stress / modulus
-        # A fibre does not fall below loading in tension, nor below unloading in compression.
-        curves = [(loading, -ratio * unloading), (unloading, -ratio * loading)]
-    end = material.transformation_strain
-    length = _ENDLESS if end is None else end - loading
+        tension, compression = [loading, unloading], [-ratio * unloading, -ratio * loading]
+    low, high = np.array(compression)[:, None], np.array(tension)[:, None]
+    change = np.array([1.0 - hardening / modulus])
+    if material.transformation_strain is not None:
+        length = material.transformation_strain - loading
+        low, high = np.hstack([low, low - length]), np.hstack([high, high + length])
+        change = np.append(change, -change)
     return NitinolLaw(
         elastic_modulus=constant(modulus),
         shear_modulus=constant(modulus / (2.0 * (1.0 + material.poisson_ratio))),
-        onset=constant(curves),
-        low=constant([0.0, -length]),
-        high=constant([length, 0.0]),
-        slope=constant([1.0 - hardening / modulus] * 2),
+        low=constant(low),
+        high=constant(high),
+        change=constant(change),
     )
