@@ -22,6 +22,7 @@ _HOME = {
             "Linear",
             "Nitinol",
             "Robot",
+            "StressStrain",
             "StripNotch",
             "Superelastic",
             "Tendon",

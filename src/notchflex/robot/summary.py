@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from notchflex._summary import Summary, short
-from notchflex.robot.error_messages import fields_of
+from notchflex.robot.error_messages import fields_of, is_list
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot
@@ -41,8 +41,13 @@ def _words(parts: Sequence[Any]) -> str:
         extra = field.json_schema_extra
         unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
         title = name.removesuffix(f"_{unit}").replace("_", " ")
-        words.append(f"{title} {_values(values)} {unit}".strip())
+        shown = " and ".join(_curve(one) for one in values if one) if is_list(field) else ""
+        words.append(f"{title} {shown or _values(values)} {unit}".strip())
     return ", ".join(words)
+
+
+def _curve(values: Sequence[float]) -> str:
+    return f"{short(values[0])} to {short(values[-1])} ({len(values)} values)"
 
 
 def _values(values: Sequence[Any]) -> str:

@@ -14,7 +14,7 @@ from notchflex.cli.interview.readings import choice, reading, readings, whole
 from notchflex.cli.interview.wordings import OPTIONS, WORDINGS
 from notchflex.errors import InputError
 from notchflex.robot import Nitinol, Robot, Superelastic, Tendon, Tube
-from notchflex.robot.error_messages import fields_of, kind_of
+from notchflex.robot.error_messages import fields_of, is_list, kind_of
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.robot import MOST_NOTCHES
 
@@ -244,6 +244,8 @@ def _reader(
     def read(text: str) -> Any:
         if type(None) in choices and text.lower() == "none":
             return each(None)
+        if is_list(field):
+            return each(tuple(reading(one.strip()) for one in text.split(",")))
         return reading(text, **bounds) if count is None else readings(text, count, **bounds)
 
     return read, False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from itertools import compress, groupby, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -151,6 +151,8 @@ def _numbers(rows: list[dict[str, Any]], key: str, form: str, scale: float = 1.0
 def _value(value: Any) -> str:
     if value is None:
         return NO_NUMBER
+    if isinstance(value, tuple):
+        return " ".join(f"{one:g}" for one in cast("tuple[float, ...]", value))
     return value if isinstance(value, str) else f"{value:g}"
 
 
