@@ -92,20 +92,18 @@ def solid(case: str) -> Solid:
     )
 
 
-def sideways(robot: nf.Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Push the tip of wrist A sideways by 0.02 N: errors of twist and bend of every ring.
+def sideways(robot: nf.Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Push the tip of wrist A sideways by 0.02 N, without tension.
 
     Args:
         robot: The wrist.
 
     Returns:
-        Twist and sideways bend over those of fem_wrist_sideways.csv, less 1.
+        Twist and sideways bend of every ring, rad; the same of the solid.
     """
     state = nf.solve(robot, nf.Load(tension=0.0, tip_force=(0.0, 0.02, 0.0)))
     turns, rows = state.body_rotation[1:], named_rows("fem_wrist_sideways.csv")
     twist = 0.5 * (turns[:, 1, 0] - turns[:, 0, 1])
     bend = 0.5 * (turns[:, 1, 2] - turns[:, 2, 1])
-    return (
-        twist / [row["twist"] for row in rows] - 1.0,
-        bend / [row["bend"] for row in rows] - 1.0,
-    )
+    solid = np.array([(row["twist"], row["bend"]) for row in rows])
+    return twist, bend, solid[:, 0], solid[:, 1]
