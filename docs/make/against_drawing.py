@@ -117,8 +117,14 @@ def _sideways() -> str:
         for ends, (twist, bend, *fem) in both.items()
     ]
     _, _, *fem = both["shell"]
-    solid_row = ("finite elements", f"{1e3 * fem[0][-1]:.2f}", "", f"{1e3 * fem[1][-1]:.2f}", "")
-    head = ("", "twist of the tip, mrad", "any ring", "sideways bend of the tip, mrad", "any ring")
+    solid_row = ("finite elements", f"{1e3 * fem[0][-1]:.2f}", "–", f"{1e3 * fem[1][-1]:.2f}", "–")
+    head = (
+        "by",
+        "twist of the tip, mrad",
+        "any ring",
+        "sideways bend of the tip, mrad",
+        "any ring",
+    )
     return table(head, [solid_row, *rows])
 
 
@@ -193,7 +199,7 @@ def _readings() -> str:
         (f'`depth_at = "{at}"`', *(f"{_angle(drawn('A', 1.40, at), T):.1f}" for T in TENSIONS))
         for at in ("outer", "mid-wall", "inner")
     ]
-    return table(("", *(f"{tension:g} N, deg" for tension in TENSIONS)), rows)
+    return table(("read at", *(f"{tension:g} N, deg" for tension in TENSIONS)), rows)
 
 
 def tables() -> dict[str, str]:
@@ -250,11 +256,12 @@ def _draw_depth(folder: Path) -> None:
     """Draw the total angle over the depth at one tension, and over the tension for five depths."""
     figure = new_figure(8.6, 3.4)
     left, right = figure.subplots(1, 2, sharey=True)
-    away = np.linspace(-0.03, 0.03, 13)
+    away = np.linspace(-0.03, 0.03, 61)
     tension = TENSIONS[-1]
     for name, colour in (("A", BLUE), ("B", VERMILLION)):
         angles = [_angle(drawn(name, 1.40 + by), tension) for by in away]
-        left.plot(1e3 * away, angles, color=colour, marker="o", ms=3, label=f"wrist {name}")
+        left.plot(1e3 * away, angles, color=colour, label=f"wrist {name}")
+    left.set_ylim(bottom=0.0)
     left.axvspan(-10.0, 10.0, color=GREEN, alpha=0.15, lw=0, label="±10 µm")
     left.set_xlabel(f"depth beyond 1.40 mm [µm], at {tension:g} N")
     left.set_ylabel("total bending angle [deg]")
