@@ -58,8 +58,7 @@ def _wrists() -> str:
         path = _compared(fem, fem.robot)
         rows.append(
             (
-                name,
-                f"{fem.loads[-1].tension:g}",
+                f"{name}, to {fem.loads[-1].tension:g} N",
                 f"{fem.angles[-1].sum():.0f}",
                 _error(np.degrees(path.notch_angle), fem.angles),
                 _total(fem, fem.robot),
@@ -67,7 +66,7 @@ def _wrists() -> str:
                 _total(fem, rigid(fem.robot)),
             )
         )
-    head = ("wrist", "up to, N", "bent to, deg", "any notch", "total", "tip, of its path")
+    head = ("wrist", "bent to, deg", "any notch", "total", "tip")
     return table((*head, 'total, `ends = "rigid"`'), rows)
 
 
@@ -261,7 +260,6 @@ def _draw_depth(folder: Path) -> None:
     for name, colour in (("A", BLUE), ("B", VERMILLION)):
         angles = [_angle(drawn(name, 1.40 + by), tension) for by in away]
         left.plot(1e3 * away, angles, color=colour, label=f"wrist {name}")
-    left.set_ylim(bottom=0.0)
     left.axvspan(-10.0, 10.0, color=GREEN, alpha=0.15, lw=0, label="±10 µm")
     left.set_xlabel(f"depth beyond 1.40 mm [µm], at {tension:g} N")
     left.set_ylabel("total bending angle [deg]")
@@ -274,6 +272,7 @@ def _draw_depth(folder: Path) -> None:
         label = f"{1.40 + by:.2f} mm deep"
         right.plot(path.tension[:, 0], angle, color=colour, label=label)
     right.set_xlabel("tendon tension [N], wrist A")
+    right.set_ylim(bottom=0.0)
     right.legend()
     save(figure, folder / "drawing_depth.svg")
 
