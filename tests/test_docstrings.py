@@ -55,12 +55,13 @@ def test_readme_examples(capsys: pytest.CaptureFixture[str]):
 
 def test_readme_comparisons_are_those_of_the_pages():
     (table,) = re.findall(r"## How right\n\n(.*?)\n\n", README, re.DOTALL)
-    pages = (DOCS / "validation.md").read_text(encoding="utf-8")
+    names = ("validation.md", "from_the_drawing.md")
+    pages = "".join((DOCS / name).read_text(encoding="utf-8") for name in names)
     rows = [line.split("|")[1:-1] for line in table.splitlines()[2:]]
-    assert len(rows) == 5
+    assert len(rows) == 6
     for _, _, worst in rows:
         number = re.escape(worst.split()[0])
-        assert re.search(rf"\| {number}( |$)", pages), worst
+        assert re.search(rf"\| [+−]?{number}( |$)", pages), worst
 
 
 def test_readme_links():

@@ -1,8 +1,9 @@
-"""Makes docs/validation.md: its tables (between marks that do not show) and its pictures.
+"""Makes the tables (between marks that do not show) and pictures of comparisons with other numbers.
 
 `python docs/make/validation.py` makes all of it, `python docs/make/validation.py gao2017` one part.
 Each part is a module beside this one, `against_<part>.py`, that compares the package with numbers
-of tests/reference and returns tables by name, and draws its pictures.
+of tests/reference and returns tables by name, and draws its pictures. They stand on
+docs/validation.md, or on the page that the module names as `PAGE`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = "../validation.md"  # from the folder of page.py
 PICTURES = ROOT / "docs" / "images" / "validation"
-PARTS = ("sections", "pacheco2021", "liu2022", "gao2017", "finite_elements", "measured")
+PARTS = ("sections", "pacheco2021", "liu2022", "gao2017", "finite_elements", "drawing", "measured")
 
 
 def main(parts: list[str]) -> None:
@@ -28,7 +29,7 @@ def main(parts: list[str]) -> None:
     for part in parts or PARTS:
         module = importlib.import_module(f"against_{part}")
         print(part, flush=True)
-        page.main(PAGE, module.tables)
+        page.main(getattr(module, "PAGE", PAGE), module.tables)
         if hasattr(module, "pictures"):
             module.pictures(PICTURES)
 

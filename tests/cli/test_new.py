@@ -65,14 +65,23 @@ def test_options_alone_make_a_robot(monkeypatch, tmp_path, capsys):
     assert "notchflex show w.toml" in capsys.readouterr().out
 
 
-def test_file_says_what_was_not_measured(monkeypatch, tmp_path):
+ESTIMATED = {
+    "nitinol": ("plateau_stress", "plateau_modulus"),
+    "superelastic": (
+        "superelastic_modulus", "transition_strain", "plastic_strain", "plastic_modulus",
+        "plastic_exponent",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("material", ESTIMATED)
+def test_file_says_what_was_not_measured(monkeypatch, tmp_path, material):
     pipe(monkeypatch)
-    assert run(command(elastic_modulus="9000")) == 0
+    assert run(command(elastic_modulus="9000", material=material)) == 0
     lines = (tmp_path / "w.toml").read_text(encoding="utf-8").splitlines()
     values = {line.partition(" = ")[0]: line for line in lines}
     for key in (
-        "plateau_stress", "plateau_modulus", "compression_ratio", "poisson_ratio", "density",
-        "allowed_strain", "coefficient",
+        *ESTIMATED[material], "poisson_ratio", "density", "allowed_strain", "coefficient",
     ):  # fmt: skip
         assert "estimate: " in values[key], key
     for key in ("base_length", "precurvature_deg", "radius", "axial_stiffness", "wrap"):
@@ -81,6 +90,17 @@ def test_file_says_what_was_not_measured(monkeypatch, tmp_path):
         assert not re.search("estimate|assumed", values[key]), key
     # What a key means stands at the first notch only.
     assert sum("depth of the cut" in line for line in lines) == 1
+
+
+@pytest.mark.parametrize(
+    ("material", "source"), [("nitinol", "30 to 57 GPa"), ("superelastic", "Pacheco 2021, Table 3")]
+)
+def test_an_estimate_names_the_source_of_its_kind(monkeypatch, tmp_path, material, source):
+    pipe(monkeypatch)
+    assert run(command(material=material)) == 0
+    text = (tmp_path / "w.toml").read_text(encoding="utf-8")
+    (line,) = re.findall("(?m)^elastic_modulus.*$", text)
+    assert source in line
 
 
 def test_a_new_wrist_is_warned_of_its_strain(monkeypatch, tmp_path, capsys):

@@ -71,17 +71,25 @@ def test_validation_page(make: Any):
     assert all(text.strip() for texts in on_page.values() for text in texts)
 
 
+def test_page_from_the_drawing(make: Any):
+    drawing = make("against_drawing")
+    on_page = make("page").marked(drawing.PAGE)
+    assert on_page == {name: [text] for name, text in drawing.tables().items()}
+
+
 def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any, monkeypatch: pytest.MonkeyPatch):
     figures = make("figures")
     monkeypatch.setattr(figures, "IMAGES", tmp_path)
     figures.main()
-    make("against_finite_elements").pictures(tmp_path)
+    for part in ("finite_elements", "drawing"):
+        make(f"against_{part}").pictures(tmp_path)
     drawn = {file.name for file in tmp_path.iterdir()}
     plain = {file.name for file in (DOCS / "images").glob("*.svg")}
-    assert drawn == plain | {"finite_elements.svg"}
+    compared = {"finite_elements.svg", "drawing_wrists.svg", "drawing_depth.svg"}
+    assert drawn == plain | compared
     assert len(plain) == 9
     # A picture that changes in more than what a drawing program does has other text.
-    for name in drawn - {"finite_elements.svg"}:
+    for name in plain:
         texts = [
             re.findall(r"<text[^>]*>([^<]*)</text>", (folder / name).read_text(encoding="utf-8"))
             for folder in (tmp_path, DOCS / "images")

@@ -64,20 +64,6 @@ def test_sideways_bending_under_a_lateral_force_is_that_of_the_beam(lateral, mar
     margin.within("turn about x, relative to the beam's", about_x / turned - 1.0, 0.02)
 
 
-def test_twist_beside_the_finite_elements(lateral, margin) -> None:
-    """3-D finite elements (fem/README): 5.79e-3 rad, 15 % less than Saint-Venant's torsion.
-
-    The uncut rings hold the sections of such short notches from warping, which no law of a
-    section knows; held altogether (Vlasov) they would twist less than half as much. So the model
-    errs to the soft side, by 18 % of the finite elements' twist where 15 % were hoped for.
-    """
-    fem = 5.79e-3
-    rotation = lateral.tip_rotation
-    twist = abs(0.5 * (rotation[1, 0] - rotation[0, 1]))
-    margin.within("twist against finite elements", twist / fem - 1.0, 0.185)
-    assert twist > fem
-
-
 def test_sideways_tendon_bends_the_strong_axis(margin) -> None:
     """A tendon at 90 deg to the only notch: M = T r about the strong axis, no friction."""
     robot = nf.Robot(

@@ -151,10 +151,12 @@ OPTIONS = {
 }
 """Section and key to the option that answers it; `--set SECTION.KEY=VALUE` answers the others."""
 
+# By section, kind and key; by "" for kinds that have no wording of their own.
 _DEFAULTS = {
-    wording.option: (section, key, wording.comment)
-    for (section, _), keys in WORDINGS.items()
+    (section, which, key): (wording.option, wording.comment)
+    for (section, kind), keys in WORDINGS.items()
     for key, wording in keys.items()
+    for which in ("", kind)
 }
 
 _NEVER_ASKED = {
@@ -177,20 +179,22 @@ _NEVER_ASKED = {
 
 def commented(text: str, defaulted: Set[str]) -> str:
     """Mark the values that nobody measured, and explain each key only once."""
-    taken = (_DEFAULTS[option] for option in defaulted if option in _DEFAULTS)
-    marks = _NEVER_ASKED | {(section, key): comment for section, key, comment in taken}
     lines: list[str] = []
-    section, explained = "", set[tuple[str, str]]()
+    section, kind, explained = "", "", set[tuple[str, str]]()
     for line in text.splitlines():
         if line.startswith("["):
-            section = line.strip("[]")
+            section, kind = line.strip("[]"), ""
         if line.startswith("#"):
             lines.append(line)
             continue
         value, _, meaning = line.partition("  # ")
-        place = section, line.partition(" = ")[0]
+        key, _, content = value.partition(" = ")
+        kind = content.strip('"') if key == "kind" else kind
+        place = section, key
+        own = _DEFAULTS.get((section, kind, key)) or _DEFAULTS.get((section, "", key), ("", ""))
+        mark = own[1] if own[0] in defaulted else _NEVER_ASKED.get(place, "")
         # A key is explained once, not at every notch; an estimate is marked everywhere.
-        words = ["" if place in explained else meaning, marks.get(place, "")]
+        words = ["" if place in explained else meaning, mark]
         explained.add(place)
         comment = "; ".join(filter(None, words))
         lines.append(f"{value}  # {comment}" if comment else value)

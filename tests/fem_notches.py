@@ -1,0 +1,97 @@
+"""Errors of the law of a notch against finite elements of one notch and of chains of notches.
+
+Numbers: tests/reference/fem_notch_*.csv. An error is relative: law over finite elements less 1 for
+compliances and lengths, and for moments; finite elements over law less 1 for the stiffness K₀.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from notchflex.mechanics.ends import Side, notch_stiffness, validity
+from notchflex.mechanics.section import SECTION_OF_CUT
+from reference_data import named_rows
+
+YOUNG = 60e3
+Row = dict[str, Any]
+
+
+def tube_and_notch(row: Row) -> tuple[float, float, str, float, float]:
+    """Return what the law takes of a row: radii, cut, depth and height."""
+    return row["OD"] / 2, row["ID"] / 2, row["cut"], row["depth"], row["height"]
+
+
+def inside(row: Row, side: Side) -> bool:
+    """Whether the small-load law claims to hold (what it says of softening is left aside)."""
+    return not [
+        text
+        for text in validity(*tube_and_notch(row), side, side)
+        if "softening" not in text and "moment" not in text
+    ]
+
+
+def single_notch() -> tuple[list[float], list[float]]:
+    """Return errors of K₀ of one notch between rigid plates, inside the checked ranges and not."""
+    error: tuple[list[float], list[float]] = [], []
+    for row in named_rows("fem_notch_clamped.csv"):
+        side = Side("clamped", row["ring"])
+        found = notch_stiffness(*tube_and_notch(row), row["nu"], side, side).weak
+        outer, inner, cut, depth, height = tube_and_notch(row)
+        wanted = height + row["delta_weak"]
+        if row["with_tube"] == "yes":
+            second = SECTION_OF_CUT[cut](outer, inner, depth).second_moment_weak
+            wanted -= 2 * row["ring"] * second / (np.pi / 4 * (outer**4 - inner**4))
+        error[not inside(row, side)].append(float(wanted / found - 1))
+    return error
+
+
+def _chain_rows():
+    for row in named_rows("fem_notch_chain.csv"):
+        side = Side("between", row["ring"])
+        section = SECTION_OF_CUT[row["cut"]](*(row["OD"] / 2, row["ID"] / 2, row["depth"]))
+        yield row, section, notch_stiffness(*tube_and_notch(row), row["nu"], side, side)
+
+
+def chain_bending() -> tuple[list[float], list[float]]:
+    """Return errors of K₀ in chains of equal notches, inside the checked ranges and not."""
+    error: tuple[list[float], list[float]] = [], []
+    for row, _, found in _chain_rows():
+        side = Side("between", row["ring"])
+        error[not inside(row, side)].append((row["height"] + row["delta_weak"]) / found.weak - 1)
+    return error
+
+
+def other_directions() -> dict[str, list[float]]:
+    """Return errors in chains of equal notches, by the direction."""
+    names = ("strong", "axial", "coupling", "torsion", "shear centre")
+    errors: dict[str, list[float]] = {name: [] for name in names}
+    for row, section, found in _chain_rows():
+        height, weak = row["height"], section.second_moment_weak
+        errors["strong"].append(found.strong / (height + row["delta_strong"]) - 1)
+        errors["axial"].append(found.axial / (height + row["delta_axial"]) - 1)
+        # The compliance between stretch on the tube axis and bending, times E: ȳ_eff ℓ/I.
+        cross = (section.centroid * found.weak - found.coupling) / weak
+        errors["coupling"].append(float(cross / row["uz_rx"] - 1))
+        twist = 2 * (1 + row["nu"]) * found.torsion / section.torsion_constant
+        errors["torsion"].append(float(twist / row["rz"] - 1))
+        errors["shear centre"].append(found.shear_centre / row["shear_centre"] - 1)
+    return errors
+
+
+def moments(depth: float) -> list[float]:
+    """Return errors of the moment of one notch of a depth (mm) between rigid plates, to closing."""
+    error = []
+    for row in named_rows("fem_notch_moment.csv"):
+        if row["depth"] != depth:
+            continue
+        side = Side("clamped", row["ring"])
+        law = notch_stiffness(0.81, 0.7, "off-axis", depth, row["height"], 0.33, side, side)
+        second = SECTION_OF_CUT["off-axis"](0.81, 0.7, depth).second_moment_weak
+        tube = 2 * row["ring"] / (np.pi / 4 * (0.81**4 - 0.7**4))  # the two rings as beams
+        angle = np.radians(row["theta_deg"]) - row["moment"] / YOUNG * tube
+        flattening = 1.0 + law.alpha * angle / 2 + law.beta * angle**2 / 2
+        found = YOUNG * second / law.weak * angle / flattening**2
+        error.append(float(found / row["moment"] - 1))
+    return error
