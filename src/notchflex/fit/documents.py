@@ -215,7 +215,7 @@ def _constants(found: Calibration) -> list[dict[str, Any]]:
                 "name": unknown.name,
                 "value": found.values[unknown.name],
                 "unit": unknown.unit,
-                "robots": list(dict.fromkeys(label for label, _ in unknown.sets)),
+                "robots": list(dict.fromkeys(one.label for one in unknown.sets)),
                 "interval_95": None if interval is None else [interval.lower, interval.upper],
                 "interval_reason": "" if interval is None else interval.reason,
                 "standard_deviation": _finite(found.deviations[unknown.name]),

@@ -149,6 +149,37 @@ def number_at(robot: Robot, path: str) -> float:
     return value
 
 
+def part_by_part(robot: Robot, path: str) -> tuple[str, ...]:
+    """The names of the numbers that a name such as `notch.depth` stands for.
+
+    Args:
+        robot: The robot.
+        path: A name, as for `Robot.with_value`.
+
+    Returns:
+        The name itself where it stands for one value; else a name for each notch or tendon that
+        has such a number.
+
+    Raises:
+        InputError: There is no such number.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> part_by_part(load_robot("pacheco2021-a"), "notch.depth")
+        ('notch.depth',)
+        >>> part_by_part(load_robot("pacheco2021-c"), "notch.depth")[-1]
+        'notch[4].depth'
+    """
+    target = _parse(path)
+    parts = {"notch": robot.notches, "tendon": robot.tendon}.get(target.section)
+    if parts is None or target.number is not None:
+        return (path,)
+    values = {n: getattr(one, target.key, None) for n, one in enumerate(parts, start=1)}
+    if len(set(values.values())) <= 1:
+        return (path,)
+    return tuple(f"{target.section}[{n}].{target.key}" for n, v in values.items() if v is not None)
+
+
 def described_at(robot: Robot, path: str) -> Described:
     """Unit and limits of the number of a robot that has a name.
 

@@ -18,6 +18,7 @@ from notchflex.fit.estimation.noise import Noise
 from notchflex.fit.estimation.problem import Problem
 from notchflex.fit.model.residuals import Residuals
 from notchflex.robot import Robot
+from notchflex.solver.newton import Settings
 
 # Probability below which noise does not explain the misfit: the model misses something.
 _UNLIKELY = 0.01
@@ -84,6 +85,11 @@ class Calibration:
         """Standard deviations of the measured numbers."""
         assert self.problem.noise is not None
         return self.problem.noise
+
+    @property
+    def settings(self) -> Settings:
+        """Settings of the solver."""
+        return self.problem.samples.every[0].settings
 
     @property
     def solves(self) -> int:

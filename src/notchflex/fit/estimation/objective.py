@@ -23,6 +23,9 @@ class FitObjective(Protocol):
         """Raise InputError if it cannot be made of these quantities."""
         ...
 
+    takes_priors: ClassVar[bool]
+    """Whether a prior may be added to it."""
+
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
         """Return value, gradient and curvature."""
         ...
@@ -43,6 +46,7 @@ class LeastSquares:
 
     huber: float | None = None
     is_likelihood: ClassVar[bool] = True
+    takes_priors: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         """Check the number."""
@@ -71,7 +75,11 @@ class LeastSquares:
 class SumOfRobotErrors:
     """Sum over all robots of the norm of their root-mean-square errors, deg (Pacheco 2021, eq. 17).
 
-    Each robot adds the 2-norm of the vector of errors of its notches and of its total angle.
+    Each robot adds the 2-norm of the vector of errors of its notches and of its total angle. A
+    prior counts as one more reading of the robot: a constant that is one standard deviation from
+    its prior counts as an angle that is off by the noise of the angles, so that for one robot with
+    equal noise eq. 17 and least squares weigh prior and data alike. A prior of a constant of
+    several robots is shared between them.
 
     Example:
         >>> SumOfRobotErrors().is_likelihood
@@ -79,6 +87,7 @@ class SumOfRobotErrors:
     """
 
     is_likelihood: ClassVar[bool] = False
+    takes_priors: ClassVar[bool] = True
 
     def check(self, quantities: tuple[str, ...]) -> None:
         """Raise InputError unless all quantities are angles."""
@@ -100,6 +109,7 @@ class SumOfDistances:
     """
 
     is_likelihood: ClassVar[bool] = False
+    takes_priors: ClassVar[bool] = False
 
     def check(self, quantities: tuple[str, ...]) -> None:
         """Raise InputError unless all quantities are points."""

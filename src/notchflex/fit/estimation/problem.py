@@ -13,6 +13,7 @@ from notchflex.fit.estimation.intervals import unit_free
 from notchflex.fit.estimation.minimise import Cost, Minimum, Vector, minimise
 from notchflex.fit.estimation.noise import Noise, first_noise
 from notchflex.fit.estimation.objective import FitObjective
+from notchflex.fit.model.residuals import Residuals
 from notchflex.fit.model.samples import Samples
 
 Progress = Callable[[str, int, int], None]
@@ -39,9 +40,9 @@ class Problem:
 
     def __init__(self, samples: Samples, objective: FitObjective) -> None:
         objective.check(samples.quantities)
-        if not objective.is_likelihood and any(one.prior for one in samples.unknowns):
+        if not objective.takes_priors and any(one.prior for one in samples.unknowns):
             raise InputError.UNSUPPORTED(
-                "a prior needs LeastSquares(); other objectives are no likelihoods"
+                "a prior needs LeastSquares() or SumOfRobotErrors(); other objectives take none"
             )
         self.samples, self.objective, self.unknowns = samples, objective, samples.unknowns
         self.noise: Noise | None = None
@@ -57,6 +58,8 @@ class Problem:
             return None
         if self.noise is None:
             self.noise = first_noise(self.samples, residuals)
+        if not self.objective.is_likelihood:
+            return self._with_readings(residuals, values)
         cost = self.objective.cost(residuals, self.noise.deviation)
         for number, unknown in enumerate(self.unknowns):
             if unknown.prior is not None:  # as a measurement of the constant itself
@@ -66,6 +69,26 @@ class Problem:
                 cost.gradient[number] += off / deviation
                 cost.curvature[number, number] += 1.0 / deviation**2
         return cost
+
+    def _with_readings(self, residuals: Residuals, values: Vector) -> Cost:
+        """A sum of norms, to which every prior is one more reading of the robots it belongs to."""
+        assert self.noise is not None
+        labels = list(dict.fromkeys(one.label for one in self.samples.every))
+        known = np.isfinite(self.noise.deviation)
+        more: list[tuple[float, int, int, float]] = []
+        for number, unknown in enumerate(self.unknowns):
+            owners = {labels.index(one.label) for one in unknown.sets}
+            for robot in owners if unknown.prior is not None else ():
+                mean, deviation = unknown.prior
+                mine = known & (residuals.robot == robot)
+                noise = float(np.sqrt(np.mean(self.noise.deviation[mine] ** 2) / len(owners)))
+                off = (float(values[number]) - mean) / deviation
+                more.append((noise * off, robot, number, noise / deviation))
+        if not more:
+            return self.objective.cost(residuals, self.noise.deviation)
+        cost = self.objective.cost(residuals.with_readings(more), self.noise.deviation)
+        count = len(residuals)
+        return cost._replace(residuals=residuals, contributions=cost.contributions[:count])
 
     def minimum(self, start: Vector) -> Minimum:
         """Return the minimum that a search from a start ends at."""

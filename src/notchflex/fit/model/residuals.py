@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,7 +14,7 @@ from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.rows import OUTPUTS, Predicted
 from notchflex.mechanics.motion import left_slope
 
-ANGLES = ("notch_angle", "total_angle")
+ANGLES = ("notch_angle", "total_angle", "edge_angle", "total_edge_angle")
 LENGTHS = ("tip_position", "axis_points")
 
 
@@ -55,6 +56,26 @@ class Residuals:
         """Whether each number belongs to a quantity of some measurements, (R,)."""
         return (self.sample == sample) & (self.quantity == OBSERVED.index(quantity))
 
+    def with_readings(self, more: Sequence[tuple[float, int, int, float]]) -> Residuals:
+        """Return the same with residuals of robots that depend on one constant each.
+
+        Args:
+            more: Residual, number of the robot, number of the constant, derivative by it.
+        """
+        value, robot, number, slope = (np.array(one) for one in zip(*more, strict=True))
+        slopes = np.zeros((len(value), self.slopes.shape[1]))
+        slopes[np.arange(len(value)), number] = slope
+        like = np.array([int(np.argmax(self.robot == one)) for one in robot])
+        added = {"values": value, "slopes": slopes}
+        return Residuals(
+            **{
+                one.name: np.concatenate(
+                    [getattr(self, one.name), added.get(one.name, getattr(self, one.name)[like])]
+                )
+                for one in fields(self)
+            }
+        )
+
     def root_mean_squares(self) -> dict[str, float]:
         """Root mean square by quantity (rad, mm, N)."""
         return {
@@ -79,6 +100,8 @@ def misfit(
         last = np.isfinite(values[0]).sum(axis=-1) - 1
         tendons = np.arange(len(last))
         values, slopes = values[:, tendons, last], slopes[:, :, tendons, last]
+    if name == "total_edge_angle":
+        values, slopes = values.sum(axis=-1), slopes.sum(axis=-1)
     values = (values - seen).reshape(len(seen), -1)
     return values, slopes.reshape(len(slopes), *values.shape)
 

@@ -154,7 +154,8 @@ def _own(found: Calibration, label: str) -> tuple[NDArray[np.bool_], NDArray[np.
     from notchflex.fit.measurements.measurements import OBSERVED
 
     own = found.residuals.robot == list(found.given).index(label)
-    return own, own & (found.residuals.quantity == OBSERVED.index("notch_angle"))
+    notches = [OBSERVED.index(name) for name in ("notch_angle", "edge_angle")]
+    return own, own & np.isin(found.residuals.quantity, notches)
 
 
 def _lines(found: Calibration, part: MeasuredPart) -> list[_ModelLine]:
@@ -212,7 +213,7 @@ def _abscissa(found: Calibration, label: str) -> tuple[NDArray[np.float64], str]
 
 
 def _kind(quantity: str) -> str:
-    if quantity in ("notch_angle", "total_angle", "tip_rotation"):
+    if quantity.endswith(("_angle", "_rotation")):
         return "angle"
     return "tension" if quantity == "tip_tension" else "position"
 
@@ -222,4 +223,4 @@ def _title(quantity: str, component: int) -> str:
 
     if quantity in ("tip_position", "tip_rotation"):
         return f"{edge(quantity)[0]}, {'xyz'[component]}"
-    return part_title(quantity, 0 if quantity == "total_angle" else component + 1)
+    return part_title(quantity, 0 if quantity.startswith("total_") else component + 1)
