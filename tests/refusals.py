@@ -11,10 +11,13 @@ import notchflex as nf
 
 
 @contextmanager
-def refused(code: str, *names: str) -> Iterator[pytest.ExceptionInfo[nf.InputError]]:
+def refused(code: str | nf.ErrorCode, *names: str) -> Iterator[pytest.ExceptionInfo[nf.InputError]]:
     """Expect an InputError of a code, whose message names all of `names`."""
     with pytest.raises(nf.InputError) as caught:
         yield caught
-    assert caught.value.code is nf.ErrorCode[code]
+    wanted = (
+        nf.ErrorCode[code] if isinstance(code, str) and code in nf.ErrorCode.__members__ else code
+    )
+    assert caught.value.code is wanted, caught.value
     for name in names:
         assert name in str(caught.value)

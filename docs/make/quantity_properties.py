@@ -18,7 +18,7 @@ KINDS = {float: "Number", bool: "Flag", int: "Count", str: "Text"}
 def module() -> str:
     """Return the text of the module: what is above the mark stays."""
     lines = [
-        f'    {name} = {"Table" if one.per else KINDS[one.kind]}()\n    """{one.summary}"""\n'
+        f'    {name} = {"Array" if one.per else KINDS[one.kind]}()\n    """{one.summary}"""\n'
         for name, one in QUANTITIES.items()
     ]
     above, _, below = FILE.read_text(encoding="utf-8").partition(MARK)

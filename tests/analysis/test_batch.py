@@ -9,7 +9,8 @@ import pytest
 
 import notchflex as nf
 from notchflex.analysis.outputs import OUTPUTS
-from notchflex.errors import InputError
+from notchflex.errors import ErrorCode, InputError
+from refusals import refused
 
 
 def test_loads_of_one_robot(wrist, margin):
@@ -103,9 +104,9 @@ def test_cores_may_be_any_whole_number(wrist):
 
 @pytest.mark.parametrize("given", [1, None])
 def test_what_is_no_batch_of_paths(wrist, given):
-    with pytest.raises(InputError, match="LoadPath"):
+    with refused(ErrorCode.WRONG_TYPE):
         nf.simulate_batch(wrist, given)
-    with pytest.raises(InputError, match="Robot"):
+    with refused(ErrorCode.WRONG_TYPE):
         nf.simulate_batch(given, nf.pull(0.0, 1.0, steps=2))
 
 
@@ -116,7 +117,7 @@ def test_cores_that_there_cannot_be(wrist, cores):
 
 
 def test_paths_of_unlike_lengths(wrist):
-    with pytest.raises(InputError, match="equally many steps"):
+    with refused(ErrorCode.WRONG_SHAPE):
         nf.simulate_batch(wrist, [nf.pull(0, 1, steps=2), nf.pull(0, 1, steps=3)])
 
 
@@ -148,3 +149,20 @@ def test_robots_of_unlike_length_share_a_program(wrist, load, margin):
     assert np.isnan(found["notch_angle"][0, 2:]).all()
     assert np.isnan(found["body_position"][0, 3:]).all()
     margin.within("tip", found["tip_position"][1] - nf.solve(robots[1], load).tip_position, 1e-9)
+
+
+def test_an_unknown_output_is_an_input_error_that_names_what_there_is():
+    batch = nf.solve_batch(nf.load_robot("pacheco2021-a"), nf.Load(tension=1.0))
+    with pytest.raises(nf.InputError) as problem:
+        batch["angle"]
+    assert problem.value.code is ErrorCode.UNKNOWN_NAME
+    assert isinstance(problem.value, KeyError)
+    assert str(problem.value).startswith("there is no output 'angle'; there are converged, ")
+    assert "angle" not in batch
+    assert batch.get("angle") is None
+
+
+def test_an_empty_batch_cannot_be_drawn():
+    with pytest.raises(nf.InputError) as problem:
+        nf.plot(nf.Batch({}))
+    assert problem.value.code is ErrorCode.NO_DATA

@@ -7,7 +7,9 @@ import pytest
 
 import notchflex as nf
 from notchflex.analysis.derivatives.kinks import kinks
+from notchflex.errors import ErrorCode
 from notchflex.solver.programs.compiled import Native
+from refusals import refused
 
 ARC = nf.ArcNotch("on-axis", depth=1.40, height=0.8, uncut_length=1.2, repeat=2)
 # Of the form of wrist A, whose programs others need too; linear up to 0.9 N.
@@ -61,7 +63,7 @@ def test_the_slopes_of_a_tip_tell_their_kinks():
 
 def test_a_direction_that_changes_nothing_is_refused():
     bend = nf.differentiable(TWO, LOADS[:1], ["tension"])
-    with pytest.raises(nf.InputError, match="changes nothing"):
+    with refused(ErrorCode.NO_DATA):
         bend.one_sided({"tension": 0.0})
 
 

@@ -1,9 +1,14 @@
 """External loads in the head of the table."""
 
-from notchflex.cli.tables.load_words import in_words, load_sentences
+from notchflex.cli.tables.path_table import load_sentences
 from notchflex.loads.external import NOTHING, BodyForce, ExternalLoad
+from notchflex.loads.summary import external_words
 
 PUSH = ExternalLoad(tip_force=(0.0, 0.0, -0.2), tip_point=(0.0, 0.0, 1.5))
+
+
+def _words(load):
+    return ", ".join(external_words(load))
 
 
 def test_nothing_is_said_of_nothing():
@@ -15,12 +20,12 @@ def test_every_load_is_named_with_its_unit():
     load = ExternalLoad(
         tip_moment=(1, 0, 0), following=True, tip_mass=20, gravity=(0, 9.81, 0), body_forces=[side]
     )
-    assert in_words(load) == (
-        "tip moment (1, 0, 0) N mm following the tip, tip mass 20 g, gravity (0, 9.81, 0) m/s2, "
+    assert _words(load) == (
+        "tip moment (1, 0, 0) N mm following the tip, tip mass 20 g, gravity (0, 9.81, 0) m/s², "
         "force (0.1, 0, 0) N on body 3 at (0.8, 0, 0) mm following it, "
         "moment (0, 2, 0) N mm on body 3 following it"
     )
-    assert in_words(PUSH) == "tip force (0, 0, -0.2) N at (0, 0, 1.5) mm from the tip"
+    assert _words(PUSH) == "tip force (0, 0, -0.2) N at (0, 0, 1.5) mm from the tip"
 
 
 def test_lines_fit_and_changes_are_told_by_their_steps():

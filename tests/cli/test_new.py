@@ -277,8 +277,22 @@ def test_capstan_and_linear_take_further_keys(monkeypatch):
     assert (robot.friction.constant_loss, robot.material.density) == (0.05, 6450.0)
 
 
+@pytest.mark.parametrize("option", ["--kind", "--friction-kind", "--material"])
+def test_an_unknown_kind_is_refused_before_anything_else(monkeypatch, capsys, option):
+    pipe(monkeypatch)
+    assert run(["new", "w", option, "foo", "--outer-diameter", "x"]) == 2
+    assert capsys.readouterr().err.startswith(f"Error: {option} foo: got 'foo'; give ")
+
+
 @pytest.mark.parametrize(
-    "wrong", ["notch.slot_radius", "tube.x=1", "notch.cut=on-axis", "friction.nonsense=1"]
+    "wrong",
+    [
+        "notch.slot_radius",
+        "tube.x=1",
+        "notch.cut=on-axis",
+        "friction.nonsense=1",
+        "friction.coefficient=0.2",  # a question asks for it: --friction
+    ],
 )
 def test_a_set_that_nothing_asks_for_writes_nothing(monkeypatch, tmp_path, wrong):
     pipe(monkeypatch)

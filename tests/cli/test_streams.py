@@ -82,7 +82,7 @@ def test_other_encodings_get_the_nearest_characters(shell, tmp_path, encoding):
 def test_answers_in_another_encoding_are_told(shell):
     done = shell(r"printf '\xff\n' | notchflex new x", PYTHONIOENCODING="utf-8:strict")
     assert done.returncode == 2
-    assert b"is no text in utf-8" in done.stderr
+    assert b"is not text in utf-8" in done.stderr
 
 
 def test_the_command_that_new_proposes_can_be_pasted(shell):

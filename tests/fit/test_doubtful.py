@@ -22,8 +22,8 @@ from notchflex.fit import (
 from notchflex.fit.documents import calibration_document
 from notchflex.fit.estimation.problem import Problem
 from notchflex.fit.model.samples import Samples
-from notchflex.plotting.fits.calibration_rows import MeasuredPart, data_panel, residual_panel
-from notchflex.plotting.sheet import Line
+from notchflex.plotting.fits.calibration_rows import data_panel, residual_panel
+from notchflex.plotting.sheet import Curve
 from refusals import refused
 
 WRIST = nf.load_robot(ROBOT)
@@ -79,8 +79,8 @@ def test_coordinates_may_be_missing_one_by_one_also_on_a_turned_base(tmp_path):
     left = at.observed["tip_position"][:, :2] - some[:, :2]
     np.testing.assert_allclose(found.residuals.values, left.ravel(), atol=1e-7)
     # drawn in the world too, as it was measured
-    drawn = data_panel(found, MeasuredPart(WRIST.name, "tip_position", 0, "x")).items
-    marks = next(one for one in drawn if isinstance(one, Line) and one.hollow)
+    drawn = data_panel(found, WRIST.name, "tip_position", 0).items
+    marks = next(one for one in drawn if isinstance(one, Curve) and one.hollow)
     np.testing.assert_allclose(marks.rows[:, 1], some[:, 0])
 
 
@@ -224,7 +224,7 @@ def test_totals_that_are_sums_are_not_counted(capsys):
         capsys.readouterr().out
     )
     panel = residual_panel(found, WRIST.name)
-    drawn = sum(len(one.rows) for one in panel.items if isinstance(one, Line))
+    drawn = sum(len(one.rows) for one in panel.items if isinstance(one, Curve))
     assert drawn == 30
 
 

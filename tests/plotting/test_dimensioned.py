@@ -8,12 +8,12 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import notchflex as nf
-from notchflex.errors import InputError
 from notchflex.plotting.drawings.dimensioned import MOST, dimensioned_figure, save_dimensioned
 from notchflex.plotting.drawings.notch_views import notch_view
 from notchflex.plotting.shapes.outline import outline
 from notchflex.plotting.shapes.robot_shape import shape_from_angles
 from notchflex.robot.kinds import Notch
+from refusals import refused
 
 ROBOTS = ["pacheco2021-a", "pacheco2021-c", "york2015", "liu2022", "gao2017", "two-axis-wrist"]
 UNUSUAL = {
@@ -160,7 +160,7 @@ def test_equal_notches_share_a_drawing_and_the_rest_is_named():
 
 def test_unknown_kind_is_refused():
     robot = nf.load_robot("york2015")
-    with pytest.raises(InputError, match="no dimensioned drawing"):
+    with refused("UNSUPPORTED"):
         notch_view(Notch(kind="arc", uncut_length=1.0), robot, True, None)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.shapes.faces import body_faces
 from notchflex.plotting.shapes.outline import outline
+from notchflex.plotting.shapes.panel import body_faces
 from notchflex.plotting.shapes.robot_shape import shape_from_angles
 
 

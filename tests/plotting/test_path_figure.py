@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from fake_path import CLOSING, fake_path
-from notchflex.errors import InputError
 from notchflex.loads.external import BodyForce, ExternalLoad
 from notchflex.mechanics.chain import assemble
 from notchflex.plotting import path_figure, path_picture, save
-from notchflex.plotting.branches import abscissa, branches, steps_by_branch
+from notchflex.plotting.curves import abscissa, branches, steps_by_branch
 from notchflex.plotting.shapes.outline import bending_plane, outline
 from notchflex.plotting.shapes.panel import load_label, representative_steps
 from notchflex.plotting.shapes.robot_shape import shape_at, shape_from_modes
 from notchflex.plotting.sheet import Area, Span
 from notchflex.robot import Linear
+from refusals import refused
 
 
 def outline_at(path, step):
@@ -232,7 +232,7 @@ def test_same_picture_is_the_same_file(tmp_path):
 
 
 def test_other_formats_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"\.png, \.svg or \.pdf"):
+    with refused("FILE_FORMAT"):
         save(path_figure(fake_path(3)), tmp_path / "wrist.gif")
 
 

@@ -65,7 +65,7 @@ def test_help_has_unit_shape_and_text():
 
 
 def test_type_checkers_know_the_kinds():
-    kinds = {"total_angle": "Number", "tip_position": "Table", "reason": "Text", "stable": "Flag"}
+    kinds = {"total_angle": "Number", "tip_position": "Array", "reason": "Text", "stable": "Flag"}
     for name, kind in kinds.items():
         assert type(getattr(nf.EquilibriumPath, name)).__name__ == kind
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.plotting.sheet import Line, Panel
+from notchflex.plotting.sheet import Curve, Panel
 from notchflex.viewer import Session
 from notchflex.viewer.page.chart import chart, ticks
 from robots import ready
@@ -31,7 +31,7 @@ def test_ticks_take_in_zero_and_all_values_in_round_steps(values):
 
 
 def test_a_chart_puts_points_where_its_ticks_say():
-    line = Line([[0.0, 0.0], [1.0, 50.0], [2.0, 100.0]], "#123456", marker="o")
+    line = Curve([[0.0, 0.0], [1.0, 50.0], [2.0, 100.0]], "#123456", marker="o")
     text = chart(Panel([line], "T < 3 [N]", "angle [deg]"), "loop")
     labels = {one.text: one.attrib for one in elements(text, "text")}
     assert "T < 3 [N]" in labels
@@ -43,7 +43,7 @@ def test_a_chart_puts_points_where_its_ticks_say():
 
 def test_many_points_are_thinned_but_not_their_ends():
     x = np.linspace(0.0, 1.0, 20_000)
-    text = chart(Panel([Line(np.stack([x, x], axis=1), "#123456")], "x", "y"), "many")
+    text = chart(Panel([Curve(np.stack([x, x], axis=1), "#123456")], "x", "y"), "many")
     way = next(one for one in elements(text, "path") if one.attrib.get("fill") == "none")
     points = way.attrib["d"].lstrip("M").split("L")
     assert len(points) == 1500
@@ -52,7 +52,7 @@ def test_many_points_are_thinned_but_not_their_ends():
 
 
 def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
-    from notchflex.viewer.page.charts import loop_chart, tendon_chart
+    from notchflex.viewer.page.chart import loop_chart, tendon_chart
 
     session = Session(ready("A"))
     for tension in (1.0, 2.0, 1.0):
@@ -69,7 +69,7 @@ def test_the_loop_tells_loading_from_unloading_and_keeps_the_loop_before():
 
 def test_colours_of_contacts_and_strains():
     from notchflex.plotting.style import BLUE, GREEN, GREY, VERMILLION
-    from notchflex.viewer.scene.colours import BEYOND, METAL, contact_colours, strain_colour
+    from notchflex.viewer.scene.marks import BEYOND, METAL, contact_colours, strain_colour
 
     robot = ready("A").with_value("friction.wrap", "geometric")
     session = Session(robot)
@@ -114,8 +114,7 @@ def test_the_table_tells_units_strain_and_closed_notches():
 
 
 def test_a_strain_without_a_limit_says_so():
-    from notchflex.viewer.page.legend import legend_html
-    from notchflex.viewer.page.readout import readout
+    from notchflex.viewer.page.readout import legend_html, readout
 
     robot = ready("A")
     robot = robot.replace(material=replace(robot.material, allowed_strain=None))
@@ -137,7 +136,7 @@ def test_no_sign_before_a_zero(name):
 
 def test_every_colour_means_one_thing():
     from notchflex.plotting.curves import COLOUR
-    from notchflex.viewer.page.legend import BALL, entries
+    from notchflex.viewer.page.readout import BALL, entries
 
     told = entries(ready("A"))
     balls = [one.colour for one in told if one.mark == BALL]
@@ -148,7 +147,7 @@ def test_every_colour_means_one_thing():
 
 
 def test_by_stroke_the_loop_is_drawn_against_stroke():
-    from notchflex.viewer.page.charts import loop, loop_chart
+    from notchflex.viewer.page.chart import loop, loop_chart
 
     session = Session(ready("A"))
     for stroke in (0.0, 1.0, 2.0, 1.5):

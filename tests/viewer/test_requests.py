@@ -6,15 +6,15 @@ import socket
 import pytest
 
 import notchflex as nf
-from notchflex import InputError
-from notchflex.viewer.server.origin import refusal
+from notchflex.viewer.server import refusal
+from refusals import refused
 
 viser = pytest.importorskip("viser", reason="the extra `viewer` is not installed")
 
 
 @pytest.fixture(scope="module")
 def port():
-    from notchflex.viewer.server.serving import serve
+    from notchflex.viewer.server import serve
 
     server = serve("127.0.0.1", 18300)
     server.scene.add_frame("/robot")
@@ -125,9 +125,9 @@ def test_a_viser_that_cannot_be_checked_is_not_served(monkeypatch):
         asyncio=types.SimpleNamespace(server=plain), datastructures=websockets.datastructures
     )
     monkeypatch.setattr(infra, "websockets", other)
-    from notchflex.viewer.server.serving import serve
+    from notchflex.viewer.server import serve
 
-    with pytest.raises(InputError, match="nothing is served"):
+    with refused("MISSING_PACKAGE"):
         serve("127.0.0.1", 18340)
     with pytest.raises(OSError, match="refused"):
         socket.create_connection(("127.0.0.1", 18340), timeout=1).close()

@@ -94,7 +94,7 @@ def test_a_law_that_is_refused_leaves_the_law_before_on_the_page_too(start, monk
     viewer.ask(lambda: viewer.set(0, 0.5, "tension [N]"))
     wait(lambda: reached(viewer, 0.5))
     robot, angle = viewer.session.robot, float(viewer.session.state.total_angle)
-    law = viewer.page.model._parts["friction"]._kind.handle
+    law = viewer.page.parts["friction"].kind.handle
 
     def refuse(*_, **__):
         raise nf.InputError("this law does not fit these notches")

@@ -1,7 +1,7 @@
 """Analyses of a robot: equilibria along a path, batches, closing loads, derivatives, kinematics."""
 
 from notchflex.analysis.axis_points import AxisPlaces, axis_places, axis_points, points_on_axis
-from notchflex.analysis.batch import Batch, simulate_batch, solve_batch
+from notchflex.analysis.batch import simulate_batch, solve_batch
 from notchflex.analysis.closing_loads.closing import Closing, closing
 from notchflex.analysis.closing_loads.search import ClosingStatus
 from notchflex.analysis.derivatives.differentiable import Differentiable, differentiable
@@ -13,6 +13,7 @@ from notchflex.analysis.kinematics import (
     equal_stroke,
     tip_from_angles,
 )
+from notchflex.analysis.outputs import Batch
 from notchflex.analysis.solve import simulate, solve, solve_each
 
 __all__ = [

@@ -152,6 +152,3 @@ def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64
     return np.asarray(
         points_on_axis(places, constant(path.body_position), constant(path.body_rotation))
     )
-
-
-__all__ = ["AxisPlaces", "axis_places", "axis_points", "points_on_axis"]

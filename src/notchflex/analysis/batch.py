@@ -7,7 +7,7 @@ is bounded whatever the batch. Where JAX has a GPU they run there, whole pieces 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -17,16 +17,18 @@ from jaxtyping import Float, Int
 
 from lanewise import WIDTH
 from notchflex._quantity import REGISTERED
-from notchflex._summary import Displayed, Summary, short
-from notchflex.analysis.batch_rows import follow_row
-from notchflex.analysis.outputs import DEFAULT_OUTPUTS, check_outputs
+from notchflex.analysis.outputs import (
+    DEFAULT_OUTPUTS,
+    Batch,
+    check_outputs,
+    follow_row,
+)
 from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.command import make_commands, pad_commands
 from notchflex.loads.load_path import join_paths, load_path
 from notchflex.loads.validation import check_integer, one_or_several, short_repr
-from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain, pad_prepared
@@ -36,51 +38,6 @@ from notchflex.solver.programs.threads import number_of_cores, on_cores
 
 # Rows of a piece at most, by how many rows there are.
 _PIECES = {0: 64, 512: 256, 8192: 2048}
-
-
-class Batch(Displayed, Mapping[str, np.ndarray]):
-    """Result of a batch: arrays by name, the rows of the batch as leading axis.
-
-    Example:
-        >>> from notchflex import load_robot, pull
-        >>> found = solve_batch(load_robot("pacheco2021-a"), pull(0.0, 2.0, steps=3))
-        >>> found["tip_position"].shape, bool(found["converged"].all())
-        ((3, 3), True)
-    """
-
-    def __init__(self, arrays: dict[str, np.ndarray]) -> None:
-        """Hold arrays by name."""
-        self._arrays = arrays
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """One of the arrays."""
-        return self._arrays[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """The names."""
-        return iter(self._arrays)
-
-    def __len__(self) -> int:
-        """How many arrays there are."""
-        return len(self._arrays)
-
-    def _summary(self) -> Summary:
-        rows: list[tuple[str, str]] = []
-        count = 0
-        for name, array in self.items():
-            count = len(array)
-            quantity = QUANTITIES.get(name)
-            unit = f" {quantity.python_unit}" if quantity and quantity.python_unit else ""
-            shape = "×".join(map(str, array.shape))
-            if array.dtype == bool:
-                text = f"{int(array.sum())} of {array.size} true"
-            elif np.isfinite(array).any():
-                text = f"{short(float(np.nanmin(array)))} to {short(float(np.nanmax(array)))}{unit}"
-            else:
-                text = "no number"
-            rows.append((name, f"{shape}, {text}"))
-        title = f"Batch of {count} row{'s' * (count != 1)}"
-        return Summary(title, rows, "[name] is the array of one output")
 
 
 def solve_batch(
@@ -98,7 +55,7 @@ def solve_batch(
     Args:
         robots: One robot, or one per row.
         loads: One load, or one per row (the steps of a `LoadPath` are loads of their own here).
-        outputs: What to return, by names of `EquilibriumPath`; fewer names are less memory.
+        outputs: What to return, by names of `EquilibriumPath`; fewer names need less memory.
         settings: Tolerance and limits of the solver.
         refinement: More strain modes, as for `simulate`.
         cores: How many cores to use; all where not given.
@@ -113,14 +70,14 @@ def solve_batch(
 
     Example:
         >>> from notchflex import load_robot, pull
-        >>> found = solve_batch(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=100))
-        >>> found["total_angle"].shape
+        >>> batch = solve_batch(load_robot("pacheco2021-a"), pull(1.0, 2.0, steps=100))
+        >>> batch["total_angle"].shape
         (100,)
     """
     every = _robots(robots)
     path = load_path(loads, max(robot.number_of_tendons for robot in every))
-    found = _simulate(every, path, len(path), outputs, settings, refinement, cores, progress)
-    return Batch({name: array[:, 0] for name, array in found.items()})
+    arrays = _simulate(every, path, len(path), outputs, settings, refinement, cores, progress)
+    return Batch({name: array[:, 0] for name, array in arrays.items()})
 
 
 def simulate_batch(
@@ -139,8 +96,8 @@ def simulate_batch(
         robots: One robot, or one per row.
         loads: One path, or one per row, of equally many steps.
         outputs: What to return, as for `solve_batch`.
-        settings: Tolerance and limits of the solver.
-        refinement: More strain modes, as for `simulate`.
+        settings: As for `solve_batch`.
+        refinement: As for `solve_batch`.
         cores: As for `solve_batch`.
         progress: As for `solve_batch`.
 
@@ -164,8 +121,8 @@ def simulate_batch(
     if not paths or len({len(path) for path in paths}) > 1:
         raise InputError.WRONG_SHAPE("a batch needs one path or more, all of equally many steps")
     joined = paths[0] if len(paths) == 1 else join_paths(paths)
-    rows = len(paths)
-    return Batch(_simulate(every, joined, rows, outputs, settings, refinement, cores, progress))
+    common = (outputs, settings, refinement, cores, progress)
+    return Batch(_simulate(every, joined, len(paths), *common))
 
 
 def _robots(robots: Any) -> list[Robot]:
@@ -220,21 +177,21 @@ def _store(
     arrays: dict[str, np.ndarray], name: str, rows: np.ndarray, values: np.ndarray, count: int
 ) -> None:
     """Store the values of some rows; NaN where robots have fewer notches than others."""
-    if name not in arrays:
-        arrays[name] = np.empty((count, *values.shape[1:]), values.dtype)
-    shape = tuple(np.maximum(arrays[name].shape[1:], values.shape[1:]))
-    if shape != arrays[name].shape[1:]:
-        wider = [(0, 0), *((0, b - a) for a, b in zip(arrays[name].shape[1:], shape, strict=True))]
-        arrays[name] = np.pad(arrays[name], wider, constant_values=_empty(values))
+    array = arrays.get(name, np.empty((count, *values.shape[1:]), values.dtype))
+    shape = tuple(np.maximum(array.shape[1:], values.shape[1:]))
+    if shape != array.shape[1:]:
+        wider = [(0, 0), *((0, b - a) for a, b in zip(array.shape[1:], shape, strict=True))]
+        array = np.pad(array, wider, constant_values=_empty(values))
     first, last = int(rows[0]), int(rows[-1]) + 1
     where = rows if last - first > len(rows) else slice(first, last)
     if shape != values.shape[1:]:
-        arrays[name][where] = _empty(values)
-    arrays[name][(where, *(slice(size) for size in values.shape[1:]))] = values
+        array[where] = _empty(values)
+    array[(where, *(slice(size) for size in values.shape[1:]))] = values
+    arrays[name] = array
 
 
 @dataclass(frozen=True)
-class _Table:
+class _BatchRows:
     """Rows of a batch whose robots run through one program.
 
     Attributes:
@@ -294,7 +251,7 @@ def _tables(
     count: int,
     outputs: tuple[str, ...],
     refinement: int,
-) -> list[_Table]:
+) -> list[_BatchRows]:
     """The rows of a batch by the layout of their robots, shorter ones padded to the longest."""
     steps = len(joined) // paths
     # The modes that any of the loads asks for, so that rows share a program.
@@ -302,13 +259,11 @@ def _tables(
     flexures = max(ready.chain.flexures for ready in every)
     edges = max(ready.chain.contacts.shape[1] for ready in every)
     by_stroke = not np.isnan(joined.stroke).all()
-    groups: dict[
-        tuple[PytreeLayout, PytreeLayout], list[tuple[int, PreparedChain, np.ndarray]]
-    ] = {}
-    for row, (robot, own) in enumerate(zip(robots, every, strict=True)):
+    groups: dict[Any, list[tuple[int, PreparedChain, np.ndarray]]] = {}
+    for row, (robot, unpadded) in enumerate(zip(robots, every, strict=True)):
         part = joined if len(robots) == 1 or paths == 1 else joined.part(row * steps, steps)
-        commands = pad_commands(make_commands(part, robot, own.chain), flexures, by_stroke)
-        ready = pad_prepared(own, flexures, edges)
+        commands = pad_commands(make_commands(part, robot, unpadded.chain), flexures, by_stroke)
+        ready = pad_prepared(unpadded, flexures, edges)
         layout = ready.command_layout(commands)
         packed = layout.pack(commands, leading=1).reshape(-1, steps, layout.size)
         groups.setdefault((ready.chain_layout, layout), []).append((row, ready, packed))
@@ -318,10 +273,7 @@ def _tables(
         rows = np.arange(count) if len(robots) == 1 else np.array(numbers)
         vectors = np.stack([ready.vector for ready in prepared])
         structure = StaticStructure.of(chain_layout, [ready.chain for ready in prepared], vectors)
-        own = np.array([every[number].chain.flexures for number in numbers])
-        layouts = (structure, layout, outputs)
-        tables.append(_Table(rows, structure.pack(vectors), np.concatenate(commands), own, layouts))
+        counts = np.array([every[number].chain.flexures for number in numbers])
+        chains, loads = structure.pack(vectors), np.concatenate(commands)
+        tables.append(_BatchRows(rows, chains, loads, counts, (structure, layout, outputs)))
     return tables
-
-
-__all__ = ["Batch", "simulate_batch", "solve_batch"]

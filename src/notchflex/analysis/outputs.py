@@ -1,21 +1,27 @@
-"""What can be asked of a path inside a compiled program, by name, and following one for that."""
+"""Outputs of batches and differentiable functions: their names, and programs that compute them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NoReturn
 
-from jaxtyping import Array
+import numpy as np
+from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
-from notchflex.errors import InputError
+from notchflex._summary import Displayed, Summary, short
+from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import SolverState, solve_load_step
+from notchflex.results.quantities.registry import QUANTITIES
+from notchflex.solver.continuation import SolverState, at_rest, solve_load_step
 from notchflex.solver.derived.quantities import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import Settings
+from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
+from notchflex.solver.programs.static_structure import StaticStructure
 
 _OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
 DEFAULT_OUTPUTS = ("total_angle", "tip_position", "tip_rotation", "converged")
@@ -23,8 +29,87 @@ OUTPUTS = (*dict.fromkeys([*DEFAULT_OUTPUTS, "residual", "iterations", *_OF_STAT
 """What can be asked of a batch or of a function that can be differentiated."""
 
 
+class UnknownOutputError(InputError, KeyError):
+    """No output of this name was asked for."""
+
+    def __init__(self, name: object, names: Iterable[str]) -> None:
+        """Name what there is."""
+        there = ", ".join(names) or "none"
+        message = f"there is no output {short_repr(name)}; there are {there}"
+        super().__init__(message, ErrorCode.UNKNOWN_NAME)
+
+    def __str__(self) -> str:
+        """Return the message; a `KeyError` would put it in quotes."""
+        return str(self.args[0])
+
+
+class Batch(Displayed, Mapping[str, np.ndarray]):
+    """Result of a batch: arrays by name, the rows of the batch as leading axis.
+
+    Example:
+        >>> from notchflex import load_robot, pull, solve_batch
+        >>> batch = solve_batch(load_robot("pacheco2021-a"), pull(0.0, 2.0, steps=3))
+        >>> batch["tip_position"].shape, bool(batch["converged"].all())
+        ((3, 3), True)
+    """
+
+    def __init__(self, arrays: dict[str, np.ndarray]) -> None:
+        """Hold arrays by name."""
+        self._arrays = arrays
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """One of the arrays."""
+        if name not in self._arrays:
+            raise UnknownOutputError(name, self._arrays)
+        return self._arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(self._arrays)
+
+    def __len__(self) -> int:
+        """How many arrays there are."""
+        return len(self._arrays)
+
+    def _summary(self) -> Summary:
+        count = len(next(iter(self.values()), ()))
+        title = f"Batch of {count} row{'s' * (count != 1)}"
+        rows = [(name, _range(name, array)) for name, array in self.items()]
+        return Summary(title, rows, "[name] is the array of one output")
+
+
+def _range(name: str, array: np.ndarray) -> str:
+    """Describe an array by its shape, and what its values lie between."""
+    shape = "×".join(map(str, array.shape))
+    if array.dtype == bool:
+        return f"{shape}, {int(array.sum())} of {array.size} true"
+    if not np.isfinite(array).any():
+        return f"{shape}, no number"
+    unit = QUANTITIES[name].python_unit if name in QUANTITIES else ""
+    ends = f"{short(float(np.nanmin(array)))} to {short(float(np.nanmax(array)))} {unit}"
+    return f"{shape}, {ends}".rstrip()
+
+
+@jax.tree_util.register_pytree_with_keys_class
+class OutputTable(dict[str, Array]):
+    """Outputs by name; an unknown name raises an `InputError` that lists those there are."""
+
+    def __missing__(self, name: str) -> NoReturn:
+        """Refuse a name that was not asked for."""
+        raise UnknownOutputError(name, self)
+
+    def tree_flatten_with_keys(self) -> tuple[list[Any], tuple[str, ...]]:
+        """Return keys and values, and the names, for JAX."""
+        return [(jax.tree_util.DictKey(name), one) for name, one in self.items()], tuple(self)
+
+    @classmethod
+    def tree_unflatten(cls, names: tuple[str, ...], values: Iterable[Any]) -> OutputTable:
+        """Return the table of names and values, for JAX."""
+        return cls(zip(names, values, strict=True))
+
+
 def check_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
-    """The names of outputs, checked.
+    """Return the names of outputs, checked.
 
     Raises:
         InputError: There is no such output, or none is asked.
@@ -32,63 +117,59 @@ def check_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     wrong = [name for name in names if name not in OUTPUTS]
     if wrong or not names:
-        said = f"there is no output {short_repr(wrong[0])}" if wrong else "no output is asked"
-        raise InputError.UNKNOWN_NAME(f"{said}; there are {', '.join(OUTPUTS)}")
+        problem = f"there is no output {short_repr(wrong[0])}" if wrong else "no output is asked"
+        raise InputError.UNKNOWN_NAME(f"{problem}; there are {', '.join(OUTPUTS)}")
     return names
-
-
-def follow_path(
-    chain: Chain,
-    commands: Any,
-    start: SolverState,
-    settings: Settings,
-    outputs: tuple[str, ...],
-) -> dict[str, Array]:
-    """Follow a path of loads, and tell of every state what is asked.
-
-    Beside `run` this is a second loop over a path, and stays one: `run` goes on or starts anew,
-    skips what comes after a failure (a branch that rows side by side would both take), and packs
-    all that a path may be asked for later; here nothing is kept but what is asked for.
-
-    Args:
-        chain: The chain.
-        commands: The loads, as leading axis.
-        start: The state before the first.
-        settings: How hard to try.
-        outputs: Names of what is asked.
-
-    Returns:
-        By name, loads as leading axis; after a load that failed the last good state.
-    """
-
-    def step(state: tuple[SolverState, Array], command: Any) -> tuple[Any, dict[str, Array]]:
-        last, alive = state
-        came = solve_load_step(chain, command, last, settings)
-        solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), came.solved, last)
-        reached = alive & came.converged
-        told = _told(chain, solved, outputs)
-        converged = reached & told.pop("_holds")
-        own = {"residual": came.residual, "iterations": came.iterations, "converged": converged}
-        told |= {name: value for name, value in own.items() if name in outputs}
-        return (solved, reached), told
-
-    return jax.lax.scan(step, (start, jnp.array(True)), commands)[1]
-
-
-def _told(chain: Chain, solved: SolverState, outputs: tuple[str, ...]) -> dict[str, Array]:
-    """What is asked of a state, and whether it may be believed."""
-    state = SolvedState(chain, solved)
-    told = {name: state.quantity(name) for name in outputs if name in _OF_STATE}
-    return told | {"_holds": believable(state.quantity)}
 
 
 def report_quantities(
     chain: Chain, solved: SolverState, outputs: tuple[str, ...]
 ) -> dict[str, Array]:
     """Return quantities of a solved state by name, in the frame of the base."""
-    told = _told(chain, solved, outputs)
-    del told["_holds"]
-    return told
+    state = SolvedState(chain, solved)
+    return {name: state.quantity(name) for name in outputs if name in _OF_STATE}
 
 
-__all__ = ["DEFAULT_OUTPUTS", "OUTPUTS", "check_outputs", "follow_path", "report_quantities"]
+@native(3, lane_sizes)
+def follow_row(
+    chain: Float[Array, " chain"],
+    commands: Float[Array, "s command"],
+    numbers: Float[Array, " settings"],
+    chain_layout: StaticStructure,
+    command_layout: PytreeLayout,
+    outputs: tuple[str, ...],
+) -> dict[str, Array]:
+    """Follow the path of one row of a batch from rest.
+
+    Beside `run` this is a second loop over a path, and stays one: `run` continues or starts anew,
+    skips what comes after a failure (a branch that rows side by side would both take), and packs
+    all that a path may be asked for later; here only what is asked for is kept.
+
+    Args:
+        chain: The robot.
+        commands: Its loads, step by step.
+        numbers: Tolerance and limits of the solver.
+        chain_layout: Structure of the robot and layout of its other numbers.
+        command_layout: Layout of one step.
+        outputs: Names of the outputs.
+
+    Returns:
+        By name, steps as leading axis; after a load that failed the last good state.
+    """
+    robot, loads = chain_layout.unpack(chain), command_layout.unpack(commands)
+    settings = Settings.of(numbers)
+
+    def step(state: tuple[SolverState, Array], command: Any) -> tuple[Any, dict[str, Array]]:
+        last, alive = state
+        result = solve_load_step(robot, command, last, settings)
+        solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), result.solved, last)
+        reached = alive & result.converged
+        quantity = SolvedState(robot, solved).quantity
+        values = {name: quantity(name) for name in outputs if name in _OF_STATE} | {
+            "residual": result.residual,
+            "iterations": result.iterations,
+            "converged": reached & believable(quantity),
+        }
+        return (solved, reached), {name: values[name] for name in outputs}
+
+    return jax.lax.scan(step, (at_rest(robot), jnp.array(True)), loads)[1]

@@ -169,6 +169,3 @@ def prepare_for(
         level = max(level, from_state.level, key=LEVELS.index)
     turning = loaded and (follows(load) or (from_state is not None and from_state.follows))
     return prepare(robot, level, loaded=loaded, follows=turning, refinement=refinement)
-
-
-__all__ = ["simulate", "solve", "solve_each"]

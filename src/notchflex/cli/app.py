@@ -15,7 +15,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentErr
 
 from notchflex import __version__
 from notchflex.cli import terminal
-from notchflex.cli.exit_codes import BAD_INPUT, DONE, INTERNAL_ERROR, INTERRUPTED
+from notchflex.cli.terminal import BAD_INPUT, DONE, INTERNAL_ERROR, INTERRUPTED
 from notchflex.errors import InputError
 from notchflex.results.files.streams import let_go
 

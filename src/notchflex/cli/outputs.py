@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from notchflex._extras import need
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import flag
+from notchflex.errors import InputError
 from notchflex.results.files.writing import (
     BROWSER,
     PAPER,
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from notchflex.plotting import Picture
 
 OUTPUT = Group("Output", sort_key=9)
+_BINARY = {"--nc": ("xarray", "h5netcdf", "h5py"), "--parquet": ("polars",)}
+"""Options of binary files, and the packages that write these."""
 
 
 def output_file(option: str, text: str) -> Parameter:
@@ -63,7 +67,7 @@ class Outputs:
         inputs: Files that are read; no output may replace one of them.
         quiet: Whether `--quiet` was given.
         pictures: Suffixes that `--plot` may have.
-        folder: Option and files of a folder that is written, checked before.
+        files: By option, further files that are written and were checked before.
         targets: What `--json`, `--csv`, `--plot` and others name; None where not given.
     """
 
@@ -73,19 +77,25 @@ class Outputs:
         *,
         quiet: bool = False,
         pictures: tuple[str, ...] = PAPER + BROWSER,
-        files: dict[str, str] | None = None,
+        files: Mapping[str, str] | None = None,
         **targets: str | None,
     ) -> None:
         terminal.be_quiet(quiet)
         self.targets = {name: target for name, target in targets.items() if target is not None}
-        named = {f"--{name.replace('_', '-')}": target for name, target in self.targets.items()}
-        check_distinct({**named, **(files or {})})
+        options = {f"--{name.replace('_', '-')}": target for name, target in self.targets.items()}
+        check_distinct({**options, **(files or {})})
         inputs = list(inputs)
-        for option, target in named.items():
+        for option, target in options.items():
             if option == "--plot":
                 check_picture(target, option, inputs=inputs, kinds=pictures)
             else:
                 check_output(target, option, inputs=inputs)
+            if option in _BINARY and target == STANDARD_OUTPUT:
+                raise InputError.FILE_FORMAT(
+                    f"{option} - : a binary file cannot go to standard output; name a file."
+                )
+            for module in _BINARY.get(option, ()):
+                need(module, "data", option)
         self.prints_tables = not quiet and STANDARD_OUTPUT not in self.targets.values()
 
     def write_json(self, document: Callable[[], Any]) -> None:

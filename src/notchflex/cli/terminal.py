@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
+INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
+INTERRUPTED = 130  # 128 + SIGINT, as shells expect
+
 Counted = Callable[[int, int], None]
 """Takes what is done and all there is."""
 
@@ -91,9 +95,9 @@ def table(
     """Return a table without lines.
 
     Args:
-        heads: Heads of the columns. `>` before one marks numbers, which are aligned to the right
-            and never broken; other cells are folded where they are too long. No head at all is
-            shown where all are empty.
+        heads: Heads of the columns, whose last lines (the units) stand side by side. `>` before one
+            marks numbers, which are aligned to the right and never broken; other cells are folded
+            where they are too long. No head at all is shown where all are empty.
         rows: The cells of each row.
         gap: Blanks between two columns.
         colour: Of the first column, on a terminal.
@@ -107,15 +111,22 @@ def table(
         pad_edge=False,
         show_header=any(heads),
     )
+    deepest = max(head.count("\n") for head in heads)
     for number, head in enumerate(heads):
         style = colour if number == 0 else ""
+        text = "\n" * (deepest - head.count("\n")) + head.removeprefix(">")
         if head.startswith(">"):
-            made.add_column(head[1:], justify="right", no_wrap=True, style=style)
+            made.add_column(text, justify="right", no_wrap=True, style=style)
         else:
-            made.add_column(head, overflow="fold", style=style)
+            made.add_column(text, overflow="fold", style=style)
     for row in rows:
         made.add_row(*row)
     return made
+
+
+def shortened(text: str, size: int) -> str:
+    """Return a text of at most `size` characters; a longer one ends with `…`."""
+    return text if len(text) <= size else f"{text[: size - 1]}…"
 
 
 def note(text: str) -> None:
@@ -164,8 +175,8 @@ def counting(text: str) -> Generator[Counted]:
 
     The bar goes when the work is done; in a pipe, in a log or with `--quiet` there is none.
     """
-    with bars(text) as tell:
-        yield (lambda done, total: None) if tell is None else partial(tell, text)
+    with bars(text) as show:
+        yield (lambda done, total: None) if show is None else partial(show, text)
 
 
 @contextlib.contextmanager
@@ -181,15 +192,33 @@ def bars(first: str = "searching") -> Generator[Callable[[str, int, int], None] 
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, TimeElapsedColumn(), console=messages(), transient=True) as shown:
-        stages = {first: shown.add_task(first, total=None)}
+    with Progress(*columns, TimeElapsedColumn(), console=messages(), transient=True) as progress:
+        stages = {first: progress.add_task(first, total=None)}
 
-        def tell(stage: str, done: int, total: int) -> None:
+        def show(stage: str, done: int, total: int) -> None:
             if stage not in stages:
-                stages[stage] = shown.add_task(stage, total=total)
-            shown.update(stages[stage], completed=done, total=total)
+                stages[stage] = progress.add_task(stage, total=total)
+            progress.update(stages[stage], completed=done, total=total)
 
-        yield tell
+        yield show
+
+
+def use_compile_cache() -> None:
+    """Let JAX keep its compiled programs beside those of the library.
+
+    The library keeps its own programs in every process (`solver/programs/store.py`). JAX's settings
+    belong to the whole process, so that they are changed on the command line only.
+    """
+    from notchflex.solver.programs import store
+
+    folder = store.program_folder()
+    if folder is None or store.VARIABLE in os.environ:
+        return
+    from notchflex._jax import jax
+
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 
 
 def _is_watched() -> bool:

@@ -51,17 +51,31 @@ def load_words(load: Load) -> str:
 
 
 def external_words(load: ExternalLoad) -> list[str]:
-    """Return the external loads of one step, each in words."""
+    """Return the external loads of one step, each in words.
+
+    Example:
+        >>> from notchflex.loads import ExternalLoad
+        >>> external_words(ExternalLoad(tip_force=(0.0, 0.1, 0.0), following=True, tip_mass=20.0))
+        ['tip force (0, 0.1, 0) N following the tip', 'tip mass 20 g']
+    """
     words: list[str] = []
-    for name, unit in (("tip_force", "N"), ("tip_moment", "N mm")):
-        if any(getattr(load, name)):
-            turning = " (following)" if load.following else ""
-            words.append(f"{name.replace('_', ' ')} {vector(getattr(load, name))} {unit}{turning}")
+    turning = " following the tip" if load.following else ""
+    at = f" at {vector(load.tip_point)} mm from the tip" if any(load.tip_point) else ""
+    if any(load.tip_force):
+        words.append(f"tip force {vector(load.tip_force)} N{at}{turning}")
+    if any(load.tip_moment):
+        words.append(f"tip moment {vector(load.tip_moment)} N mm{turning}")
     if load.tip_mass:
-        words.append(f"tip mass {short(load.tip_mass)} g")
-    if load.gravity is not None:
+        words.append(f"tip mass {short(load.tip_mass)} g{'' if any(load.tip_force) else at}")
+    if load.gravity is not None and any(load.gravity):
         words.append(f"gravity {vector(load.gravity)} m/s²")
-    words += [f"force {vector(one.force)} N on body {one.body}" for one in load.body_forces]
+    for one in load.body_forces:
+        point = f" at {vector(one.point)} mm" if any(one.point) else ""
+        follows = " following it" if one.following else ""
+        for name, value, where in (("force", one.force, point), ("moment", one.moment, "")):
+            if any(value):
+                unit = "N" if name == "force" else "N mm"
+                words.append(f"{name} {vector(value)} {unit} on body {one.body}{where}{follows}")
     return words
 
 

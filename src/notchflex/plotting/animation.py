@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex.errors import InputError
-from notchflex.plotting.branches import abscissa
-from notchflex.plotting.curves import notches_panel, total_panel
+from notchflex.plotting.curves import abscissa, notches_panel, total_panel
 from notchflex.plotting.output import Picture
 from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
@@ -76,8 +75,8 @@ def save_animation(
     figure.draw_without_rendering()  # arranges the axes, once for all frames
     figure.set_layout_engine("none")
     robot, *curves = figure.axes
-    limits = {name: getattr(robot, f"get_{name}lim")() for name in _axes_of(robot)}
-    view = plane_of(path)
+    view, names = plane_of(path), "xyz"[: 3 if robot.name == "3d" else 2]
+    limits = {name: getattr(robot, f"get_{name}lim")() for name in names}
     dots = [axes.plot([], [], "o", color=BLACK, markersize=5.0, zorder=9)[0] for axes in curves]
     frame, standing = _durations(len(steps))
     writer = PillowWriter(fps=1.0 / frame)  # pyright: ignore[reportArgumentType]
@@ -94,7 +93,7 @@ def save_animation(
                 dot.set_data(*points)
             for _ in range(standing if number in (0, len(steps) - 1) else 1):
                 writer.grab_frame()
-            if progress is not None:
+            if progress:
                 progress(number + 1, len(steps))
 
 
@@ -133,10 +132,6 @@ def _dots(path: EquilibriumPath, step: int) -> list[tuple[list[float], list[floa
     total = float(path.total_angle[step]) * QUANTITIES["total_angle"].scale
     notches = [float(one) for one in path.notch_angle[step] * QUANTITIES["notch_angle"].scale]
     return [([x], [total]), ([x] * len(notches), notches)]
-
-
-def _axes_of(axes: Any) -> str:
-    return "xyz" if axes.name == "3d" else "xy"
 
 
 def _limit(axes: Any, limits: dict[str, Any]) -> None:

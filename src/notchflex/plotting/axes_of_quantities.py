@@ -13,11 +13,19 @@ from numpy.typing import NDArray
 
 from notchflex._quantity import Quantity
 from notchflex.errors import InputError
-from notchflex.plotting.branches import LOADING, UNLOADING, branches, load_parameter
-from notchflex.plotting.curves import LINE, NEUTRAL, branch_lines, failures
-from notchflex.plotting.equilibrium import robot_shape, state_shape
+from notchflex.plotting.curves import (
+    LINE,
+    LOADING,
+    NEUTRAL,
+    UNLOADING,
+    branch_lines,
+    branches,
+    failures,
+    load_parameter,
+)
+from notchflex.plotting.path import robot_shape, state_shape
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
-from notchflex.plotting.sheet import BESIDE, INSIDE, Line, Mark, Panel
+from notchflex.plotting.sheet import BESIDE, INSIDE, Curve, Mark, Panel
 from notchflex.plotting.style import house_style, sequence_colours
 from notchflex.results.files.csv import Entry, entries_of, is_listed
 from notchflex.results.quantities.registry import QUANTITIES
@@ -32,31 +40,19 @@ STEP = "step"
 
 @dataclass(frozen=True)
 class Series:
-    """Values of one quantity along a path, S steps, k entries.
+    """Values of one quantity with k entries along a path of S steps, in the units of pictures."""
 
-    Attributes:
-        label: Label of the axis, with symbol and unit.
-        names: Legend entries; "" for a quantity with one number.
-        headers: CSV columns of the entries; "" for none.
-        values: (S, k), in the units of pictures.
-        per: Meaning of the entries, such as ("notch",).
-    """
-
-    label: str
-    names: Sequence[str]
-    headers: Sequence[str]
-    values: NDArray[np.float64]
-    per: tuple[str, ...] = ()
+    label: str  # of the axis, with symbol and unit
+    names: Sequence[str]  # legend entries; "" for a quantity with one number
+    headers: Sequence[str]  # CSV columns; "" for none
+    values: NDArray[np.float64]  # (S, k)
+    per: tuple[str, ...] = ()  # meaning of the entries, such as ("notch",)
 
 
 def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> Axes:
-    """Draw one quantity of a path over another, or the shape of a state or a robot.
+    """Draw one quantity y of a path over another x, or the shape of a state or a robot.
 
-    Args:
-        thing: A path; a state or a robot if x and y are None.
-        x: Quantity along the horizontal axis; see `notchflex.plot`.
-        y: Quantity along the vertical axis.
-        ax: Axes to draw into; new ones of pyplot if None.
+    Without axes to draw into it makes new ones of pyplot.
 
     Raises:
         InputError: It can't be drawn on one pair of axes, or the quantity is unknown.
@@ -97,11 +93,7 @@ def plot_on_axes(thing: Any, x: str | None, y: str | None, ax: Axes | None) -> A
 
 
 def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
-    """Return one quantity of a path over another; loading and unloading have their own lines.
-
-    Raises:
-        InputError: The quantity is unknown or not numeric, or x has several entries.
-    """
+    """Return one quantity of a path over another; loading and unloading have their own lines."""
     both = len({way for _, way in branches(load_parameter(path))}) > 1
     across, upward = series_of(path, x), series_of(path, y)
     pairs = _pairs(x, across, upward)
@@ -114,7 +106,7 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
         else:
             items += branch_lines(path, points, name=None if both else "")
     if several and both:
-        items += [Line([], NEUTRAL, LINE[way], name=way) for way in (LOADING, UNLOADING)]
+        items += [Curve([], NEUTRAL, LINE[way], name=way) for way in (LOADING, UNLOADING)]
     if len({column for column, _ in pairs}) == 1:
         items += failures(path, across.values[:, pairs[0][0]])
     named = both or not np.all(path.converged)
@@ -123,11 +115,7 @@ def quantities_panel(path: EquilibriumPath, x: str, y: str) -> Panel:
 
 
 def series_of(path: EquilibriumPath, name: str) -> Series:
-    """Return a quantity of a path by its name, or one of its entries by its CSV column.
-
-    Raises:
-        InputError: The name is unknown, or the quantity has no numbers to draw.
-    """
+    """Return a quantity of a path by its name, or one of its entries by its CSV column."""
     if name == STEP:
         return Series(STEP, [""], [""], np.arange(1.0, len(path) + 1.0)[:, None])
     known = [one for one in QUANTITIES.values() if is_listed(one) and one.kind is not str]

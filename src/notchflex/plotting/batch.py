@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from notchflex.errors import InputError
+from notchflex.plotting.curves import TIP_LABELS
 from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import BESIDE, Line, Mark, Panel, dots, grid
+from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
 
@@ -41,9 +42,6 @@ def batch_picture(
         label: Label of this axis, with its unit.
         title: Heading.
 
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
-
     Raises:
         InputError: The number of values is not that of the rows, or there is nothing to draw.
 
@@ -55,8 +53,7 @@ def batch_picture(
         >>> picture.cells[-1].panel.x_label
         'tip position x [mm]'
     """
-    first = next(iter(batch.values()))
-    rows = len(first)
+    rows = len(next(iter(batch.values()), ()))
     x = np.arange(1.0, rows + 1.0) if against is None else np.asarray(against, float)
     if x.shape != (rows,):
         raise InputError.WRONG_SHAPE(
@@ -110,21 +107,13 @@ def _over_rows(
         one = f"{quantity.per[0]} {column + 1}" if quantity.per and count > 1 else ""
         points = np.stack([x[order], table[order, column]], axis=1)
         options: dict[str, Any] = {"marker": "o", "size": 2.0, "width": 0.8, "hover": True}
-        items.append(Line(points, colour if count > 1 else BLUE, name=one, group=one, **options))
+        items.append(Curve(points, colour if count > 1 else BLUE, name=one, group=one, **options))
     return Panel(items, label, quantity.label, legend=BESIDE if count > 1 else "")
 
 
 def _tips(tips: NDArray[np.float64], good: NDArray[np.bool_]) -> Panel:
-    quantity = QUANTITIES["tip_position"]
     items: list[Mark] = [dots(tips[good][:, [0, 2]], BLUE, 2.5, hover=True, group="tip")]
     if not good.all():
         name = "not converged"
         items.append(dots(tips[~good][:, [0, 2]], VERMILLION, 2.5, name=name, group=name))
-    unit = f"[{quantity.unit}]"
-    return Panel(
-        items,
-        f"{quantity.title} x {unit}",
-        f"{quantity.title} z {unit}",
-        equal=True,
-        legend="" if good.all() else BESIDE,
-    )
+    return Panel(items, *TIP_LABELS, equal=True, legend="" if good.all() else BESIDE)

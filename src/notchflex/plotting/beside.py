@@ -8,12 +8,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex.errors import InputError
-from notchflex.plotting.branches import LOADING, UNLOADING, abscissa, steps_by_branch
-from notchflex.plotting.curves import LINE, branch_lines, converged_only, failures
+from notchflex.plotting.curves import (
+    LINE,
+    LOADING,
+    NOTCH_LABEL,
+    TIP_LABELS,
+    UNLOADING,
+    abscissa,
+    branch_lines,
+    converged_only,
+    failures,
+    steps_by_branch,
+)
 from notchflex.plotting.fits.comparison import MODEL_COLOURS
 from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
-from notchflex.plotting.sheet import BELOW, Cell, Colour, Line, Mark, Note, Panel, dots, stack
+from notchflex.plotting.sheet import BELOW, Cell, Colour, Curve, Mark, Note, Panel, dots, stack
 from notchflex.plotting.style import GREY, rgb
 from notchflex.plotting.tendon_profiles import SLACK, span_line
 from notchflex.results.quantities.registry import QUANTITIES
@@ -38,9 +48,6 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
         paths: Label to path, two to five of them.
         title: Heading.
 
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
-
     Raises:
         InputError: Too few or too many paths.
 
@@ -61,15 +68,17 @@ def beside_picture(paths: Mapping[str, EquilibriumPath], *, title: str = "") -> 
     cells: list[Cell] = []
     for column, (label, path) in enumerate(paths.items()):
         steps = representative_steps(path, most=_SHAPES)
-        shades = [_pale(colours[label], part) for part in np.linspace(0.55, 0.0, len(steps))]
+        shades: list[Colour] = []
+        for pale in np.linspace(0.55, 0.0, len(steps)):
+            shades.append(tuple(one + pale * (1.0 - one) for one in rgb(colours[label])))
         panel = shape_panel(path, steps, plane_of(path), title=label, colours=shades, legend=BELOW)
         cells.append(Cell(panel, 0, column, 2))
-    curves = [_angles(paths, colours), _notches(paths, colours)]
-    cells += stack(curves, len(paths))
-    cells += stack([_travel(paths, colours), _tensions(paths, colours)], len(paths) + 1)
-    legend = [Line([], colours[label], name=label, group=label) for label in paths]
+    notches, tensions = _most_bent_states(paths, colours)
+    cells += stack([_angles(paths, colours), notches], len(paths))
+    cells += stack([_travel(paths, colours), tensions], len(paths) + 1)
+    legend = [Curve([], colours[label], name=label, group=label) for label in paths]
     if any(len(steps_by_branch(path)) > 1 for path in paths.values()):
-        legend += [Line([], GREY, LINE[way], name=way) for way in (LOADING, UNLOADING)]
+        legend += [Curve([], GREY, LINE[way], name=way) for way in (LOADING, UNLOADING)]
     heading = title or "; ".join(dict.fromkeys(path.robot.name for path in paths.values()))
     return Picture(heading, 1.2 + 3.6 * (len(paths) + 2), 6.8, cells, legend)
 
@@ -79,73 +88,60 @@ def _most_bent(path: EquilibriumPath) -> int | None:
     return next(reversed(representative_steps(path)), None)
 
 
-def _pale(colour: Colour, part: float) -> Colour:
-    return tuple(one + part * (1.0 - one) for one in rgb(colour))
-
-
 def _angles(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:
     quantity = QUANTITIES["total_angle"]
     items: list[Mark] = []
-    labels: list[str] = []
-    for label, path in paths.items():
-        x, x_label = abscissa(path)
-        labels.append(x_label)
+    labels: set[str] = set()
+    for name, path in paths.items():
+        x, label = abscissa(path)
+        labels.add(label)
         points = np.stack([x, path.total_angle * quantity.scale], axis=1)
-        items += branch_lines(path, points, colours[label], "", group=label)
-        items += failures(path, x)
+        items += [*branch_lines(path, points, colours[name], "", group=name), *failures(path, x)]
     # One label for all, if they are drawn against the same quantity.
-    return Panel(items, labels[0] if len(set(labels)) == 1 else "load of each", quantity.label)
+    return Panel(items, labels.pop() if len(labels) == 1 else "load of each", quantity.label)
 
 
 def _travel(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:
-    quantity = QUANTITIES["tip_position"]
     items: list[Mark] = []
-    for label, path in paths.items():
+    for name, path in paths.items():
         tip = converged_only(path, path.tip_position)[:, [0, 2]]
-        items += branch_lines(path, tip, colours[label], "", group=label)
+        items += branch_lines(path, tip, colours[name], "", group=name)
         step = _most_bent(path)
         if step is not None:
-            items.append(dots(tip[step : step + 1], colours[label], 4.0, group=label))
-    unit = f"[{quantity.unit}]"
-    return Panel(items, f"{quantity.title} x {unit}", f"{quantity.title} z {unit}", equal=True)
+            items.append(dots(tip[step : step + 1], colours[name], 4.0, group=name))
+    return Panel(items, *TIP_LABELS, equal=True)
 
 
-def _notches(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:
+def _most_bent_states(
+    paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]
+) -> tuple[Panel, Panel]:
+    """Return the notch angles, and the tension along the first pulled tendon, when most bent."""
     quantity = QUANTITIES["notch_angle"]
-    items: list[Mark] = []
+    angles: list[Mark] = []
+    tensions: list[Mark] = []
     least = 0.0
-    for label, path in paths.items():
+    for name, path in paths.items():
         step = _most_bent(path)
         if step is None:
             continue
         angle = path.notch_angle[step] * quantity.scale
         least = min(least, float(angle.min()))
         points = np.stack([np.arange(1, len(angle) + 1), angle], axis=1)
-        look: dict[str, Any] = {"marker": "o", "size": 2.5, "group": label, "hover": True}
-        items.append(Line(points, colours[label], **look))
-    return Panel(
-        items or [Note("no step was solved")],
-        "notch [number], 1 at the base",
-        quantity.label,
-        title="most bent state" if items else "",
-        y_range=(0.0, None) if least >= 0.0 and items else None,
-        whole="x",
+        look: dict[str, Any] = {"marker": "o", "size": 2.5, "group": name, "hover": True}
+        angles.append(Curve(points, colours[name], **look))
+        pulled = path.tension[step] > SLACK
+        if pulled.any():
+            tendon = int(np.argmax(pulled))
+            tensions.append(span_line(path, step, tendon, colours[name], group=name))
+    labels = "span [number], first pulled tendon", QUANTITIES["span_tension"].label
+    return (
+        _state_panel(angles, "no step was solved", NOTCH_LABEL, quantity.label, least >= 0.0),
+        _state_panel(tensions, "no tendon is pulled", *labels, True),
     )
 
 
-def _tensions(paths: Mapping[str, EquilibriumPath], colours: Mapping[str, Colour]) -> Panel:
-    items: list[Mark] = []
-    for label, path in paths.items():
-        step = _most_bent(path)
-        if step is None or not (path.tension[step] > SLACK).any():
-            continue
-        tendon = int(np.argmax(path.tension[step] > SLACK))
-        items.append(span_line(path, step, tendon, colours[label], group=label))
-    return Panel(
-        items or [Note("no tendon is pulled")],
-        "span [number], first pulled tendon",
-        QUANTITIES["span_tension"].label,
-        title="most bent state" if items else "",
-        y_range=(0.0, None) if items else None,
-        whole="x",
-    )
+def _state_panel(items: list[Mark], note: str, x: str, y: str, positive: bool) -> Panel:
+    if not items:
+        return Panel([Note(note)], x, y, whole="x")
+    y_range = (0.0, None) if positive else None
+    return Panel(items, x, y, title="most bent state", y_range=y_range, whole="x")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from notchflex.plotting.sheet import Sheet
+from notchflex.results.files.writing import check_picture
 
 if TYPE_CHECKING:
-    from pathlib import Path as FilePath
-
     from matplotlib.figure import Figure
 
 SCREEN_DOTS = 72
@@ -33,8 +34,6 @@ class Picture(Sheet):
 
     def _repr_png_(self) -> bytes:
         """Return it as a notebook shows it."""
-        from io import BytesIO
-
         written = BytesIO()
         self.figure().savefig(written, format="png", dpi=SCREEN_DOTS)
         return written.getvalue()
@@ -60,10 +59,6 @@ class Picture(Sheet):
         Raises:
             InputError: Another suffix, a library that is not installed, or it cannot be written.
         """
-        from pathlib import Path as FilePath
-
-        from notchflex.results.files.writing import check_picture
-
         check_picture(str(target), "the picture")
         if FilePath(target).suffix.lower() == ".html":
             from notchflex.plotting.renderers.with_plotly import save_html

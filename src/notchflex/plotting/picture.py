@@ -7,7 +7,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from notchflex.errors import InputError
+from notchflex.plotting.batch import batch_picture
+from notchflex.plotting.beside import beside_picture
+from notchflex.plotting.fits.calibration import calibration_picture
+from notchflex.plotting.fits.comparison import comparison_picture
+from notchflex.plotting.fits.friction import friction_picture
 from notchflex.plotting.output import Picture
+from notchflex.plotting.path import path_picture, robot_picture, state_picture
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
@@ -44,13 +50,6 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 def _picture(result: Any) -> Picture:
     from notchflex.analysis import Batch
     from notchflex.comparison import Comparison
-    from notchflex.plotting.batch import batch_picture
-    from notchflex.plotting.beside import beside_picture
-    from notchflex.plotting.equilibrium import robot_picture, state_picture
-    from notchflex.plotting.fits.calibration import calibration_picture
-    from notchflex.plotting.fits.comparison import comparison_picture
-    from notchflex.plotting.fits.friction import friction_picture
-    from notchflex.plotting.path import path_picture
     from notchflex.results import Equilibrium, EquilibriumPath
     from notchflex.robot import Robot
 
@@ -61,21 +60,18 @@ def _picture(result: Any) -> Picture:
         Batch: batch_picture,
         Comparison: comparison_picture,
     }
-    for kind, describe in kinds.items():
-        if isinstance(result, kind):
-            return describe(result)
     if isinstance(result, Mapping) and all(
         isinstance(one, EquilibriumPath) for one in result.values()
     ):
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
+    if not isinstance(result, tuple(kinds)):
+        from notchflex.fit import Calibration, FrictionRig  # takes a second
 
-    # Imported late: it takes a second.
-    from notchflex.fit import Calibration, FrictionRig
-
-    if isinstance(result, Calibration):
-        return calibration_picture(result)
-    if isinstance(result, FrictionRig):
-        return friction_picture(result)
+        kinds |= {Calibration: calibration_picture}
+        kinds |= {FrictionRig: friction_picture}
+    for kind, describe in kinds.items():
+        if isinstance(result, kind):
+            return describe(result)
     raise InputError.WRONG_TYPE(
         "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, a "
         f"Comparison, a Calibration, a FrictionRig or a dict of paths; got {type(result).__name__}."

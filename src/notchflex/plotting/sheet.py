@@ -28,37 +28,35 @@ INSIDE, BESIDE, BELOW = "inside", "beside", "below"
 """Positions of the legend of a panel."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Mark:
+    """What every mark of a panel has: legend entry, group and drawing order (higher in front).
+
+    A browser shows and hides the marks of one group together.
+    """
+
+    name: str = ""
+    group: str = ""
+    layer: int = 2
+
+
 @dataclass(frozen=True)
-class Line:
+class Curve(Mark):
     """Points that are connected, marked or both, (k, 2) in the plane or (k, 3) in space.
 
-    Attributes:
-        points: Coordinates; a row of NaN is a gap. No points at all: a legend entry only.
-        colour: Colour of line and markers.
-        dash: Lengths of strokes and gaps; `SOLID`, or None for markers alone.
-        width: Line width [pt].
-        marker: One of `MARKERS`, or "".
-        size: Size of the markers [pt].
-        hollow: Whether the markers are open.
-        name: Legend entry; "" for none.
-        group: Marks of one group are shown and hidden together in a browser.
-        layer: Drawing order; higher is in front.
-        hover: Whether a browser shows the numbers under the pointer.
-        error: Half heights of error bars, (k,), NaN for none; None without error bars.
+    A row of NaN is a gap; without points it is a legend entry only. Without `dash` it has markers
+    alone; with `hover` a browser shows the numbers under the pointer.
     """
 
     points: Any
     colour: Colour
     dash: tuple[float, ...] | None = SOLID
-    width: float = 1.4
-    marker: str = ""
-    size: float = 3.0
+    width: float = 1.4  # pt
+    marker: str = ""  # one of `MARKERS`
+    size: float = 3.0  # of the markers [pt]
     hollow: bool = False
-    name: str = ""
-    group: str = ""
-    layer: int = 2
     hover: bool = False
-    error: Any = None
+    error: Any = None  # half heights of error bars, (k,), NaN for none
 
     @property
     def rows(self) -> Points:
@@ -67,14 +65,14 @@ class Line:
         return points if points.size else np.zeros((0, 2))
 
 
-def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Line:
-    """Return round markers without a line; `options` are those of `Line`."""
+def dots(points: Any, colour: Colour, size: float = 3.0, **options: Any) -> Curve:
+    """Return round markers without a line; `options` are those of `Curve`."""
     look: dict[str, Any] = {"dash": None, "marker": "o", "size": size}
-    return Line(points, colour, **(look | options))
+    return Curve(points, colour, **(look | options))
 
 
 @dataclass(frozen=True)
-class Area:
+class Area(Mark):
     """Filled polygons in the plane, each (k, 2); none for a legend entry only."""
 
     polygons: Sequence[Points]
@@ -82,53 +80,39 @@ class Area:
     edge: Colour
     opacity: float = 0.85
     width: float = 0.8
-    name: str = ""
-    group: str = ""
-    layer: int = 2
 
 
 @dataclass(frozen=True)
-class Faces:
+class Faces(Mark):
     """Quadrilaterals in space, (m, 4, 3), with a colour each; `colour` is that of the legend."""
 
     corners: Points
     colours: Sequence[Colour]
     colour: Colour
-    name: str = ""
-    group: str = ""
-    layer: int = 0
+    layer: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
-class Arrow:
-    """An arrow in the plane or in space; in the plane `bend` makes it an arc (1: a half circle)."""
+class Arrow(Mark):
+    """An arrow in the plane or in space; in the plane `bend` makes it an arc (1: a half circle).
+
+    The axes include `reach`, (k, 2), in place of its ends.
+    """
 
     start: Points
     end: Points
     colour: Colour
     bend: float = 0.0
     width: float = 1.4
-    name: str = ""
-    group: str = ""
-    layer: int = 9
     reach: Points | None = None
-    """Points that the axes must include, (k, 2); the ends of the arrow if None."""
+    layer: int = field(default=9, kw_only=True)
 
 
 @dataclass(frozen=True)
-class Span:
-    """A line or band across the whole panel, at one value or between two values of an axis.
+class Span(Mark):
+    """A line across the whole panel at one value of an axis (`low` == `high`), or a band.
 
-    Attributes:
-        axis: "x" for a vertical line or band, "y" for a horizontal one.
-        low: Where it begins.
-        high: Where it ends; a line if equal to `low`.
-        colour: Colour of the line or the band.
-        dash: Of a line, as in `Line`.
-        width: Of a line [pt].
-        opacity: Of a band.
-        name: Legend entry; "" for none.
-        group: As in `Line`; the name if "".
+    `axis` is "x" for a vertical one, "y" for a horizontal one. Its group is its name if "".
     """
 
     axis: str
@@ -138,35 +122,30 @@ class Span:
     dash: tuple[float, ...] = SOLID
     width: float = 0.8
     opacity: float = 1.0
-    name: str = ""
-    group: str = ""
-    layer: int = 0
+    layer: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
-class Bars:
+class Bars(Mark):
     """Horizontal bars from top to bottom, with their values."""
 
     values: Sequence[float]
     names: Sequence[str]
     colours: Sequence[Colour]
-    layer: int = 0
+    layer: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
-class Correlations:
-    """A coloured matrix of correlations, each with its value.
+class Correlations(Mark):
+    """A coloured matrix of correlations, (n, n), each with its value; NaN where there is none.
 
-    Attributes:
-        values: From -1 to 1, (n, n); NaN where there is none.
-        names: Names of the n variables, which a browser shows under the pointer.
-        rows: Labels of the rows; the columns are numbered from 1.
+    A browser shows the `names` under the pointer. `rows` are labels; columns are numbered from 1.
     """
 
     values: Points
     names: Sequence[str]
     rows: Sequence[str]
-    layer: int = 0
+    layer: int = field(default=0, kw_only=True)
 
     @property
     def texts(self) -> list[list[str]]:
@@ -181,51 +160,32 @@ class Correlations:
 
 
 @dataclass(frozen=True)
-class Note:
+class Note(Mark):
     """A sentence in the centre of an empty panel, or in its upper left corner."""
 
     text: str
     colour: Colour = "black"
     corner: bool = False
-    layer: int = 0
-
-
-Mark = Line | Area | Faces | Arrow | Span | Bars | Correlations | Note
+    layer: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Axes in the plane or in space and the marks in them.
-
-    Attributes:
-        items: The marks.
-        x_label: Label of the axis, with its unit.
-        y_label: The same for y.
-        z_label: The same for z; "" in the plane.
-        title: Title, left-aligned.
-        legend: `INSIDE`, `BESIDE`, `BELOW`, or "" for none.
-        equal: Whether both axes have the same scale.
-        scale: Panels with the same name show the same part of the plane.
-        x_range: Limits; None is chosen to fit the marks, also for one end.
-        y_range: The same for y.
-        whole: Axes with integers only: "", "x", "y" or "xy".
-        shared: Axes with the same limits in all panels that share them, as `whole`.
-        most_x: Maximum number of ticks on the x axis; None for no limit.
-    """
+    """Axes in the plane or in space, with units in their labels, and the marks in them."""
 
     items: Sequence[Mark]
     x_label: str
     y_label: str
-    z_label: str = ""
+    z_label: str = ""  # "" in the plane
     title: str = ""
-    legend: str = ""
-    equal: bool = False
-    scale: str = ""
-    x_range: tuple[float | None, float | None] | None = None
+    legend: str = ""  # `INSIDE`, `BESIDE`, `BELOW`, or "" for none
+    equal: bool = False  # both axes have the same scale
+    scale: str = ""  # panels with the same name show the same part of the plane
+    x_range: tuple[float | None, float | None] | None = None  # None fits the marks
     y_range: tuple[float | None, float | None] | None = None
-    whole: str = ""
-    shared: str = ""
-    most_x: int | None = None
+    whole: str = ""  # axes with integers only, as "xy"
+    shared: str = ""  # axes with the same limits in all panels that share them, as "xy"
+    most_x: int | None = None  # maximum number of ticks on the x axis
 
     @property
     def in_space(self) -> bool:
@@ -257,21 +217,13 @@ def stack(panels: Iterable[Panel], column: int = 0, height: int = 1) -> list[Cel
 
 @dataclass(frozen=True)
 class Sheet:
-    """Panels on a grid, with a heading.
-
-    Attributes:
-        title: The heading.
-        width: Width on paper [in].
-        height: Height on paper [in].
-        cells: The panels.
-        legend: Entries of a common legend below the panels.
-    """
+    """Panels on a grid under a heading, of a size on paper [in], with a common legend below."""
 
     title: str
     width: float
     height: float
     cells: Sequence[Cell]
-    legend: Sequence[Line | Area] = field(default_factory=tuple[Line, ...])
+    legend: Sequence[Curve | Area] = ()
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -67,12 +67,7 @@ def new_figure(width: float, height: float, title: str = "") -> Figure:
 
 
 def rgb(colour: Any) -> tuple[float, float, float]:
-    """Return red, green and blue of a colour, each from 0 to 1.
-
-    Example:
-        >>> rgb("#ff0000")
-        (1.0, 0.0, 0.0)
-    """
+    """Return red, green and blue of a colour, each from 0 to 1."""
     return to_rgb(colour)
 
 
@@ -100,16 +95,8 @@ def save(figure: Figure, target: str | FilePath) -> None:
     check_picture(str(target), "the picture", kinds=PAPER)
     suffix = FilePath(target).suffix.lower()
     # Without dates the same picture is the same file, byte for byte.
-    metadata: dict[str, None] = {
-        ".svg": {"Date": None},
-        ".pdf": {"CreationDate": None},
-        ".png": {},
-    }[suffix]
+    dates = {".svg": "Date", ".pdf": "CreationDate"}
+    options: dict[str, Any] = {"format": suffix[1:], "dpi": DOTS_PER_INCH, "bbox_inches": None}
+    options["metadata"] = {dates[suffix]: None} if suffix in dates else {}
     with house_style(), replacing(target) as temporary:
-        figure.savefig(
-            temporary,
-            format=suffix[1:],
-            dpi=DOTS_PER_INCH,
-            metadata=metadata,
-            bbox_inches=None,
-        )
+        figure.savefig(temporary, **options)

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.branches import abscissa, steps_by_branch
-from notchflex.plotting.curves import LINE, NEUTRAL, branch_lines
-from notchflex.plotting.sheet import BESIDE, Colour, Line, Mark, Panel
+from notchflex.plotting.curves import LINE, NEUTRAL, abscissa, branch_lines, steps_by_branch
+from notchflex.plotting.sheet import BESIDE, Colour, Curve, Mark, Panel
 from notchflex.plotting.style import sequence_colours
-from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.results.quantities.spans import spans_of
+from notchflex.results.quantities.registry import QUANTITIES, spans_of
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
@@ -33,12 +31,12 @@ def pulled_tendons(path: EquilibriumPath) -> list[int]:
     return [int(i) for i in np.flatnonzero(tension.max(axis=0) > SLACK)]
 
 
-def span_line(path: EquilibriumPath, step: int, tendon: int, colour: Colour, **look: Any) -> Line:
+def span_line(path: EquilibriumPath, step: int, tendon: int, colour: Colour, **look: Any) -> Curve:
     """Return the tension of a tendon (from 0) from span to span at one step."""
     tension = path.span_tension[step, tendon, : spans_of(path, tendon)]
     points = np.stack([np.arange(len(tension)), tension], axis=1)
     usual: dict[str, Any] = {"marker": "o", "size": 1.8, "hover": True}
-    return Line(points, colour, **(usual | look))
+    return Curve(points, colour, **(usual | look))
 
 
 def profile_panel(path: EquilibriumPath, tendon: int) -> Panel:
@@ -55,7 +53,7 @@ def profile_panel(path: EquilibriumPath, tendon: int) -> Panel:
                   dash=LINE[way], width=1.1, group=way)
         for way, steps in ways.items() for step in steps
     ]  # fmt: skip
-    items += [Line([], NEUTRAL, LINE[way], name=way, group=way) for way in ways]
+    items += [Curve([], NEUTRAL, LINE[way], name=way, group=way) for way in ways]
     which = f" {tendon + 1}" if path.tension.shape[1] > 1 else ""
     return Panel(
         items,
@@ -115,15 +113,12 @@ def reverses_step_by_step(path: EquilibriumPath) -> bool:
     if not tendons or not (bound[:, tendons] > 0.0).any():
         return False
     counts = reversed_contacts(path)
-    partial = [
-        {
-            round(float(one), 6)
-            for one in counts[:, tendon]
-            if 0.0 < one < spans_of(path, tendon) - 1
-        }
-        for tendon in tendons
-    ]
-    return max(map(len, partial)) >= _FEWEST
+    for tendon in tendons:
+        count = counts[:, tendon]
+        partial = count[(count > 0.0) & (count < spans_of(path, tendon) - 1)]
+        if len(np.unique(partial.round(6))) >= _FEWEST:
+            return True
+    return False
 
 
 def _spread(path: EquilibriumPath, steps: list[int], tendon: int) -> list[int]:

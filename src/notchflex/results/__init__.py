@@ -14,13 +14,11 @@ if TYPE_CHECKING:
     from notchflex.results.files.table import read_table
     from notchflex.results.path import EquilibriumPath
     from notchflex.results.quantities.registry import QUANTITIES
-    from notchflex.results.recorded import BEFORE, TOLD, Recorded
+    from notchflex.results.recorded import Recorded
     from notchflex.results.state import SavedState, State
 
 __all__ = [
-    "BEFORE",
     "QUANTITIES",
-    "TOLD",
     "Equilibrium",
     "EquilibriumPath",
     "Quantity",
@@ -35,7 +33,7 @@ __all__ = [
 _HOME = {
     "Equilibrium": "equilibrium",
     "EquilibriumPath": "path",
-    **dict.fromkeys(("BEFORE", "TOLD", "Recorded"), "recorded"),
+    "Recorded": "recorded",
     **dict.fromkeys(("SavedState", "State"), "state"),
     **dict.fromkeys(("read_path", "save_path"), "files.io"),
     "read_table": "files.table",

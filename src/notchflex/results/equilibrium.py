@@ -90,8 +90,8 @@ class Equilibrium(EquilibriumQuantities, Displayed):
 
         Example:
             >>> from notchflex import Load, load_robot, solve
-            >>> found = solve(load_robot("pacheco2021-a"), Load(tension=1.0)).to_dict()
-            >>> found["load"], round(found["total_angle_deg"], 1)
+            >>> step = solve(load_robot("pacheco2021-a"), Load(tension=1.0)).to_dict()
+            >>> step["load"], round(step["total_angle_deg"], 1)
             ({'tension_N': [1.0], 'stroke_mm': [None]}, 51.5)
         """
         from notchflex.results.files.json import step_document
@@ -134,6 +134,3 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         from notchflex.results.summary import equilibrium_summary
 
         return equilibrium_summary(self)
-
-
-__all__ = ["ConvergenceError", "Equilibrium"]

@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._jax import constant
-from notchflex._quantity import Quantity
 from notchflex._summary import Displayed, Summary
 from notchflex.errors import ConvergenceError, Failure, InputError
 from notchflex.loads import LoadPath
@@ -20,7 +19,7 @@ from notchflex.loads.command import Command, make_commands
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.motion import rotation_about
 from notchflex.results.equilibrium import Equilibrium
-from notchflex.results.quantities.front import friction_front
+from notchflex.results.quantities.path_formulas import friction_front
 from notchflex.results.quantities.properties import QUANTITIES, PathQuantities
 from notchflex.results.reason import why_not
 from notchflex.results.recorded import Recorded
@@ -91,18 +90,16 @@ class EquilibriumPath(PathQuantities, Displayed):
         """
         kept = self._kept
         if name not in kept:
-            own = QUANTITIES.get(name)
-            if own is None:
+            if name not in QUANTITIES:
                 known = ", ".join(QUANTITIES)
                 raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r}; there are {known}")
-            computed = own.source in ("path", "derived")
-            kept[name] = own.formula(self) if computed else self._in_world(own)
+            quantity = QUANTITIES[name]
+            if quantity.source in ("path", "derived"):
+                kept[name] = quantity.formula(self)
+            else:  # vectors and rotations of the solver are in the frame of the base
+                turn, values = self.base_to_world, self.solver_quantity(name)
+                kept[name] = values if turn is None else quantity.turned(values, turn)
         return kept[name]
-
-    def _in_world(self, quantity: Quantity) -> np.ndarray:
-        """Vectors and rotations of the solver are in the frame of the base."""
-        turn, values = self.base_to_world, self.solver_quantity(quantity.name)
-        return values if turn is None else quantity.turned(values, turn)
 
     def solver_quantity(self, name: str) -> np.ndarray:
         """Return what the solver reports of every step, by its name.
@@ -253,6 +250,3 @@ class EquilibriumPath(PathQuantities, Displayed):
             failure, text = self.failures[step]
             raise ConvergenceError(f"step {step + 1} of {len(self)}: {text}", failure)
         return self
-
-
-__all__ = ["EquilibriumPath"]

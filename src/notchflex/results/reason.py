@@ -88,6 +88,3 @@ def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray,
     least = 1e-3 * float(chain.closing_force)
     first, second = np.diff(tensions, axis=0)
     return np.flatnonzero(asked & (second > np.maximum(_GROWS * first, least)))
-
-
-__all__ = ["why_not"]

@@ -1,4 +1,4 @@
-"""A run as it was written down: its numbers are told again, and nothing is solved."""
+"""A run read back from a file: its numbers are reported again, and nothing is solved."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from notchflex.loads.command import Command
 from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.quantities import STATE, Shape
 
-TOLD = (*Shape._fields, *STATE)
-"""Everything that a run tells of each state, by name."""
+REPORTED = (*Shape._fields, *STATE)
+"""Everything that a run reports of each state, by name."""
 
 BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
-"""What is asked of the state before the first one: work is summed up from there."""
+"""What is needed of the state before the first one: work is integrated from there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Recorded:
 
     Attributes:
         solved: The last solved state at each load.
-        told: What is reported of each state, by the names of `TOLD`.
+        reported: What is reported of each state, by the names of `REPORTED`.
         first: What is reported of the state before the first load, by the names of `BEFORE`.
         held: Smallest eigenvalue of every stiffness, and the sign of its determinant.
         residual: Largest scaled imbalance of the last attempt.
@@ -36,7 +36,7 @@ class Recorded:
     """
 
     solved: SolverState
-    told: Mapping[str, np.ndarray]
+    reported: Mapping[str, np.ndarray]
     first: Mapping[str, np.ndarray]
     held: tuple[np.ndarray, np.ndarray]
     residual: Float[np.ndarray, " s"]
@@ -46,11 +46,11 @@ class Recorded:
     reached: Float[np.ndarray, " s"]
 
     def quantity(self, name: str) -> np.ndarray:
-        """What is reported of each state, by its name in the registry."""
-        return self.told[name]
+        """Return a quantity of each state by its name in the registry."""
+        return self.reported[name]
 
     def before(self, name: str) -> np.ndarray:
-        """A quantity of the state before the first load, by its name in `BEFORE`."""
+        """Return a quantity of the state before the first load, by its name in `BEFORE`."""
         return self.first[name]
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
@@ -60,8 +60,5 @@ class Recorded:
 
     def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:
         """Whether each state is stable."""
-        del commands
-        return (self.held[0] > 0.0) & (self.held[1] > 0.0)
-
-
-__all__ = ["BEFORE", "TOLD", "Recorded"]
+        eigenvalue, sign = self.stability(commands)
+        return (eigenvalue > 0.0) & (sign > 0.0)

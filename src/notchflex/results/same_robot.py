@@ -36,20 +36,20 @@ def differences(robot: Robot, other: Robot) -> list[str]:
         pair = first.get(name), second.get(name)
         if pair[0] != pair[1]:
             changes.setdefault(_general(name), {}).setdefault(pair, []).append(name)
-    found: list[str] = []
+    changed: list[str] = []
     for general, pairs in changes.items():
         for (mine, its), names in pairs.items():
             everywhere = len(names) == sum(_general(one) == general for one in first)
             shown = [general] if everywhere else names
-            found += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
-    return found
+            changed += [f"{name} = {_text(mine)} instead of {_text(its)}" for name in shown]
+    return changed
 
 
 def mismatch(robot: Robot, other: Robot) -> str:
     """Describe in a few words how a robot differs from another one; "" where it does not."""
-    found = differences(robot, other)
-    more = len(found) - _MOST
-    return ", ".join(found[:_MOST]) + (f" and {more} more" if more > 0 else "")
+    changed = differences(robot, other)
+    more = len(changed) - _MOST
+    return ", ".join(changed[:_MOST]) + (f" and {more} more" if more > 0 else "")
 
 
 def _values(robot: Robot) -> dict[str, Any]:

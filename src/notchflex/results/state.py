@@ -103,7 +103,7 @@ class State(Displayed):
             The state.
 
         Raises:
-            InputError: The file is missing, is no state or is damaged.
+            InputError: The file is missing, is not a state or is damaged.
         """
         if not str(path).strip():
             raise InputError.MISSING_VALUE(
@@ -120,7 +120,7 @@ class State(Displayed):
             ) from None
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise InputError.FILE_FORMAT(
-                f"{path} is no notchflex state; give a file written by --save-state"
+                f"{path} is not a notchflex state; give a file written by --save-state"
             )
         robot, arrays = content.get("robot"), content.get("arrays")
         if not isinstance(robot, str) or not isinstance(arrays, dict):
@@ -172,9 +172,9 @@ class SavedState:
             try:
                 array = np.asarray(numbers, float)
             except (TypeError, ValueError, OverflowError):
-                raise _damaged(self.source, f"{name} is no table of numbers") from None
+                raise _damaged(self.source, f"{name} is not a table of numbers") from None
             if not np.isfinite(array).all():
-                raise _damaged(self.source, f"{name} holds what is no finite number")
+                raise _damaged(self.source, f"{name} holds what is not a finite number")
             read[name] = array
         wanted, _ = tree_util.tree_flatten_with_path(at_rest(chain))
         for name in (leaf_name(key) for key, _ in wanted):
@@ -249,7 +249,7 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solver
                 "continue from a state of the same robot"
             )
         fitting.append(array)
-    found: SolverState = tree_util.tree_unflatten(structure, fitting)
-    if found.applied is not None and frame is not None:
-        found = found._replace(applied=in_frame(found.applied, frame))
-    return found
+    solved: SolverState = tree_util.tree_unflatten(structure, fitting)
+    if solved.applied is not None and frame is not None:
+        solved = solved._replace(applied=in_frame(solved.applied, frame))
+    return solved

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from notchflex.mechanics.chain import unchecked_dimensions
 
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
@@ -16,66 +17,51 @@ MOMENT_ERROR = 0.01
 
 
 def path_warnings(path: EquilibriumPath) -> list[str]:
-    """Return one sentence for each thing about a path that asks for care.
+    """Return one sentence for each reason to doubt a path.
 
     Args:
         path: Solved path.
 
     Returns:
-        Sentences on strains beyond what the material is allowed or its law is known for, and on
-        unstable equilibria, and on strain modes that do not serve; none if there is nothing to
-        say.
+        Sentences on dimensions outside the range that was checked, on strains beyond what the
+        material is allowed or its law is known for, on unstable equilibria, and on too few strain
+        modes; none if there is nothing to warn of.
     """
-    return [
-        *_allowed_strain(path),
-        *_plastic_strain(path),
-        *_unstable(path),
-        *_coarse(path),
-    ]
+    outside = unchecked_dimensions(path.robot)
+    return [*outside, *_strains(path), *_unstable(path), *_coarse(path)]
 
 
-def _allowed_strain(path: EquilibriumPath) -> Iterator[str]:
-    allowed = path.robot.material.allowed_strain
-    if allowed is None:
-        return
-    yield from _first_beyond(
-        path,
-        path.peak_strain,
-        allowed,
-        f"the peak strain passes the allowed strain of {100 * allowed:.3g} %",
-        "the notch may be damaged there",
-    )
-
-
-def _plastic_strain(path: EquilibriumPath) -> Iterator[str]:
-    limit = getattr(path.robot.material, "plastic_strain", None)
-    if limit is None:
-        return
-    # The law is fitted in the outer strain of eq. 16, so that is what tells its branch.
-    yield from _first_beyond(
-        path,
-        path.outer_strain,
-        limit,
-        f"the outer strain passes {100 * limit:.3g} %, where the plastic branch begins",
-        "that branch is a guess, and a real notch would stay bent",
-    )
-
-
-def _first_beyond(
-    path: EquilibriumPath, strain: NDArray[np.float64], limit: float, what: str, so: str
-) -> Iterator[str]:
-    size = np.where(np.asarray(path.converged)[:, None], np.abs(strain), -np.inf)
-    beyond = size > limit
-    if not beyond.any():
-        return
-    notches = np.flatnonzero(beyond.any(axis=0))
-    step = int(np.flatnonzero(beyond.any(axis=1))[0])
-    where = ", ".join(str(notch + 1) for notch in notches)
-    plural = "es" if len(notches) > 1 else ""
-    yield (
-        f"{what} in notch{plural} {where}, first at step {step + 1} ({_load(path, step)}), "
-        f"at most {100 * size.max():.3g} %: {so}."
-    )
+def _strains(path: EquilibriumPath) -> Iterator[str]:
+    material = path.robot.material
+    # The law is fitted in the outer strain of eq. 16, which therefore selects its branch.
+    for strain, limit, what, so in (
+        (
+            "peak strain",
+            material.allowed_strain,
+            "the allowed strain of {:.3g} %",
+            "the notch may be damaged there",
+        ),
+        (
+            "outer strain",
+            getattr(material, "plastic_strain", None),
+            "{:.3g} %, where the plastic branch begins,",
+            "that branch is a guess, and a real notch would stay bent",
+        ),
+    ):
+        if limit is None:
+            continue
+        values = getattr(path, strain.replace(" ", "_"))
+        size = np.where(np.asarray(path.converged)[:, None], np.abs(values), -np.inf)
+        beyond = size > limit
+        if not beyond.any():
+            continue
+        notches = [str(notch + 1) for notch in np.flatnonzero(beyond.any(axis=0))]
+        step = int(np.flatnonzero(beyond.any(axis=1))[0])
+        yield (
+            f"the {strain} passes {what.format(100 * limit)} in notch"
+            f"{'es' if len(notches) > 1 else ''} {', '.join(notches)}, first at step {step + 1} "
+            f"({_load(path, step)}), at most {100 * size.max():.3g} %: {so}."
+        )
 
 
 def _unstable(path: EquilibriumPath) -> Iterator[str]:

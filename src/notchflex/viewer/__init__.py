@@ -4,40 +4,25 @@
 extra; `Viewer` needs them.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from notchflex.viewer.server.address import HOST, PORT, check_host, check_installed, exposed
+from notchflex.viewer.server import HOST, PORT, check_host, check_installed, exposed
 
 if TYPE_CHECKING:
     from notchflex.viewer.controls import Controls
     from notchflex.viewer.session import Session
-    from notchflex.viewer.target_queue import TargetQueue
+    from notchflex.viewer.tasks import TargetQueue
     from notchflex.viewer.viewer import Viewer
 
-__all__ = [
-    "HOST",
-    "PORT",
-    "Controls",
-    "Session",
-    "TargetQueue",
-    "Viewer",
-    "check_host",
-    "check_installed",
-    "exposed",
-]
+__all__ = ["HOST", "PORT", "Controls", "Session", "TargetQueue", "Viewer"]
+__all__ += ["check_host", "check_installed", "exposed"]
 
-_HOME = {
-    "Controls": "controls",
-    "Session": "session",
-    "Viewer": "viewer",
-    "TargetQueue": "target_queue",
-}
+_MODULES = {"TargetQueue": "tasks"}
 
 
 def __getattr__(name: str) -> Any:
     """Import a name on first use: the command line only needs the checks."""
-    if name not in _HOME:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_MODULES.get(name, name.lower())}"), name)

@@ -1,17 +1,20 @@
-"""The settings of the page: tendons by tension or stroke, a force and a weight at the tip."""
+"""The settings of the page, and the ranges of its sliders.
+
+Tendons go by tension or stroke, with a force and a weight at the tip. The ranges are enough to bend
+a robot well, in round numbers.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
+from notchflex.analysis import solve
 from notchflex.loads import Load
 from notchflex.robot import Robot
-
-T = TypeVar("T")
 
 TENSION, STROKE = "tension", "stroke"
 
@@ -26,14 +29,10 @@ POINTING: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True)
 class Controls:
-    """Loads of a robot of t tendons.
+    """Loads of a robot.
 
-    Args:
-        by: `TENSION` or `STROKE` for every tendon.
-        value: Its tension [N] or stroke [mm].
-        tip_force: Force at the tip in the world [N].
-        tip_mass: Mass that hangs at the tip [g].
-        pointing: Direction of the tube, a key of `POINTING`.
+    Every tendon has a tension [N] or a stroke [mm] as `value`, by `TENSION` or `STROKE`. The force
+    at the tip is in the world [N], the mass hangs there [g]; `pointing` is a key of `POINTING`.
 
     Example:
         >>> Controls(("tension",), (2.0,)).load()
@@ -65,9 +64,9 @@ class Controls:
 
     def with_tendon(self, tendon: int, by: str, value: float) -> Controls:
         """Return the same with another tension or stroke of one tendon (from 0)."""
-        return replace(
-            self, by=_put(self.by, tendon, by), value=_put(self.value, tendon, float(value))
-        )
+        kinds, values = list(self.by), list(self.value)
+        kinds[tendon], values[tendon] = by, float(value)
+        return replace(self, by=tuple(kinds), value=tuple(values))
 
     def command(self, number: int) -> str:
         """Return `TENSION` or `STROKE` of one of the `numbers`; "" if it is not of a tendon."""
@@ -89,5 +88,104 @@ class Controls:
         return (self.by, self.pointing) == (other.by, other.pointing)
 
 
-def _put(values: tuple[T, ...], index: int, value: T) -> tuple[T, ...]:
-    return (*values[:index], value, *values[index + 1 :])
+# Tensions are doubled from 1/64 N until the robot is well bent; a slider has half as much more.
+FIRST, MOST = 2.0**-6, 2.0**12
+WELL_BENT = math.radians(60.0)
+ROOM = 1.5
+# A lateral force bends a robot as much as a larger tension, because of its longer lever.
+FORCE_PART = 0.05
+GRAVITY = 9.81e-3  # N/g
+STRIDES = 60
+"""Steps from one end of a slider to the other."""
+STRETCH = 10.0
+"""Largest factor by which the end of a slider can be changed."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Ends of the sliders of a robot; forces have both directions."""
+
+    tension: tuple[float, ...]  # of each tendon [N]
+    stroke: tuple[float, ...]  # of each tendon [mm]
+    force: float  # at the tip [N]
+    mass: float  # at the tip [g]
+
+    def ends(self, number: int, by: str) -> tuple[float, float]:
+        """Return the ends of the slider of one of the `Controls.numbers`, of a tendon `by`."""
+        count = len(self.tension)
+        if number < count:
+            most = (self.tension if by == TENSION else self.stroke)[number]
+            # While one tendon is pulled, another one is released.
+            return (-most if by == STROKE and count > 1 else 0.0), most
+        return (0.0, self.mass) if number == count + 3 else (-self.force, self.force)
+
+    def stride(self, by: Sequence[str]) -> np.ndarray:
+        """Return the largest step of each number of `Controls`; `by` is that of every tendon."""
+        ends = [self.ends(tendon, one)[1] for tendon, one in enumerate(by)]
+        return np.array([*ends, *[2.0 * self.force] * 3, self.mass]) / STRIDES
+
+    def stretched(self, tendon: int, by: str, end: float) -> Reach:
+        """Return the same with another end of the slider of a tendon (from 0)."""
+        ends = list(self.tension if by == TENSION else self.stroke)
+        ends[tendon] = end
+        return replace(self, **{by: tuple(ends)})
+
+
+def reach_of(robot: Robot) -> Reach:
+    """Return the ranges of the sliders of a robot, found by pulling each of its tendons."""
+    ends = [_pulled(robot, tendon) for tendon in range(robot.number_of_tendons)]
+    tension, stroke = zip(*ends, strict=True)
+    force = round_up(FORCE_PART * max(tension))
+    return Reach(tension, stroke, force, round_up(force / GRAVITY))
+
+
+def round_up(value: float) -> float:
+    """Return the next number above that is 1, 1.5, 2, 3, 4, 5, 6 or 8 times a power of ten.
+
+    Example:
+        >>> [round_up(value) for value in (0.031, 2.0, 9.0)]
+        [0.04, 2.0, 10.0]
+    """
+    power = 10.0 ** math.floor(math.log10(value))
+    factors = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+    factor = next(one for one in factors if one * power >= value * (1.0 - 1e-9))
+    return float(f"{factor * power:.12g}")
+
+
+def round_down(value: float) -> float:
+    """Return the largest number of three digits that is not above.
+
+    Example:
+        >>> [round_down(value) for value in (3.7482, 0.0129, 15.0)]
+        [3.74, 0.0129, 15.0]
+    """
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{math.floor(value / unit * (1.0 + 1e-9)) * unit:.12g}")
+
+
+def _pulled(robot: Robot, tendon: int) -> tuple[float, float]:
+    """Return tension and stroke at the ends of the sliders of a tendon, for the same bend."""
+    tension, drawn = FIRST, 0.0
+    while tension <= MOST:
+        solved = _stroke(robot, tendon, tension)
+        if solved is None:
+            tension *= 0.5 if drawn > 0.0 else 1.0
+            break
+        drawn, bent = solved
+        if bent:
+            break
+        tension *= 2.0
+    end = round_up(ROOM * min(tension, MOST))
+    last, _ = _stroke(robot, tendon, end) or (0.0, False)
+    return end, round_down(last) if last > drawn else round_up(max(drawn, 1e-3))
+
+
+def _stroke(robot: Robot, tendon: int, tension: float) -> tuple[float, bool] | None:
+    """Return the stroke at a tension and whether the robot is well bent; None if not solved."""
+    state = solve(robot, Load(tension=[None] * tendon + [tension]))
+    if not state.converged:
+        return None
+    # With all its notches closed, a robot hardly bends further.
+    can_close = np.isfinite(state.gap)
+    closed = bool(can_close.any() and state.closed[can_close].all())
+    return float(state.stroke[tendon]), closed or np.abs(state.notch_angle).sum() >= WELL_BENT

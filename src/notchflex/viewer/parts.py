@@ -12,14 +12,7 @@ SECTIONS: dict[str, type] = {"friction": Friction, "material": Material}
 
 
 class PartNumber(NamedTuple):
-    """A number of a part.
-
-    Attributes:
-        key: Its key in the robot file, such as `coefficient`.
-        value: Its value.
-        unit: Its unit; "" if dimensionless.
-        text: Its description.
-    """
+    """A number of a part: key in the robot file, value, unit ("" for none), description."""
 
     key: str
     value: float
@@ -33,16 +26,10 @@ def kinds(section: str) -> list[str]:
 
 
 def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = None) -> Robot:
-    """Return a robot with another kind of friction or material.
+    """Return a robot with another kind of `friction` or `material`.
 
-    Values that both kinds have are kept. Others come from the original robot if it is of this
-    kind, else from the first ready robot of this kind.
-
-    Args:
-        robot: The robot.
-        section: `friction` or `material`.
-        kind: The kind.
-        original: The robot as its file describes it.
+    Values that both kinds have are kept. Others come from the original robot, as its file describes
+    it, if it is of this kind, else from the first ready robot of this kind.
 
     Raises:
         InputError: The kind is unknown, or no robot has values for it.
@@ -54,11 +41,11 @@ def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = No
     except InputError:
         if kind not in kinds(section):
             raise
-    own = to_table(robot)[section]
+    present = to_table(robot)[section]
     for ready in list_robots():
         table = to_table(load_robot(ready))[section]
         if table["kind"] == kind:
-            keys = {key: own.get(key, value) for key, value in table.items() if key != "kind"}
+            keys = {key: present.get(key, value) for key, value in table.items() if key != "kind"}
             values = {f"{section}.{key}": value for key, value in keys.items()}
             return robot.with_values({f"{section}.kind": kind, **values})
     raise InputError.UNKNOWN_NAME(
@@ -67,11 +54,7 @@ def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = No
 
 
 def numbers(robot: Robot, section: str) -> Iterator[PartNumber]:
-    """Return the numbers of a part.
-
-    Args:
-        robot: The robot.
-        section: `friction` or `material`.
+    """Yield the numbers of the `friction` or the `material` of a robot.
 
     Example:
         >>> [one.key for one in numbers(load_robot("pacheco2021-a"), "friction")]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,19 +15,12 @@ from notchflex.viewer.controls import STROKE, TENSION, Controls
 
 @dataclass
 class History:
-    """Solved steps in order; each is one entry of every list.
-
-    Attributes:
-        controls: The settings.
-        tension: Tension of every tendon at the base [N], (t,).
-        stroke: Stroke of every tendon at the base [mm], (t,).
-        total_angle: Bending angle of the whole robot [rad].
-    """
+    """Solved steps in order; each is one entry of every list."""
 
     controls: list[Controls] = field(default_factory=list[Controls])
-    tension: list[np.ndarray] = field(default_factory=list[np.ndarray])
-    stroke: list[np.ndarray] = field(default_factory=list[np.ndarray])
-    total_angle: list[float] = field(default_factory=list[float])
+    tension: list[np.ndarray] = field(default_factory=list[np.ndarray])  # of every tendon [N]
+    stroke: list[np.ndarray] = field(default_factory=list[np.ndarray])  # of every tendon [mm]
+    total_angle: list[float] = field(default_factory=list[float])  # [rad]
 
     def __len__(self) -> int:
         """Number of steps."""
@@ -45,30 +37,15 @@ class History:
         """Return tension [N] or stroke [mm] of a tendon (from 0) and total angle [rad], (S, 2)."""
         steps = self.tension if by == TENSION else self.stroke
         pairs = zip(steps, self.total_angle, strict=True)
-        found = [(values[tendon], angle) for values, angle in pairs if tendon < len(values)]
-        return np.array(found, float).reshape(-1, 2)
-
-
-class Outcome(NamedTuple):
-    """Result of one setting.
-
-    Attributes:
-        state: The current state of the robot.
-        reason: Why the setting was not reached, and the state is unchanged; "" if reached.
-    """
-
-    state: Equilibrium
-    reason: str
+        rows = [(values[tendon], angle) for values, angle in pairs if tendon < len(values)]
+        return np.array(rows, float).reshape(-1, 2)
 
 
 class Session:
-    """A robot with history: every setting is reached from the one before.
+    """A robot with history, pointing in a direction of `POINTING`.
 
-    A setting that does not converge changes neither the state nor the history.
-
-    Args:
-        robot: The robot.
-        pointing: Direction of the tube, a key of `POINTING`.
+    Every setting is reached from the one before. One that does not converge changes neither the
+    state nor the history; `go` and `change` return why, and "" if it was reached.
 
     Example:
         >>> from notchflex import load_robot
@@ -76,8 +53,8 @@ class Session:
         >>> rest = session.controls
         >>> angle = []
         >>> for tension in (0.5, 1.0, 0.5):
-        ...     step = session.go(rest.with_tendon(0, "tension", tension))
-        ...     angle.append(float(step.state.total_angle))
+        ...     assert not session.go(rest.with_tendon(0, "tension", tension))
+        ...     angle.append(float(session.state.total_angle))
         >>> angle[2] > angle[0]  # hysteresis
         True
     """
@@ -89,7 +66,7 @@ class Session:
         self._compiled: set[tuple[object, ...]] = set()
         self.reset()
 
-    def reset(self) -> Outcome:
+    def reset(self) -> None:
         """Return to the robot at rest and clear all history."""
         self.before: History | None = None  # the loop before the robot was last changed
         self.controls = Controls.at_rest(self.robot, self.pointing)
@@ -97,7 +74,6 @@ class Session:
         self.history = History()
         self.history.add(self.controls, self.state)
         self._compiled.add(self._form(self.controls))
-        return Outcome(self.state, "")
 
     @property
     def state(self) -> Equilibrium:
@@ -106,23 +82,19 @@ class Session:
 
     def where(self, tendon: int, by: str) -> float:
         """Return the current tension [N] or stroke [mm] of a tendon (from 0)."""
-        found = self.state.stroke if by == STROKE else self.state.tension
-        return float(found[tendon])
+        values = self.state.stroke if by == STROKE else self.state.tension
+        return float(values[tendon])
 
-    def go(self, controls: Controls) -> Outcome:
-        """Solve a setting from the current state.
-
-        Args:
-            controls: The setting; the direction of the tube stays.
-        """
+    def go(self, controls: Controls) -> str:
+        """Solve a setting from the current state; the direction of the tube stays."""
         controls = replace(controls, pointing=self.pointing)
-        found = simulate(self.robot, controls.load(), from_state=self.solved.state)
+        solved = simulate(self.robot, controls.load(), from_state=self.solved.state)
         self._compiled.add(self._form(controls))
-        if not found.converged[0]:
-            return Outcome(self.state, found.reason[0])
-        self.controls, self.solved = controls, found
+        if not solved.converged[0]:
+            return solved.reason[0]
+        self.controls, self.solved = controls, solved
         self.history.add(controls, self.state)
-        return Outcome(self.state, "")
+        return ""
 
     def is_new(self, controls: Controls) -> bool:
         """Return whether a setting may need a program that is not compiled, which takes seconds."""
@@ -140,19 +112,12 @@ class Session:
         robot: Robot | None = None,
         pointing: str | None = None,
         go_on: Callable[[int, int], bool] | None = None,
-    ) -> Outcome:
+    ) -> str:
         """Replace the robot or the direction of its tube, and repeat the load history.
 
         The former loop is kept in `before`. A robot with another number of tendons begins at rest.
-
-        Args:
-            robot: The other robot.
-            pointing: Direction of the tube.
-            go_on: Called after every step with the number of steps done and of all; the rest is
-                omitted if it returns False.
-
-        Returns:
-            The outcome; of the last converged step if one did not converge.
+        `go_on` is called after every step with the number of steps done and of all; the rest is
+        omitted if it returns False.
 
         Raises:
             InputError: The other robot cannot be solved; this one is unchanged.
@@ -162,25 +127,22 @@ class Session:
         # First: a robot that cannot be solved leaves this one unchanged.
         again = Session(changed, self.pointing if pointing is None else pointing)
         again._compiled |= self._compiled
-        outcome = Outcome(again.state, "")
+        reason = ""
         if changed.number_of_tendons == self.robot.number_of_tendons:
             again.before = past if len(past) > 1 else None
-            outcome = again._repeat(past.controls[1:], go_on)
+            reason = again._repeat(past.controls[1:], go_on)
         self.__dict__.update(again.__dict__)
-        return outcome
+        return reason
 
-    def _repeat(
-        self, settings: list[Controls], go_on: Callable[[int, int], bool] | None
-    ) -> Outcome:
+    def _repeat(self, settings: list[Controls], go_on: Callable[[int, int], bool] | None) -> str:
         """Solve settings one after the other, until one fails or `go_on` returns False."""
         count = len(settings) + 1
         for number, controls in enumerate(settings, start=2):
-            step = self.go(controls)
-            if step.reason:
-                return Outcome(self.state, f"step {number} of {count} repeated: {step.reason}")
+            if reason := self.go(controls):
+                return f"step {number} of {count} repeated: {reason}"
             if go_on is not None and not go_on(number, count) and number < count:
-                return Outcome(self.state, f"stopped after step {number} of {count} repeated")
-        return Outcome(self.state, "")
+                return f"stopped after step {number} of {count} repeated"
+        return ""
 
     def path(self) -> EquilibriumPath:
         """Return the whole history as one path from rest, as `notchflex.simulate` finds it."""

@@ -11,17 +11,13 @@ from threading import Event
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.viewer import parts
-from notchflex.viewer.controls import Controls
+from notchflex.viewer.controls import STRETCH, Controls, reach_of
 from notchflex.viewer.page.page import Page
 from notchflex.viewer.page.readout import beyond
-from notchflex.viewer.reach import STRETCH, reach_of
 from notchflex.viewer.scene.scene import Scene, Shown
-from notchflex.viewer.server.address import HOST, PORT, check_host, check_installed
-from notchflex.viewer.server.origin import bracketed
-from notchflex.viewer.server.serving import serve
-from notchflex.viewer.session import Outcome, Session
-from notchflex.viewer.target_queue import TargetQueue
-from notchflex.viewer.tasks import Tasks, WatchedFile
+from notchflex.viewer.server import HOST, PORT, bracketed, check_host, check_installed, serve
+from notchflex.viewer.session import Session
+from notchflex.viewer.tasks import TargetQueue, Tasks, WatchedFile
 
 # A browser does not show more steps a second than this.
 MOST_STEPS = 60.0
@@ -32,12 +28,8 @@ _TEXT, _LOOK = 0.1, 0.5
 class Viewer:
     """A robot in the browser, with sliders for its loads.
 
-    Args:
-        robot: The robot.
-        read: Reads the robot's file again after it was saved; None without a file.
-        file: The file that is watched.
-        host: Address to serve on.
-        port: Port to serve on, or the next free one.
+    It is solved at rest and served on a host and a port, or the next free one. `read` reads the
+    robot again after its file was saved.
 
     Raises:
         InputError: The extra `viewer` is not installed, or nothing can be served there.
@@ -52,7 +44,6 @@ class Viewer:
         host: str = HOST,
         port: int = PORT,
     ) -> None:
-        """Solve the robot at rest and begin to serve."""
         check_installed()
         check_host(host, port)
         self.original = robot
@@ -127,16 +118,14 @@ class Viewer:
         if rest > 0.0:
             time.sleep(rest)
 
-    def advance(self, controls: Controls) -> Outcome:
+    def advance(self, controls: Controls) -> None:
         """Solve a setting and draw the result."""
         if self.session.is_new(controls):
             self.page.busy("preparing: a new kind of load is compiled once, which takes seconds")
-        outcome = self.session.go(controls)
-        if outcome.reason:
+        if reason := self.session.go(controls):
             self.targets.clear(self.session.controls)
-            self.message = f"Not reached: {outcome.reason}"
+            self.message = f"Not reached: {reason}"
         self._draw(update=not len(self.targets) or time.monotonic() - self._updated > _TEXT)
-        return outcome
 
     def _draw(self, update: bool) -> None:
         """Move the robot; with `update` also update numbers and charts."""
@@ -150,12 +139,9 @@ class Viewer:
         self.message = self.note = ""
 
     def set(self, number: int, value: float, label: str) -> None:
-        """Set a number of the controls, from the current state of the robot.
+        """Set one of the `Controls.numbers` from the current state, within its slider.
 
-        Args:
-            number: Its index in `Controls.numbers`.
-            value: Its new value; limited to the range of its slider.
-            label: Label on the page, with its unit in brackets.
+        `label` is that of the slider, with the unit in brackets.
         """
         low, high = self.reach.ends(number, self.session.controls.command(number))
         kept = min(max(value, low), high)
@@ -222,13 +208,12 @@ class Viewer:
         old = self.session.robot
         self._quiet()
         self.page.busy("preparing the robot")
-        outcome = self.session.change(robot, go_on=self._go_on)
+        reason = self.session.change(robot, go_on=self._go_on)
         if (old.tube, old.notch, old.tendon) != (robot.tube, robot.notch, robot.tendon):
             self._reshape(robot)
-            self.page.rebuild()
         self.scene.robot = robot
         self.page.name()
-        self._repeated(outcome)
+        self._repeated(reason)
 
     def change_part(self, section: str, kind: str) -> None:
         """Change the kind of friction or material of the robot."""
@@ -243,9 +228,9 @@ class Viewer:
         setattr(self.shown, name, value)
         self._draw(update=False)
 
-    def _repeated(self, outcome: Outcome) -> None:
-        if outcome.reason:
-            self.message = f"Not reached: {outcome.reason}"
+    def _repeated(self, reason: str) -> None:
+        if reason:
+            self.message = f"Not reached: {reason}"
             self.targets.clear()
         self._restart()
 
@@ -253,6 +238,7 @@ class Viewer:
         self.reach = self._first_reach = reach_of(robot)
         self.scene.remove()
         self.scene = Scene(self.server, robot, self.reach, self.shown)
+        self.page.rebuild()
 
     def load(self, robot: Robot, file: WatchedFile | None = None) -> None:
         """Begin again with another robot; the former file is no longer watched."""

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.errors import InputError
+from notchflex.errors import ErrorCode, InputError
 from notchflex.results.files.record import robot_of
 from notchflex.results.quantities.registry import QUANTITIES
+from refusals import refused
 
 WHOLE = (".json", ".nc", ".parquet")
 
@@ -92,7 +93,7 @@ def test_a_document_of_the_first_version_with_steps_not_tried_is_read(tmp_path):
     assert_same(nf.read_path(file), path)
     document["steps"][2]["total_angle_deg"] = 0.0
     file.write_text(json.dumps(document))
-    with pytest.raises(InputError, match="was changed"):
+    with refused(ErrorCode.FILE_DAMAGED):
         nf.read_path(file)
 
 
@@ -113,7 +114,7 @@ def test_a_table_comes_back_to_the_printed_digits(loop, tmp_path, suffix):
 
 def test_a_csv_says_that_it_holds_no_path(loop, tmp_path):
     nf.save_path(loop, tmp_path / "loop.csv")
-    with pytest.raises(InputError, match=r"neither the robot nor the memory.*read_table"):
+    with refused(ErrorCode.FILE_FORMAT):
         nf.read_path(tmp_path / "loop.csv")
 
 
@@ -131,7 +132,7 @@ def test_data_set_has_names_and_units(loop):
 
 def test_one_state_is_no_path(loop, tmp_path):
     loop[2].to_xarray().to_netcdf(tmp_path / "one.nc", engine="h5netcdf")
-    with pytest.raises(InputError, match=r"holds one state, not a path"):
+    with refused(ErrorCode.FILE_FORMAT):
         nf.read_path(tmp_path / "one.nc")
 
 
@@ -141,7 +142,7 @@ def test_a_document_whose_steps_were_changed_is_refused(loop, tmp_path):
     document = json.loads(file.read_text())
     document["steps"][1]["tendon_tension_N"] = [9.0]
     file.write_text(json.dumps(document))
-    with pytest.raises(InputError, match=r"was changed"):
+    with refused(ErrorCode.FILE_DAMAGED):
         nf.read_path(file)
 
 
@@ -157,7 +158,7 @@ def _without(document, *keys):
     [
         (("read_back",), "holds no path that can be read back"),
         (("read_back", "arrays"), "damaged"),
-        (("read_back", "facts", "format"), "laid out as None"),
+        (("read_back", "facts", "format"), "has the format None"),
         (("read_back", "arrays", "notch_angle"), "notch_angle is missing"),
         (("read_back", "arrays", "tension", "base64"), "damaged"),
         (("read_back", "facts", "settings"), "settings is missing"),
@@ -180,7 +181,7 @@ def test_arrays_that_do_not_fit_the_robot_are_told(loop, tmp_path):
     facts = document["read_back"]["facts"]
     facts["robot"] = robot_of(nf.load_robot("gao2017"))
     file.write_text(json.dumps(document))
-    with pytest.raises(InputError, match=r"has the shape .* ask for"):
+    with refused(ErrorCode.FILE_DAMAGED):
         nf.read_path(file)
 
 
@@ -197,9 +198,9 @@ def test_rubbish_is_told_in_a_sentence(tmp_path, suffix):
 
 
 def test_other_suffixes_are_refused(loop, tmp_path):
-    with pytest.raises(InputError, match=r"got the suffix \.xlsx; a path is written as"):
+    with refused(ErrorCode.FILE_FORMAT):
         nf.save_path(loop, tmp_path / "a.xlsx")
-    with pytest.raises(InputError, match=r"got no suffix; a path is read as"):
+    with refused(ErrorCode.FILE_FORMAT):
         nf.read_path(tmp_path / "a")
 
 

@@ -8,8 +8,12 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex._summary import Displayed, Summary, short
-from notchflex.analysis.closing_loads.edges import edge_closing
-from notchflex.analysis.closing_loads.search import ClosingStatus, closing_tensions
+from notchflex.analysis.closing_loads.search import (
+    ClosingStatus,
+    closing_tensions,
+    find_roots,
+    statuses,
+)
 from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble
 from notchflex.mechanics.contact import closing_travel, free_angle
@@ -17,10 +21,13 @@ from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.prepare import PreparedChain, prepare
-from notchflex.solver.programs.run import solve_contacts
+from notchflex.solver.programs.run import run, solve_contacts
 
 _ANGLE = QUANTITIES["total_angle"]
 _MOST_ROWS = 12
+# Steps of the first pull, up to so many times the tension that would close the softest notch if it
+# were linear and alone; what does not close by then is reported as never closing.
+_STEPS, _BEYOND_LINEAR = 40, 2.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,7 +97,7 @@ def closing(robot: Robot) -> Closing:
         tension, status = _tensions(prepare(robot), tendon, longest, travel)
         met = travel
     else:
-        tension, met, status = edge_closing(prepare(robot), tendon, longest)
+        tension, met, status = _edge_closing(prepare(robot), tendon, longest)
     has_spine = np.isfinite(travel)
     elastic = np.where(has_spine, travel / height, np.nan)
     return Closing(
@@ -104,18 +111,17 @@ def closing(robot: Robot) -> Closing:
 
 
 def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
-    """Lever of every tendon about the neutral axis of every notch in the free robot, mm.
+    """Return the lever of every tendon about the neutral axis of every notch at rest, mm.
 
-    The chain is one of space.
-
-    Positive where it bends the notch toward its direction; 0 where it does not go.
+    Positive where it bends the notch toward its direction; 0 where it does not go. The chain must
+    be assembled with `flat=False`.
     """
     place = np.einsum("nba,tb->nta", chain.notch_frame, chain.tendon_place)[..., 0]
     spine = np.where(np.asarray(chain.rods.has_closure) > 0.0, chain.rods.end_offset[:, 0], 0.0)
     arm = np.zeros((chain.flexures, chain.tendons))
     for group in chain.groups:
-        own = list(group.numbers)
-        arm[:, own] = np.asarray(group.present) * (place[:, own] + spine[:, None])
+        tendons = list(group.numbers)
+        arm[:, tendons] = np.asarray(group.present) * (place[:, tendons] + spine[:, None])
     return arm
 
 
@@ -127,11 +133,11 @@ def _tensions(
 ) -> tuple[Float[np.ndarray, " n"], np.ndarray]:
     """Base tension that closes every notch against its spine, pulling its own tendon; status."""
     chain = ready.chain
-    found = np.full(chain.flexures, np.nan)
+    tension = np.full(chain.flexures, np.nan)
     status = np.full(chain.flexures, ClosingStatus.NEVER, dtype=object)
     notches = np.flatnonzero((arm > 0.0) & (travel > 0.0))
     if len(notches) == 0:
-        return found, status
+        return tension, status
     stiffness = np.asarray(chain.contact_stiffness)
     # Always as many rows as notches, whichever are searched: one compiled program.
     which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
@@ -146,5 +152,67 @@ def _tensions(
         return np.where(converged, overlap, np.nan)[: len(notches)]
 
     linear = np.asarray(chain.stiffness)[notches, 0] * travel[notches] / arm[notches]
-    found[notches], status[notches] = closing_tensions(overlap, linear)
-    return found, status
+    tension[notches], status[notches] = closing_tensions(overlap, linear)
+    return tension, status
+
+
+def _edge_closing(
+    ready: PreparedChain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
+    """Tension that closes every notch whose edges belong to rigid pieces, its angle, and status.
+
+    The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
+    """
+    tension, angle = (np.full(ready.chain.flexures, np.nan) for _ in range(2))
+    status = np.full(ready.chain.flexures, ClosingStatus.NEVER, dtype=object)
+    for number in np.unique(tendon):
+        pulled = np.flatnonzero((tendon == number) & (arm > 0.0))
+        if len(pulled):
+            tension[pulled], angle[pulled], status[pulled] = _by_one_tendon(
+                ready, int(number), pulled
+            )
+    return tension, angle, status
+
+
+def _by_one_tendon(
+    ready: PreparedChain, tendon: int, notches: np.ndarray
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], np.ndarray]:
+    """The same for the notches `notches`, pulling one tendon."""
+    free, _ = _pull(ready, tendon, np.zeros(1))
+    reach = -free[0, notches]  # the gap at rest: an edge so far from closing
+    # Tendon and edges are about as far from the axis.
+    linear = np.asarray(ready.chain.contact_stiffness)[notches] * reach
+    steps = np.linspace(0.0, _BEYOND_LINEAR * linear.max(), _STEPS + 1)
+    overlap, _ = _pull(ready, tendon, steps)
+    touching = overlap[:, notches] > 0.0
+    closes = touching.any(axis=0)
+    after = np.maximum(touching.argmax(axis=0), 1)
+
+    def at(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
+        """Overlap and angle of every notch, each at its own tension, on one path."""
+        order = np.argsort(tension)
+        back = np.argsort(order)
+        overlap, angle = _pull(ready, tendon, tension[order])
+        return overlap[back, notches], angle[back, notches]
+
+    low, high = (np.where(closes, steps[step], steps[-1]) for step in (after - 1, after))
+    tension, precise = find_roots(lambda tension: at(tension)[0], low, high)
+    _, angle = at(tension)
+    closed = closes & precise & np.isfinite(angle)
+    failed = ~np.isfinite(overlap[:, notches]).all(axis=0)
+    status = statuses(closed, np.asarray(~closes & ~failed))
+    return np.where(closed, tension, np.nan), np.where(closed, angle, np.nan), status
+
+
+def _pull(
+    ready: PreparedChain, tendon: int, tensions: Float[np.ndarray, " s"]
+) -> tuple[Float[np.ndarray, "s n"], Float[np.ndarray, "s n"]]:
+    """Overlap of every notch's edges (contact force / stiffness - gap, mm) and its angle (rad)."""
+    value = np.zeros((len(tensions), ready.chain.tendons))
+    value[:, tendon] = tensions
+    states = run(ready, tension_commands(value), ready.rest, Settings(), each_from_start=False)
+    stiffness = np.asarray(ready.chain.contact_stiffness)
+    overlap = states.quantity("contact_force") / stiffness - states.quantity("gap")
+    good = states.converged[:, None]
+    angle = states.quantity("notch_angle")
+    return np.where(good, overlap, np.nan), np.where(good, angle, np.nan)

@@ -52,10 +52,10 @@ def closing_tensions(
         Tensions (N), NaN where none was found, and statuses (`ClosingStatus`).
     """
     low, high, failed = _bracket(overlap, guess)
-    found = np.isfinite(high)
-    tension, precise = find_roots(overlap, low, np.where(found, high, low))
-    closes = found & precise
-    return np.where(closes, tension, np.nan), statuses(closes, ~found & ~failed)
+    bracketed = np.isfinite(high)
+    tension, precise = find_roots(overlap, low, np.where(bracketed, high, low))
+    closes = bracketed & precise
+    return np.where(closes, tension, np.nan), statuses(closes, ~bracketed & ~failed)
 
 
 def statuses(closes: Bool[np.ndarray, " m"], never: Bool[np.ndarray, " m"]) -> np.ndarray:
@@ -126,6 +126,3 @@ def find_roots(
         slow = np.where(high - low > 0.5 * width, slow + 1, 0)
         width = high - low
     return 0.5 * (low + high), high - low <= _PRECISION * high
-
-
-__all__ = ["ClosingStatus", "closing_tensions", "find_roots", "statuses"]

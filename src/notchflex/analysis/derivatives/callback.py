@@ -6,34 +6,122 @@ again for what users write around it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
+from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
+from notchflex.analysis.outputs import OutputTable
 from notchflex.errors import InputError
+from notchflex.loads import LoadPath
+from notchflex.results.path import EquilibriumPath
+
+TENDONS = ("tension", "stroke")
+TIP = ("tip_force", "tip_moment")
+# Derivatives by numbers of the robot that are kept.
+_REMEMBERED = 256
 
 
-class Solver(Protocol):
-    """Outputs by name, and the derivatives of those that are floats."""
+@dataclass(frozen=True, eq=False)
+class VectorSolver:
+    """Outputs and their Jacobian by compiled programs, for plain vectors of values.
+
+    Attributes:
+        model: The forward model.
+        start: Present values of the parameters, by name.
+        outputs: Names of what is returned.
+        numbers: Names of the parameters that are numbers of the robot.
+        solve: Solves the path at named values; raises `InputError` for values that cannot be.
+        load: Returns the loads at named values.
+    """
+
+    model: ForwardModel
+    start: Mapping[str, Array]
+    outputs: tuple[str, ...]
+    numbers: tuple[str, ...]
+    solve: Callable[[Mapping[str, Any]], EquilibriumPath]
+    load: Callable[[Mapping[str, Any]], LoadPath]
 
     def values(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        """Return the outputs at some values; raise `InputError` where there are none."""
-        ...
+        """Return the outputs; raise `InputError` where no robot or load can have these values."""
+        path = self._path(flat)
+        return {name: np.asarray(getattr(path, name)) for name in self.outputs}
 
     def jacobian(
         self, flat: Float[np.ndarray, " k"], outputs: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
-        """Return derivatives of some outputs by every value, as last axis."""
-        ...
+        """Return the derivatives of some outputs by every value, as last axis."""
+        path = self._path(flat)
+        changes = self._changes(path, self._named(flat))
+        names = tuple(name for name in outputs if name != "residual")
+        by_change = self.model.derivatives(path, changes, names)
+        slopes = {name: np.moveaxis(one, 0, -1) for name, one in by_change.items()}
+        if "residual" in outputs:  # the residual left by the solver does not depend on the values
+            slopes["residual"] = np.zeros((len(path), len(flat)))
+        return slopes
+
+    def _named(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
+        shapes = {name: np.shape(at) for name, at in self.start.items()}
+        ends = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])[:-1]
+        parts = zip(shapes.items(), np.split(flat, ends), strict=True)
+        return {name: part.reshape(shape) for (name, shape), part in parts}
+
+    def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
+        """The path at some values; the last one is kept, as its derivatives are asked for next."""
+        if not np.isfinite(flat).all():  # a tension that is no number would mean a slack tendon
+            raise InputError.NOT_FINITE("values must be finite numbers")
+        key = flat.tobytes()
+        if key not in self._last:
+            path = self.solve(self._named(flat))
+            self._last.clear()
+            self._last[key] = path
+        return self._last[key]
+
+    @cached_property
+    def _last(self) -> dict[bytes, EquilibriumPath]:
+        return {}
+
+    @cached_property
+    def _kept(self) -> dict[Any, Change]:
+        return {}
+
+    def _changes(self, path: EquilibriumPath, values: Mapping[str, np.ndarray]) -> Iterator[Change]:
+        """Change of loads and chain per unit of every value."""
+        # One program for all: with a change of the chain where any value changes it.
+        still = np.zeros(self.model.ready.long.chain_layout.size) if self.numbers else None
+        for name, value in values.items():
+            if name in self.numbers:
+                yield self._by_number(path, values, name)
+                continue
+            for place in np.ndindex(value.shape):
+                varied = np.array(value)
+                varied[place] += 1.0  # loads are linear in tension, stroke, tip force and moment
+                more = self.load({**values, name: varied})
+                yield Change(self.model.load_change(path, more), still)
+
+    def _by_number(
+        self, path: EquilibriumPath, values: Mapping[str, np.ndarray], name: str
+    ) -> Change:
+        """Change by a number of the robot, kept for the next tensions and strokes."""
+        numbers = [float(values[one]) for one in self.numbers]
+        tip = [values[one].tobytes() for one in values if one in TIP]
+        key = (name, *numbers, *tip)
+        if key not in self._kept:
+            if len(self._kept) >= _REMEMBERED:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = self.model.change(path.robot, path.load, name)
+        return self._kept[key]
 
 
 def outputs_function(
-    solver: Solver, start: Float[np.ndarray, " k"]
-) -> Callable[[Array], dict[str, Array]]:
+    solver: VectorSolver, start: Float[np.ndarray, " k"]
+) -> Callable[[Array], OutputTable]:
     """Make a solver a function of JAX.
 
     Values that the solver refuses give NaN for numbers and false for truth values, as a program of
@@ -46,65 +134,87 @@ def outputs_function(
     Returns:
         A function of a vector of values, differentiable once, forward and reverse.
     """
-    first = solver.values(start)
-    floats = tuple(name for name, value in first.items() if value.dtype.kind == "f")
-    others = tuple(name for name in first if name not in floats)
+    shapes = {
+        name: jax.ShapeDtypeStruct(value.shape, value.dtype)
+        for name, value in solver.values(start).items()
+    }
+    floats = {name: shape for name, shape in shapes.items() if shape.dtype.kind == "f"}
+    others = {name: shape for name, shape in shapes.items() if name not in floats}
+    values_of_others = _callback(solver.values, others)
+    values_of_floats = _differentiable_once(solver, start, floats)
 
-    def shapes(names: tuple[str, ...], *more: int) -> dict[str, Any]:
-        own = {name: (*first[name].shape, *more) for name in names}
-        return {name: jax.ShapeDtypeStruct(own[name], first[name].dtype) for name in names}
-
-    def called(function: Callable[[np.ndarray], Any], result: dict[str, Any]) -> Any:
-        def safe(at: Any) -> dict[str, np.ndarray]:
-            try:
-                found = function(np.asarray(at))
-                return {name: np.asarray(found[name], one.dtype) for name, one in result.items()}
-            except InputError:
-                return {name: _nothing(one) for name, one in result.items()}
-
-        # Compiled once: a callback on its own is compiled at every call.
-        compiled = jax.jit(lambda at: jax.pure_callback(safe, result, at, vmap_method="sequential"))
-
-        def call(at: Array) -> dict[str, Array]:
-            return compiled(at) if isinstance(at, Tracer) else jax.tree.map(jnp.asarray, safe(at))
-
-        return call
-
-    values_of_floats = called(solver.values, shapes(floats))
-    values_of_others = called(solver.values, shapes(others))
-    slopes_of_floats = called(lambda at: solver.jacobian(at, floats), shapes(floats, len(start)))
-
-    compiled: list[bool] = []
-
-    @jax.custom_jvp
-    def of_floats(at: Array) -> dict[str, Array]:
-        return values_of_floats(at)
-
-    @of_floats.defjvp
-    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Any, Any]:
-        (at,), (change,) = primals, tangents
-        # Compiled now: within a program of JAX nothing may be traced.
-        if not compiled:
-            solver.jacobian(start, floats)
-            compiled.append(True)
-        slopes = slopes_of_floats(at)
-        return of_floats(at), {name: slopes[name] @ change for name in floats}
-
-    def function(at: Array) -> dict[str, Array]:
+    def function(at: Array) -> OutputTable:
         if not isinstance(at, Tracer):
-            return {
-                name: jnp.asarray(value) for name, value in solver.values(np.asarray(at)).items()
-            }
-        found = dict(of_floats(at)) if floats else {}
+            values = solver.values(np.asarray(at))
+            return OutputTable({name: jnp.asarray(value) for name, value in values.items()})
+        outputs = dict(values_of_floats(at)) if floats else {}
         if others:
-            found |= values_of_others(jax.lax.stop_gradient(at))
-        return {name: found[name] for name in first}
+            outputs |= values_of_others(jax.lax.stop_gradient(at))
+        return OutputTable({name: outputs[name] for name in shapes})
 
     return function
 
 
-def _nothing(of: Any) -> np.ndarray:
-    return np.full(of.shape, np.nan if of.dtype.kind == "f" else 0).astype(of.dtype)
+def _differentiable_once(
+    solver: VectorSolver, start: np.ndarray, shapes: dict[str, Any]
+) -> Callable[[Array], dict[str, Array]]:
+    """Return the outputs of some shapes as a function with a first derivative."""
+    names = tuple(shapes)
+    slope_shapes = {
+        name: jax.ShapeDtypeStruct((*shape.shape, len(start)), shape.dtype)
+        for name, shape in shapes.items()
+    }
+    values_of = _callback(solver.values, shapes)
+    slopes_of = _callback(lambda at: solver.jacobian(at, names), slope_shapes)
+    compiled: list[bool] = []
+
+    @jax.custom_jvp
+    def slopes(at: Array) -> dict[str, Array]:
+        return slopes_of(at)
+
+    @slopes.defjvp
+    def _(primals: Any, tangents: Any) -> Any:
+        raise InputError.UNSUPPORTED(
+            "a robot under loads can be differentiated once, not twice: take differences of its "
+            "gradients, or minimise by a method that needs first derivatives only"
+        )
+
+    @jax.custom_jvp
+    def values(at: Array) -> dict[str, Array]:
+        return values_of(at)
+
+    @values.defjvp
+    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Any, Any]:
+        (at,), (change,) = primals, tangents
+        # Compiled now: within a program of JAX nothing may be traced.
+        if not compiled:
+            solver.jacobian(start, names)
+            compiled.append(True)
+        by = slopes(at)
+        return values(at), {name: by[name] @ change for name in names}
+
+    return values
 
 
-__all__ = ["Solver", "outputs_function"]
+def _callback(
+    function: Callable[[np.ndarray], Any], shapes: dict[str, Any]
+) -> Callable[[Array], dict[str, Array]]:
+    """Return a plain function as one that JAX can trace; NaN or 0 where it refuses its values."""
+
+    def safe(at: Any) -> dict[str, np.ndarray]:
+        try:
+            values = function(np.asarray(at))
+            return {name: np.asarray(values[name], one.dtype) for name, one in shapes.items()}
+        except InputError:
+            return {
+                name: np.full(one.shape, np.nan if one.dtype.kind == "f" else 0, one.dtype)
+                for name, one in shapes.items()
+            }
+
+    # Compiled once: a callback on its own is compiled at every call.
+    compiled = jax.jit(lambda at: jax.pure_callback(safe, shapes, at, vmap_method="sequential"))
+
+    def call(at: Array) -> dict[str, Array]:
+        return compiled(at) if isinstance(at, Tracer) else jax.tree.map(jnp.asarray, safe(at))
+
+    return call

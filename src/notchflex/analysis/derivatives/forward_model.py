@@ -105,8 +105,8 @@ class ForwardModel:
             return np.concatenate([ready.long.vector, loads.ravel()])
 
         size = self.ready.long.chain_layout.size
-        found = slope(packed, number_at(robot, name))
-        return Change(found[size:].reshape(len(load), -1), found[:size])
+        by_number = slope(packed, number_at(robot, name))
+        return Change(by_number[size:].reshape(len(load), -1), by_number[:size])
 
     def load_change(
         self, path: EquilibriumPath, load: LoadPath
@@ -143,14 +143,14 @@ class ForwardModel:
             tangents = PathTangents(path, outputs, remembers)
             columns = [tangents.along(one) for one in directions]
             return {name: np.stack([one[name] for one in columns]) for name in outputs}
-        found = {name: np.empty((len(directions), *shape)) for name, shape in shapes.items()}
+        derivatives = {name: np.empty((len(directions), *shape)) for name, shape in shapes.items()}
         for name, shape in shapes.items():
             for place in np.ndindex(shape):
                 weight = np.zeros(shape)
                 weight[place] = 1.0
                 by = gradient(path, {name: weight})
-                found[name][:, *place] = [by.along(one) for one in directions]
-        return found
+                derivatives[name][:, *place] = [by.along(one) for one in directions]
+        return derivatives
 
     def _assembled(self, robot: Robot) -> PreparedChain:
         if self.any_load:
@@ -163,11 +163,11 @@ class ForwardModel:
         return lru_cache(maxsize=4)(self._varied)
 
     def _varied(self, robot: Robot) -> PreparedChain:
-        own, shape = self.robot, self._shape(robot)
-        if robot is own:
+        present, shape = self.robot, self._shape(robot)
+        if robot is present:
             return self.ready
         # A search for constants of the material and friction varies a few numbers of the chain.
-        if shape is self._shape(own) and robot.material.density == own.material.density:
+        if shape is self._shape(present) and robot.material.density == present.material.density:
             fields = laws(robot.material, shape) | laws(robot.friction, shape)
             return self.ready.with_fields(fields)
         ready = self._assembled(robot)
@@ -187,6 +187,3 @@ class ForwardModel:
     def _shape(self, robot: Robot) -> Shaped:
         chain = self.ready.chain
         return shape_of(robot, chain.level, chain.refinement)
-
-
-__all__ = ["Change", "ForwardModel"]

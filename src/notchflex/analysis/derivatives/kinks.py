@@ -57,15 +57,15 @@ def kinks(path: EquilibriumPath, within: float = 1e-6) -> list[Kink]:
     if not isinstance(path.run, SolverRun):
         return []
     solved, before = path.run.solved, path.prepared.state.unpack(path.run.between)
-    found = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
+    every = [*_contacts(path.chain, solved, before, within), *_notches(path, within)]
     good = np.asarray(path.converged)
-    return sorted((one for one in found if good[one.step]), key=lambda one: one.step)
+    return sorted((one for one in every if good[one.step]), key=lambda one: one.step)
 
 
 def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: float) -> list[Kink]:
     height = np.asarray(chain.rods.length).sum(-1)[:, None, None]
     edges = np.asarray(chain.contacts)
-    found: list[Kink] = []
+    contacts: list[Kink] = []
     for k, group in enumerate(chain.groups):
         ratio, bound = (
             np.asarray(one[k]) for one in (solved.memory.log_ratio, solved.memory.bound)
@@ -81,8 +81,8 @@ def _contacts(chain: Chain, solved: SolverState, before: SolverState, within: fl
             tendon = group.numbers[column]
             index = int(np.flatnonzero(edges[tendon] == 2 * flexure + edge)[0])
             gap = float(distance[step, flexure, column, edge])
-            found.append(Kink(int(step), "contact", index + 1, tendon + 1, gap))
-    return found
+            contacts.append(Kink(int(step), "contact", index + 1, tendon + 1, gap))
+    return contacts
 
 
 def _notches(path: EquilibriumPath, within: float) -> list[Kink]:
@@ -94,6 +94,3 @@ def _notches(path: EquilibriumPath, within: float) -> list[Kink]:
         Kink(int(step), "notch", int(notch) + 1, None, float(distance[step, notch]))
         for step, notch in np.argwhere(distance < within)  # NaN where a notch has no lips
     ]
-
-
-__all__ = ["Kink", "kinks"]

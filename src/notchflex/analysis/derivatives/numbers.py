@@ -39,12 +39,12 @@ def slope(
     for side in (0, 1, -1):
         points, weights = _stencil(order, side)
         try:
-            found = np.stack([vector_of(float(value + width * point)) for point in points])
+            values = np.stack([vector_of(float(value + width * point)) for point in points])
         except InputError:  # beyond what the number may be
             continue
-        found = np.where(np.isfinite(found), found, 0.0)
+        values = np.where(np.isfinite(values), values, 0.0)
         # What does not change is 0, not a rounding error.
-        return np.tensordot(weights, found - found[0], 1) / width
+        return np.tensordot(weights, values - values[0], 1) / width
     raise InputError.OUT_OF_RANGE(f"the number cannot be varied around {value:g}")
 
 
@@ -56,6 +56,3 @@ def _stencil(order: int, side: int) -> tuple[Float[np.ndarray, " p"], Float[np.n
     points = side * np.arange(order + 1.0) if side else central
     powers = np.vander(points, increasing=True).T
     return points, np.linalg.solve(powers, np.eye(len(points))[1])
-
-
-__all__ = ["slope"]

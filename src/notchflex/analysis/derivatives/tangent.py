@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -28,6 +29,24 @@ from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.sensitivity import SubstepHistory, attach_derivatives
 
 
+class StepLayouts(NamedTuple):
+    """How a program takes chain, load and state as vectors, and what it reports.
+
+    Attributes:
+        chain: Structure and layout of the chain.
+        command: Layout of one load.
+        state: Layout of a state.
+        outputs: Names of the quantities.
+        chain_varies: Whether a change of the chain is followed.
+    """
+
+    chain: StaticStructure
+    command: PytreeLayout
+    state: PytreeLayout
+    outputs: tuple[str, ...]
+    chain_varies: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Change:
     """Change of what a path is computed from, per unit of a number.
@@ -41,14 +60,14 @@ class Change:
     chain: Float[np.ndarray, " chain"] | None
 
     def entries(
-        self, form: StaticStructure
+        self, structure: StaticStructure
     ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, " m"]]:
         """Return where the chain changes, as packed for programs, and by how much."""
-        if form not in self._entries:
+        if structure not in self._entries:
             chain = np.zeros(0) if self.chain is None else self.chain
-            places = np.flatnonzero(chain)
-            self._entries[form] = form.indices_of(places), chain[places]
-        return self._entries[form]
+            indices = np.flatnonzero(chain)
+            self._entries[structure] = structure.indices_of(indices), chain[indices]
+        return self._entries[structure]
 
     @cached_property
     def _entries(self) -> dict[StaticStructure, tuple[np.ndarray, np.ndarray]]:
@@ -79,47 +98,57 @@ class PathTangents:
         """
         loads, chain = direction.loads, direction.chain
         long = self.path.prepared.long
-        form = long.static_structure
-        varies = chain is not None
-        change = form.pack(chain) if varies else np.zeros(1)
-        packed, command_layout, states = self.steps
-        moved = np.zeros_like(packed) if loads is None else loads
-        given = (np.zeros(long.state.size), long.dynamic_vector, change)
-        steps = (*states, packed, moved)
-        rows = (*(False,) * len(given), *(True,) * len(steps))
-        others = (form, command_layout, long.state, self.outputs, varies)
-        found = _tangent.along(rows, *given, *steps, *others)
-        return {name: self._own(name, values) for name, values in found.items()}
+        layouts = self.layouts._replace(chain_varies=chain is not None)
+        change = np.zeros(1) if chain is None else layouts.chain.pack(chain)
+        constant = (np.zeros(long.state.size), long.dynamic_vector, change)
+        load_change = np.zeros_like(self.loads) if loads is None else loads
+        steps = (*self.steps, self.loads, load_change)
+        by_row = (*(False,) * len(constant), *(True,) * len(steps))
+        changes = _tangent.along(by_row, *constant, *steps, layouts)
+        turn = self.path.base_to_world
+        for name, values in changes.items():
+            values = unpad_quantity(self.path.chain, name, values)
+            changes[name] = values if turn is None else REGISTERED[name].turned(values, turn)
+        return changes
 
     @cached_property
-    def steps(self) -> tuple[np.ndarray, PytreeLayout, tuple[np.ndarray, ...]]:
-        """What programs take of every load, for the long chain.
+    def layouts(self) -> StepLayouts:
+        """How programs take chain, load and state, for the long chain."""
+        long = self.path.prepared.long
+        return StepLayouts(long.static_structure, self._commands[1], long.state, self.outputs)
 
-        Returns:
-            The loads, the form of one of them; and whether a change of the state before passes on,
-            the states before and at the load and between, and how it was found.
+    @property
+    def loads(self) -> Float[np.ndarray, "s command"]:
+        """The loads, packed for the long chain."""
+        return self._commands[0]
+
+    @cached_property
+    def _commands(self) -> tuple[np.ndarray, PytreeLayout]:
+        return self.path.prepared.padded_commands(self.path.commands)
+
+    @cached_property
+    def steps(self) -> tuple[np.ndarray, ...]:
+        """What programs take of every step beside its load, for the long chain.
+
+        The states before and at the load and between, and how it was found: parts of the substeps,
+        whether it converged, and whether a change of the state before passes on.
         """
-        ready, came = self.path.prepared, self.path.run
-        assert isinstance(came, SolverRun)
-        packed, form = ready.padded_commands(self.path.commands)
-        own = (came.states_before, came.states, came.between)
-        every = (pad_rows(one, ready.state, ready.long.state) for one in own)
-        how = np.stack([came.part_before, came.parts, self.path.converged], axis=1)
-        remembers = (self.remembers & ~came.from_start)[:, None].astype(float)
-        return packed, form, (remembers, *every, how)
-
-    def _own(self, name: str, values: np.ndarray) -> np.ndarray:
-        own = unpad_quantity(self.path.chain, name, values)
-        turn = self.path.base_to_world
-        return own if turn is None else REGISTERED[name].turned(own, turn)
+        ready, run = self.path.prepared, self.path.run
+        assert isinstance(run, SolverRun)
+        states = (
+            pad_rows(one, ready.state, ready.long.state)
+            for one in (run.states_before, run.states, run.between)
+        )
+        remembers = self.remembers & ~run.from_start
+        how = np.stack([run.part_before, run.parts, self.path.converged, remembers], axis=1)
+        return (*states, how.astype(float))
 
 
-def answer_of(
+def step_function(
     state: Float[Array, " state"],
     between: Float[Array, " state"],
-    how: Float[Array, " 3"],
-    layouts: tuple[PytreeLayout, PytreeLayout],
-    outputs: tuple[str, ...],
+    how: Float[Array, " 4"],
+    layouts: StepLayouts,
 ) -> Callable[[Chain, Array, Array], tuple[Array, dict[str, Array]]]:
     """Return a solved step as a function that can be differentiated.
 
@@ -127,57 +156,53 @@ def answer_of(
         state: The solved state, packed.
         between: The state before its last part, packed.
         how: How it was found, as `PathTangents.steps` has it.
-        layouts: Of a load and of a state.
-        outputs: Names of what is reported.
+        layouts: How things are packed, and what is reported.
 
     Returns:
         A function of a chain, a packed load and the packed state before; it returns the packed
         state and the outputs.
     """
-    command_layout, state_layout = layouts
-    solved, halfway = state_layout.unpack(state), state_layout.unpack(between)
+    solved, halfway = layouts.state.unpack(state), layouts.state.unpack(between)
     history = SubstepHistory(halfway, how[0], how[1].astype(int), how[2] > 0.0)
 
-    def answer(chain: Chain, load: Array, before: Array) -> tuple[Array, dict[str, Array]]:
-        command, last = command_layout.unpack(load), state_layout.unpack(before)
+    def step(chain: Chain, load: Array, before: Array) -> tuple[Array, dict[str, Array]]:
+        command, last = layouts.command.unpack(load), layouts.state.unpack(before)
         result = attach_derivatives(chain, command, last, solved, history)
-        return state_layout.pack(result), report_quantities(chain, result, outputs)
+        return layouts.state.pack(result), report_quantities(chain, result, layouts.outputs)
 
-    return answer
+    return step
 
 
-@native(10, lane_sizes)
+def lanes_of(layouts: StepLayouts) -> tuple[int, int]:
+    """Return the sizes of the axes that run along the chain."""
+    chain: Any = layouts.chain
+    return lane_sizes(chain)
+
+
+@native(9, lanes_of)
 def _tangent(
     last_change: Float[Array, " state"],
     chain: Float[Array, " chain"],
     chain_change: Float[Array, " chain"],
-    remembers: Float[Array, " 1"],
     before: Float[Array, " state"],
     state: Float[Array, " state"],
     between: Float[Array, " state"],
-    how: Float[Array, " 3"],
+    how: Float[Array, " 4"],
     load: Float[Array, " command"],
     load_change: Float[Array, " command"],
-    chain_layout: StaticStructure,
-    command_layout: PytreeLayout,
-    state_layout: PytreeLayout,
-    outputs: tuple[str, ...],
-    varies: bool,
+    layouts: StepLayouts,
 ) -> tuple[Float[Array, " state"], dict[str, Array]]:
     """Change of a solved state, which is carried to the next, and of what is reported of it.
 
     The program for loads alone, where the chain does not vary, is a fifth shorter.
     """
-    answer = answer_of(state, between, how, (command_layout, state_layout), outputs)
+    step = step_function(state, between, how, layouts)
 
-    def step(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
-        return answer(chain_layout.unpack(varied), load, before)
+    def packed(load: Array, before: Array, varied: Array = chain) -> tuple[Array, dict[str, Array]]:
+        return step(layouts.chain.unpack(varied), load, before)
 
     at = (load, before)
-    changes = (load_change, jnp.where(remembers[0] > 0.0, last_change, 0.0))
-    if varies:
+    changes = (load_change, jnp.where(how[3] > 0.0, last_change, 0.0))
+    if layouts.chain_varies:
         at, changes = (*at, chain), (*changes, chain_change)
-    return jax.jvp(step, at, changes)[1]
-
-
-__all__ = ["Change", "PathTangents", "answer_of"]
+    return jax.jvp(packed, at, changes)[1]

@@ -79,23 +79,23 @@ def tip_response(
 
     Example:
         >>> from notchflex import load_robot, pull
-        >>> found = tip_response(load_robot("pacheco2021-a"), pull(0.5, 1.0, steps=2))
-        >>> found.jacobian.shape, found.compliance.shape
+        >>> response = tip_response(load_robot("pacheco2021-a"), pull(0.5, 1.0, steps=2))
+        >>> response.jacobian.shape, response.compliance.shape
         ((2, 6, 1), (2, 6, 6))
     """
-    path = load_path(loads, check_is_robot(robot).number_of_tendons)
+    load = load_path(loads, check_is_robot(robot).number_of_tendons)
     check_refinement(refinement)
-    model = ForwardModel(robot, path, settings or DEFAULT, refinement, any_load=True)
-    found = model.solve(robot, path)
-    changes = [Change(loads, None) for loads in _unit_loads(found)]
+    model = ForwardModel(robot, load, settings or DEFAULT, refinement, any_load=True)
+    path = model.solve(robot, load)
+    changes = [Change(loads, None) for loads in _unit_loads(path)]
     # Each state is varied alone: what the contacts remember of the state before stays.
-    by_loads = model.derivatives(found, changes, _POSE, remembers=False)
-    slopes = np.moveaxis(_pose_change(found, by_loads), 0, -1)
+    by_loads = model.derivatives(path, changes, _POSE, remembers=False)
+    slopes = np.moveaxis(_pose_change(path, by_loads), 0, -1)
     turn = np.eye(6)
-    if found.base_to_world is not None:
-        turn = np.kron(np.eye(2), found.base_to_world)
-    tendons = found.chain.tendons
-    return TipResponse(found, slopes[..., :tendons], slopes[..., tendons:] @ turn.T)
+    if path.base_to_world is not None:
+        turn = np.kron(np.eye(2), path.base_to_world)
+    tendons = path.chain.tendons
+    return TipResponse(path, slopes[..., :tendons], slopes[..., tendons:] @ turn.T)
 
 
 def _unit_loads(path: EquilibriumPath) -> Iterator[Float[np.ndarray, "s command"]]:
@@ -133,6 +133,3 @@ def _with_tip(applied: BodyLoads, wrench: Float[np.ndarray, " 6"], length: float
         dead_moment=constant(applied.dead_moment + np.multiply.outer(last, moment)),
         dead_arm=constant(applied.dead_arm + np.multiply.outer(last, arm)),
     )
-
-
-__all__ = ["TipResponse", "tip_response"]

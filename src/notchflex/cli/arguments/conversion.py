@@ -78,9 +78,10 @@ def number(word: str, form: str, *, least: float = -math.inf) -> float:
     try:
         value = float(word)
     except ValueError:
-        raise InputError.NOT_A_NUMBER(f"give {form}.") from None
+        got = f"{word!r} is not a number" if word.strip() else "a number is missing"
+        raise InputError.NOT_A_NUMBER(f"{got}; give {form}.") from None
     if not math.isfinite(value):
-        raise InputError.NOT_FINITE(f"give {form}.")
+        raise InputError.NOT_FINITE(f"{word.strip()} is not finite; give {form}.")
     if value < least:
         raise InputError.OUT_OF_RANGE(f"give {form}.")
     return value
@@ -93,17 +94,15 @@ def whole(low: int, high: int | None = None) -> Callable[[str], int]:
         >>> whole(0, 3)("2")
         2
     """
-    end = " or more" if high is None else f" to {high}"
-    form = f"a whole number, {low}{end}" if high is None else f"a whole number from {low}{end}"
+    form = f", {low} or more" if high is None else f" from {low} to {high}"
 
     def read(word: str) -> int:
-        sign, digits = word[:1] == "-", word.removeprefix("-")
         # Python converts no more than some thousand digits.
-        if not digits.isdecimal() or len(digits) > 18:
-            raise InputError.NOT_A_NUMBER(f"give {form}.")
-        value = -int(digits) if sign else int(digits)
+        if not word.removeprefix("-").isdecimal() or len(word) > 18:
+            raise InputError.NOT_A_NUMBER(f"give a whole number{form}.")
+        value = int(word)
         if value < low or (high is not None and value > high):
-            raise InputError.OUT_OF_RANGE(f"give {form}.")
+            raise InputError.OUT_OF_RANGE(f"give a whole number{form}.")
         return value
 
     return read
@@ -119,9 +118,9 @@ def vector(what: str) -> Callable[[str], Vector]:
         >>> vector("angles in deg")("90,0,-5")
         (90.0, 0.0, -5.0)
     """
+    form = f"three finite {what} joined by commas: X,Y,Z"
 
     def read(text: str) -> Vector:
-        form = f"three finite {what} joined by commas: X,Y,Z"
         values = [number(word, form) for word in text.split(",")]
         if len(values) != 3:
             raise InputError.BAD_SYNTAX(f"give {form}.")
@@ -148,35 +147,19 @@ def parse_spec(text: str) -> list[float]:
 def _range(part: str) -> list[float]:
     words = part.split(":")
     if len(words) == 1:
-        return [_value(part)]
+        return [number(part, SPEC)]
     if len(words) != 3:
         raise InputError.BAD_SYNTAX(f"{part!r} is not start:stop:count; give {SPEC}.")
-    start, stop = map(_value, words[:2])
+    start, stop = (number(word, SPEC) for word in words[:2])
     try:
-        count = int(words[2])
-    except ValueError:
-        raise InputError.NOT_A_NUMBER(
-            f"the count in {part!r} is {words[2]!r}; give a whole number."
-        ) from None
-    if count < 1:
-        raise InputError.OUT_OF_RANGE(f"a range of {count} steps; give a count of 1 or more.")
+        count = whole(1, MOST_STEPS)(words[2].strip())
+    except InputError as problem:
+        got = f"the count in {part!r} is {words[2]!r}"
+        raise InputError(f"{got}; {problem}", problem.code) from None
     if count == 1 and start != stop:
         raise InputError.OUT_OF_RANGE(
             f"a range of 1 step cannot go from {start:g} to {stop:g}; give a count of 2 or more."
         )
-    if count > MOST_STEPS:
-        raise InputError.OUT_OF_RANGE(f"this is more than {MOST_STEPS:,} steps.")
     import numpy as np  # not for `--help`
 
     return np.linspace(start, stop, count).tolist()
-
-
-def _value(word: str) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        got = f"{word!r} is not a number" if word.strip() else "a number is missing"
-        raise InputError.NOT_A_NUMBER(f"{got}; give {SPEC}.") from None
-    if not math.isfinite(value):
-        raise InputError.NOT_FINITE(f"got {word.strip()}; give finite numbers.")
-    return value

@@ -99,23 +99,18 @@ class DataSources(NamedTuple):
 
     def load(self, settings: Sequence[str]) -> dict[str, Robot]:
         """Load the robots with the values of `--set`: of all, or of one whose label precedes."""
-        own: dict[str, list[str]] = {label: [] for label in self.robots}
+        of_robot: dict[str, list[str]] = {label: [] for label in self.robots}
         for text in settings:
             label, colon, rest = text.partition(":")
             labelled = colon and "=" not in label
             if labelled:
                 self.check_label(label, f"--set {text}")
-            for one in [label] if labelled else own:
-                own[one].append(rest if labelled else text)
-        return {label: chosen_robot(name, own[label]) for label, name in self.robots.items()}
+            for one in [label] if labelled else of_robot:
+                of_robot[one].append(rest if labelled else text)
+        return {label: chosen_robot(name, of_robot[label]) for label, name in self.robots.items()}
 
     def check_label(self, label: str, source: str) -> None:
-        """Raise if no robot has a label.
-
-        Args:
-            label: The label.
-            source: Where it was given, for the message.
-        """
+        """Raise if no robot has a label."""
         if label not in self.robots:
             labels = ", ".join(self.robots)
             raise InputError.UNKNOWN_NAME(

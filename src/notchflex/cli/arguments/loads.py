@@ -42,12 +42,7 @@ class TendonCommand(NamedTuple):
 
 
 def tendon_command(option: str, *, negative: bool = False) -> Parameter:
-    """Return the parameter of an option `SPEC` or `TENDON=SPEC` that may be given several times.
-
-    Args:
-        option: Its name.
-        negative: Whether negative numbers are allowed.
-    """
+    """Return the parameter of an option `SPEC` or `TENDON=SPEC` that may be given several times."""
     return converted(partial(_read_command, option, negative), "SPEC", several=True)
 
 
@@ -69,38 +64,33 @@ def load_columns(
 
     A single value holds for all steps; longer columns must have one length.
 
-    Args:
-        tension: The commands of `--tension`.
-        stroke: The commands of `--stroke`.
-        tendons: Number of tendons of the robot.
-
     Returns:
         Tensions [N] and strokes [mm], each (S, tendons), NaN where not commanded.
     """
     import numpy as np
 
-    every = [*tension, *stroke]
-    if not every:
+    if not (tension or stroke):
         raise InputError.MISSING_VALUE(
             "Give a load: --tension SPEC or --stroke SPEC, for example --tension 2."
         )
-    longest = max(every, key=lambda command: len(command.steps))
+    longest = max((*tension, *stroke), key=lambda command: len(command.steps))
     tables = np.full((2, len(longest.steps), tendons), np.nan)
     commanded: dict[int, str] = {}
-    for number_, command in enumerate(every):
-        index = _tendon_index(command, tendons)
-        if index in commanded:
-            raise InputError.CONFLICT(
-                f"{command.source}: tendon {index + 1} already has {commanded[index]}; "
-                "give each tendon one tension or one stroke."
-            )
-        if len(command.steps) not in (1, len(longest.steps)):
-            raise InputError.WRONG_SHAPE(
-                f"{command.source} has {len(command.steps)} steps and {longest.source} has "
-                f"{len(longest.steps)}; give equal numbers of steps, or a single value for all."
-            )
-        commanded[index] = command.source
-        tables[int(number_ >= len(tension)), :, index] = command.steps
+    for table, commands in zip(tables, (tension, stroke), strict=True):
+        for command in commands:
+            index = _tendon_index(command, tendons)
+            if index in commanded:
+                raise InputError.CONFLICT(
+                    f"{command.source}: tendon {index + 1} already has {commanded[index]}; "
+                    "give each tendon one tension or one stroke."
+                )
+            if len(command.steps) not in (1, len(longest.steps)):
+                raise InputError.WRONG_SHAPE(
+                    f"{command.source} has {len(command.steps)} steps and {longest.source} has "
+                    f"{len(longest.steps)}; give equal numbers of steps, or a single value for all."
+                )
+            commanded[index] = command.source
+            table[:, index] = command.steps
     return tables[0], tables[1]
 
 
@@ -112,12 +102,12 @@ def _tendon_index(command: TendonCommand, tendons: int) -> int:
         raise InputError.MISSING_VALUE(
             f"{command.source}: the robot has {has}; say which one, for example {option} 1={text}."
         )
-    index = (command.tendon or 0) - (command.tendon is not None)
-    if not 0 <= index < tendons:
+    number = 1 if command.tendon is None else command.tendon
+    if not 1 <= number <= tendons:
         raise InputError.UNKNOWN_NAME(
-            f"{command.source}: there is no tendon {command.tendon}; the robot has {has}."
+            f"{command.source}: there is no tendon {number}; the robot has {has}."
         )
-    return index
+    return number - 1
 
 
 class BodyForceOption(NamedTuple):
@@ -143,10 +133,6 @@ def _read_body_force(text: str) -> BodyForceOption:
 
     where = read(point, "coordinates in mm") if at else None
     return BodyForceOption(int(body), read(force, "forces in N"), where)
-
-
-def _read_mass(text: str) -> float:
-    return number(text, "a finite number of grams, 0 or more", least=0.0)
 
 
 def _xyz(what: str, text: str) -> Parameter:
@@ -183,7 +169,7 @@ class ExternalLoads:
     ] = ()
     tip_mass: Annotated[
         float | None,
-        converted(_read_mass, "G"),
+        converted(partial(number, form="a finite number of grams, 0 or more", least=0.0), "G"),
         Parameter(help="Mass that hangs at the tip [g]; along 0,0,-9.81 without --gravity."),
     ] = None
     gravity: Annotated[
@@ -219,7 +205,7 @@ class ExternalLoads:
         """Return the path with these loads on all its steps."""
         from notchflex.loads import BodyForce
 
-        given = {
+        of_tip = {
             name: value
             for name in ("tip_force", "tip_moment", "tip_point", "tip_mass", "gravity")
             if (value := getattr(self, name)) is not None
@@ -229,4 +215,4 @@ class ExternalLoads:
             for body, force, point in self.body_force
         ]
         turns = self.following and bool(self.tip_force or self.tip_moment)
-        return path.loaded(**given, body_forces=forces or None, following=turns)
+        return path.loaded(**of_tip, body_forces=forces or None, following=turns)

@@ -1,4 +1,4 @@
-"""Robots on the command line: by name or file, with changed values, and variants beside them."""
+"""Robots and measurements on the command line: by name or file, with changed values, variants."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from notchflex.cli.arguments.conversion import texts
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
+    from notchflex.fit import Measurements
     from notchflex.robot import Robot
 
 MOST_BESIDE = 4
@@ -34,6 +35,18 @@ Settings = Annotated[
         "Change a value of the robot, such as `material.elastic_modulus=9000`, "
         "`notch[2].depth=1.3` (the second notch from the base), `notch.depth=1.38` (every notch) "
         "or `material.kind=linear`. May be given several times, in any order.",
+    ),
+]
+
+OnePath = Annotated[
+    bool | None,
+    Parameter(
+        name="--path",
+        negative="--from-rest",
+        show_default=False,
+        help="Take the rows of each pull as one loading path with friction history, or each row as "
+        "loaded from rest. Without either the column `from_rest` of the file decides, else the "
+        "order of its rows: a force that falls step by step within a pull makes it a path.",
     ),
 ]
 
@@ -74,7 +87,7 @@ def changed_title(robot: Robot, settings: Sequence[str]) -> str:
     return f"{robot.name} with {', '.join(changes)}" if changes else robot.name
 
 
-def variant(text: str, other: str) -> tuple[str, list[tuple[str, object]]]:
+def variant(text: str, other: str = "") -> tuple[str, list[tuple[str, object]]]:
     """Read `LABEL: PATH=VALUE, PATH=VALUE` of `--beside`.
 
     Args:
@@ -82,7 +95,7 @@ def variant(text: str, other: str) -> tuple[str, list[tuple[str, object]]]:
         other: What else may be given, as the message begins.
 
     Example:
-        >>> variant("slick: friction.coefficient=0", "")
+        >>> variant("slick: friction.coefficient=0")
         ('slick', [('friction.coefficient', 0)])
     """
     from notchflex.robot import parse_assignment
@@ -142,3 +155,28 @@ def _label_and_robot(text: str) -> tuple[str, str]:
     if colon:
         return label.strip(), name.strip()
     return robot_label(text.strip()), text.strip()
+
+
+def read_data(file: str, robot: Robot, path: bool | None) -> Measurements:
+    """Read measurements, and write how the rows were interpreted and what was not used.
+
+    Args:
+        file: The file.
+        robot: The robot that was measured.
+        path: The value of `--path`: None where neither it nor `--from-rest` was given.
+    """
+    from notchflex.fit.measurements.csv import read_measurements
+
+    measured = read_measurements(file, robot, from_rest=None if path is None else not path)
+    if measured.order:
+        terminal.note(f"{measured.source}: {measured.order}.")
+    if measured.ignored:
+        terminal.note(f"{measured.source}: ignored columns: {', '.join(measured.ignored)}.")
+    if measured.negative_forces:
+        count = measured.negative_forces
+        are = "force is" if count == 1 else "forces are"
+        terminal.note(
+            f"{measured.source}: {count} measured {are} negative (sensor offset); the model "
+            "uses 0 N."
+        )
+    return measured

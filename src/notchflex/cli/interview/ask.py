@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -24,7 +24,7 @@ Result = TypeVar("Result")
 
 
 class _GoBack(Exception):  # noqa: N818
-    """A person wants to answer the previous question again: no error."""
+    """A person wants to answer the previous question again: not an error."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Question:
     Attributes:
         option: The option that answers it, for example `--depth`.
         text: What is asked, with its unit.
-        read: Turns the answer into a value; raises `InputError` with what is allowed.
+        read: Converts the answer to a value; raises `InputError` with what is allowed.
         default: The answer taken when none is given; None where one is needed.
         hint: How to measure it, shown once before it is asked.
     """
@@ -45,17 +45,24 @@ class Question:
     default: str | None = None
     hint: str = ""
 
+    def value(self, answer: str) -> Any:
+        """Convert an answer; errors begin with the option and the answer."""
+        try:
+            return self.read(answer.strip())
+        except InputError as problem:
+            raise InputError(f"{self.option} {answer}: {problem}", problem.code) from None
+
 
 class Interview:
     """Takes answers from options first, then from a person or a pipe.
 
     Args:
-        given: Option to what the command line said; None where it said nothing.
+        answers: Option to its value on the command line; None where it was not given.
         accept_defaults: Take every default without asking.
     """
 
-    def __init__(self, given: dict[str, str | None], *, accept_defaults: bool = False) -> None:
-        self.given = given
+    def __init__(self, answers: Mapping[str, str | None], *, accept_defaults: bool = False) -> None:
+        self.answers = answers
         self.accept_defaults = accept_defaults
         self.defaulted: set[str] = set()
         self.used: set[str] = set()
@@ -64,15 +71,16 @@ class Interview:
         self._typed: list[str] = []
         self._asked = 0
 
-    def set_values(self, section: str) -> dict[str, Any]:
-        """Return what `--set` gave for a section, but for what a question asks; numbers as such."""
+    def set_values(self, section: str, *, but: Container[str]) -> dict[str, Any]:
+        """Return the values of `--set` for a section, numbers as such, without some keys."""
         start = f"--set {section}."
-        self.used |= {option for option in self.given if option.startswith(start)}
-        return {
-            option.removeprefix(start): parse_value(said)
-            for option, said in self.given.items()
-            if option.startswith(start) and said is not None
+        values = {
+            option.removeprefix(start): parse_value(answer)
+            for option, answer in self.answers.items()
+            if option.startswith(start) and answer and option.removeprefix(start) not in but
         }
+        self.used |= {f"{start}{key}" for key in values}
+        return values
 
     def conduct(self, questions: Callable[[Interview], Result]) -> Result:
         """Return what the answers make; a person may go back from question to question.
@@ -84,7 +92,7 @@ class Interview:
         Raises:
             InputError: As `ask`.
         """
-        told = False
+        warned = False
         while True:
             self.defaulted.clear()
             self._asked = 0
@@ -93,9 +101,9 @@ class Interview:
             except _GoBack:
                 if self._typed:
                     self._typed.pop()
-                elif not told:
-                    self._tell("This is the first question.")
-                    told = True
+                elif not warned:
+                    _show("This is the first question.")
+                    warned = True
 
     def ask(self, question: Question) -> Any:
         """Return the value of an answer; a person who errs is asked again.
@@ -103,19 +111,19 @@ class Interview:
         Raises:
             InputError: A bad answer that was not typed by a person, or none where one is needed.
         """
-        said = self.given.get(question.option)
-        if said is not None:
+        answer = self.answers.get(question.option)
+        if answer is not None:
             self.used.add(question.option)
-            return self._read(question, said)
+            return question.value(answer)
         if question.default is not None and self.accept_defaults:
-            return self._default(question)
+            return self._value(question, "")
         self._asked += 1
         if self._asked <= len(self._typed):
             return self._value(question, self._typed[self._asked - 1])
         if self.person and self._asked == 1:
-            self._tell(HEADER)
+            _show(HEADER)
         if question.hint and self.person:
-            self._tell(question.hint)
+            _show(question.hint)
         while True:
             answer = self._line(question)
             if self.person and answer in BACK:
@@ -125,19 +133,20 @@ class Interview:
             except InputError as problem:
                 if not self.person:
                     raise
-                self._tell(str(problem))
+                _show(str(problem))
                 continue
             self._typed.append(answer)
             return value
 
     def _value(self, question: Question, answer: str) -> Any:
         if not answer and question.default is not None:
-            return self._default(question)
-        return self._read(question, answer)
+            self.defaulted.add(question.option)
+            answer = question.default
+        return question.value(answer)
 
     def _line(self, question: Question) -> str:
         shown = f" ({question.default})" if question.default is not None else ""
-        # A pipe needs no prompt, and what is printed would only be noise in a log.
+        # A pipe needs no prompt, which would only be noise in a log.
         *before, prompt = _lines(f"{question.text}{shown}:") if self.person else [""]
         for line in before:
             print(line)
@@ -145,7 +154,7 @@ class Interview:
             return input(f"{prompt} " if prompt else "").strip()
         except UnicodeDecodeError:
             raise InputError.BAD_SYNTAX(
-                f"{question.text}: the answer is no text in {sys.stdin.encoding}."
+                f"{question.text}: the answer is not text in {sys.stdin.encoding}."
             ) from None
         except EOFError:
             if question.default is not None:
@@ -154,26 +163,14 @@ class Interview:
                 f"No answer to: {question.text}. Give {question.option}, or a line of input."
             ) from None
 
-    def _default(self, question: Question) -> Any:
-        self.defaulted.add(question.option)
-        return self._read(question, question.default or "")
 
-    @staticmethod
-    def _tell(text: str) -> None:
-        for line in _lines(text, "  "):
-            print(line)
-
-    @staticmethod
-    def _read(question: Question, answer: str) -> Any:
-        try:
-            return question.read(answer.strip())
-        except InputError as problem:
-            raise InputError(f"{question.option} {answer}: {problem}", problem.code) from None
+def _show(text: str) -> None:
+    for line in _lines(text, "  "):
+        print(line)
 
 
 def _lines(text: str, indent: str = "") -> list[str]:
-    """Break a text at its words for the width of the terminal; long words stay whole."""
-    # Room for the answer behind the last line.
+    """Break a text at its words for the width of the terminal, with room for the answer."""
     width = max(30, shutil.get_terminal_size((80, 24)).columns - 12)
     return textwrap.wrap(
         text,

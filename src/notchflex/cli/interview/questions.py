@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+import typing
+from collections.abc import Callable, Iterable
+from itertools import groupby
+from typing import Any, TypeVar
 
 from notchflex.cli.interview.ask import Interview, Question
-from notchflex.cli.interview.kinds import ask_kind, ask_part, ask_row
 from notchflex.cli.interview.readings import choice, reading, readings, whole
+from notchflex.cli.interview.wordings import OPTIONS, WORDINGS
 from notchflex.errors import InputError
-from notchflex.robot import ArcNotch, Capstan, Linear, Robot, Superelastic, Tendon, Tube
+from notchflex.robot import Robot, Superelastic, Tendon, Tube
+from notchflex.robot.error_messages import fields_of, kind_of
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.robot import MOST_NOTCHES
 
 ALLOWED_STRAIN = "0.08"
 NITINOL_DENSITY = 6450.0  # kg/m3
+
+T = TypeVar("T")
+
+_BOUNDS = {"gt": "above", "ge": "at_least", "lt": "below", "le": "at_most"}
 
 
 def interviewed(interview: Interview, name: str) -> Robot:
@@ -27,147 +35,98 @@ def interviewed(interview: Interview, name: str) -> Robot:
     Raises:
         InputError: An answer that cannot be used.
     """
-    ask = interview.ask
-    title = ask(Question("--title", "Title", _title, default=name))
-    tube = _ask_tube(interview)
+    # A kind that does not exist is refused before anything is asked.
+    for option, base in (
+        ("--kind", Notch),
+        ("--friction-kind", Friction),
+        ("--material", Material),
+    ):
+        if interview.answers.get(option) is not None:
+            _ask_kind(interview, option, base)
+    title = interview.ask(Question("--title", "Title", _title, default=name))
+    outer = _ask(interview, "tube", Tube, "outer_diameter")
+    inner = _ask(interview, "tube", Tube, "inner_diameter", below=outer, outer_diameter=outer)
+    tube = Tube(outer, inner, _ask(interview, "tube", Tube, "base_length"))
     notches = _ask_notches(interview, tube)
     tendons = _ask_tendons(interview, tube, notches)
-    material = _ask_material(interview)
-    friction = _ask_friction(interview)
-    return Robot(
-        name=title,
-        tube=tube,
-        notch=notches,
-        tendon=tendons,
-        material=_with_allowed_strain(interview, material),
-        friction=friction,
-    )
+    material_kind = _ask_kind(interview, "--material", Material, "Material, ")
+    material = _ask_part(interview, "material", material_kind)
+    friction_kind = _usual_or_asked(interview, "--friction-kind", Friction, "Kind of friction, ")
+    friction = _ask_part(interview, "friction", friction_kind)
+    # Asked last, so that pipes written before this question still fit.
+    material = dataclasses.replace(material, allowed_strain=_ask_strain(interview, material))
+    return Robot(title, tube, notches, tendons, material, friction)
 
 
-def _ask_tube(interview: Interview) -> Tube:
-    outer = interview.ask(
-        Question(
-            "--outer-diameter",
-            "Outer diameter of the tube [mm]",
-            lambda text: reading(text, above=0),
-        )
-    )
-    inner = interview.ask(
-        Question(
-            "--inner-diameter",
-            "Inner diameter [mm]",
-            lambda text: reading(text, above=0, below=outer),
-            hint=f"With a pin gauge, or from the wall: {outer:g}-2*wall.",
-        )
-    )
-    base = interview.ask(
-        Question(
-            "--base-length",
-            "Uncut length between the held end and the first notch [mm]",
-            lambda text: reading(text, at_least=0),
-            default="0",
-        )
-    )
-    return Tube(outer_diameter=outer, inner_diameter=inner, base_length=base)
+def _ask_kind(interview: Interview, option: str, base: type[T], text: str = "") -> type[T]:
+    """Ask for a kind of notch, material or friction; the usual one stands first."""
+    kinds = kinds_of(base)
+    usual = next(kind for _, kind in WORDINGS if kind in kinds)
+    names = tuple(dict.fromkeys((usual, *kinds)))
+    question = f"{text}{' or '.join(names)}"
+    return kinds[interview.ask(Question(option, question, lambda said: choice(said, names), usual))]
 
 
-def _ask_friction(interview: Interview) -> Friction:
-    kind = ask_kind(interview, "--friction-kind", "Kind of friction", Friction, "capstan")
-    if kind is not Capstan:
-        return ask_part(interview, "friction", kind)
-    coefficient = interview.ask(
-        Question(
-            "--friction",
-            "Friction coefficient between tendon and tube",
-            lambda text: reading(text, at_least=0),
-            default="0.13",
-        )
-    )
-    return Capstan(coefficient, **interview.set_values("friction"))
+def _usual_or_asked(interview: Interview, option: str, base: type[T], text: str) -> type[T]:
+    """Ask a person for a kind; a pipe that gives no option means the usual one."""
+    if interview.person or interview.answers.get(option) is not None:
+        return _ask_kind(interview, option, base, text)
+    kinds = kinds_of(base)
+    return kinds[next(kind for _, kind in WORDINGS if kind in kinds)]
+
+
+def _ask_part(interview: Interview, section: str, kind: type[T]) -> T:
+    """Ask for the keys of a part: those that have a wording, or all where none has."""
+    worded = WORDINGS.get((section, kind_of(kind)))
+    keys = worded or [
+        key for key in fields_of(kind) if key not in ("kind", "repeat", "allowed_strain")
+    ]
+    values: dict[str, Any] = {}
+    if worded:
+        values = interview.set_values(section, but=(*keys, "allowed_strain"))
+        if kind is Superelastic:
+            values = {"density": NITINOL_DENSITY, **values}
+    values |= {key: _ask(interview, section, kind, key) for key in keys}
+    return kind(**values)
 
 
 def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
-    kind = ask_kind(interview, "--kind", "Kind of notch", Notch, "arc")
-    if kind is not ArcNotch:
-        return ask_row(interview, kind)
-    cut = interview.ask(
-        Question(
-            "--cut",
-            "Cut, on-axis or off-axis",
-            lambda text: choice(text, ("on-axis", "off-axis")),
-            hint="on-axis: a laser aimed at the axis leaves radial edges. off-axis: a saw or wire "
-            "leaves one straight edge. It changes the stiffness by a third to a half.",
-        )
-    )
-    count = interview.ask(
+    """Ask for the number of notches of a kind, and for their keys: one value, or one for each."""
+    kind = _usual_or_asked(interview, "--kind", Notch, "Kind of notch, ")
+    worded = WORDINGS.get(("notch", kind_of(kind)))
+    keys = list(worded or (key for key in fields_of(kind) if key not in ("kind", "repeat")))
+    same = {"cut": _ask(interview, "notch", kind, "cut")} if "cut" in keys else {}
+    count: int = interview.ask(
         Question(
             "--notches",
             "Number of notches",
             lambda text: whole(text, at_least=1, at_most=MOST_NOTCHES),
         )
     )
-    each = "" if count == 1 else f"; one value, or {count} joined by commas, base to tip"
-    depths = interview.ask(
-        Question(
-            "--depth",
-            f"Depth of the cut [mm]{each}",
-            lambda text: readings(text, count, above=0, below=tube.outer_diameter),
-            hint="From the outer surface opposite the spine. If you measure what is left at the "
-            f"spine, type {tube.outer_diameter:g}-left.",
+    # From the drawing, unless told otherwise.
+    further = {"ends": "shell"} if "ends" in fields_of(kind) and "ends" not in keys else {}
+    further |= interview.set_values("notch", but=tuple(keys))
+    columns: dict[str, list[Any]] = {
+        key: [value] * count for key, value in (same | further).items()
+    }
+    for key in (key for key in keys if key not in same):
+        limits = {"below": tube.outer_diameter} if key == "depth" else {}
+        columns[key] = _ask(
+            interview, "notch", kind, key, count, outer_diameter=tube.outer_diameter, **limits
         )
-    )
-    heights = interview.ask(
-        Question(
-            "--height",
-            f"Height of the notch along the tube [mm]{each}",
-            lambda text: readings(text, count, above=0),
-        )
-    )
-    uncut = interview.ask(
-        Question(
-            "--uncut-length",
-            f"Uncut length behind the notch, toward the tip [mm]{each}",
-            lambda text: readings(text, count, at_least=0),
-        )
-    )
-    directions = interview.ask(
-        Question(
-            "--direction",
-            f"Direction toward which it bends [deg]{each}",
-            lambda text: readings(text, count),
-            default="0",
-        )
-    )
-    bent = interview.ask(
-        Question(
-            "--precurvature",
-            f"Angle of the notch when nothing pulls [deg]{each}",
-            lambda text: readings(text, count),
-            default="0",
-        )
-    )
-    rows = list(zip(depths, heights, uncut, directions, bent, strict=True))
-    return tuple(
-        ArcNotch(
-            cut=cut,
-            depth=row[0],
-            height=row[1],
-            uncut_length=row[2],
-            direction_deg=row[3],
-            precurvature_deg=row[4],
-            repeat=repeat,
-        )
-        for row, repeat in _runs(rows)
-    )
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    runs = [list(run) for _, run in groupby(enumerate(rows), key=lambda item: item[1])]
+    return tuple(kind(**kind.further_on(run[0][1], run[0][0]), repeat=len(run)) for run in runs)
 
 
 def _ask_tendons(
     interview: Interview, tube: Tube, notches: tuple[Notch, ...]
 ) -> tuple[Tendon, ...]:
-    radii = interview.ask(
+    radius, direction = WORDINGS["tendon", ""].values()
+    radii: list[float] = interview.ask(
         Question(
-            "--tendon-radius",
-            "Distance of the tendon from the tube axis [mm]; several tendons joined by commas",
+            radius.option,
+            radius.text,
             lambda text: [
                 reading(part.strip(), above=0, at_most=tube.outer_radius)
                 for part in text.split(",")
@@ -175,104 +134,104 @@ def _ask_tendons(
             default=f"{tube.inner_radius:g}",
         )
     )
-    directions = interview.ask(
+    directions: list[float] = interview.ask(
         Question(
-            "--tendon-direction",
-            "Side on which the tendon runs [deg]; 0 is where notches of direction 0 bend to",
+            direction.option,
+            direction.text,
             lambda text: readings(text, len(radii)),
             default="0" if len(radii) == 1 else None,
         )
     )
-    further = interview.set_values("tendon")
+    further = interview.set_values("tendon", but=("radius", "direction_deg"))
     tendons = [
-        Tendon(radius=radius, direction_deg=direction, **further)
+        Tendon(radius, direction, **further)
         for radius, direction in zip(radii, directions, strict=True)
     ]
-    # Over a strip or a link there is no arc of the wall: such a tendon runs straight.
-    no_arc = any("path" in dict(one.tendon_problems(tendons[0])) for one in notches)
-    if no_arc and "path" not in further:
+    # Over a strip or a link there is no arc of the wall, and in finite elements the tendon of a
+    # wrist spans its notches: such a tendon runs straight.
+    straight = any(
+        "path" in dict(one.tendon_problems(tendons[0])) or one.has_elastic_ends for one in notches
+    )
+    if straight and "path" not in further:
         tendons = [dataclasses.replace(tendon, path="straight") for tendon in tendons]
     return tuple(tendons)
 
 
-def _ask_material(interview: Interview) -> Material:
-    ask = interview.ask
-    kinds = tuple(dict.fromkeys(("superelastic", "linear", *kinds_of(Material))))
-    kind = ask(
-        Question(
-            "--material",
-            f"Material, {' or '.join(kinds)}",
-            lambda text: choice(text, kinds),
-            default="superelastic",
-        )
-    )
-    if kind not in ("superelastic", "linear"):
-        return ask_part(interview, "material", kinds_of(Material)[kind])
-    further: dict[str, Any] = interview.set_values("material")
-    modulus = ask(
-        Question(
-            "--elastic-modulus",
-            "Elastic modulus [MPa]",
-            lambda text: reading(text, above=0),
-            default="10000" if kind == "superelastic" else None,
-            hint="10000 is the value fitted to laser-cut Nitinol wrists (Pacheco 2021).",
-        )
-    )
-    if kind == "linear":
-        return Linear(elastic_modulus=modulus, **further)
-    values: dict[str, Any] = {"density": NITINOL_DENSITY, **further}
-    return Superelastic(
-        elastic_modulus=modulus,
-        superelastic_modulus=ask(
-            Question(
-                "--superelastic-modulus",
-                "Modulus of the superelastic branch [MPa]",
-                lambda text: reading(text, above=0),
-                default="3000",
-            )
-        ),
-        transition_strain=ask(
-            Question(
-                "--transition-strain",
-                "Strain where the superelastic branch begins",
-                lambda text: reading(text, above=0, below=0.1),
-                default="0.028",
-            )
-        ),
-        **values,
-    )
-
-
-def _with_allowed_strain(interview: Interview, material: Material) -> Material:
-    """Ask last for the strain to warn of: what was piped before this was asked still fits."""
+def _ask_strain(interview: Interview, material: Material) -> float | None:
+    """Ask for the strain to warn of."""
     superelastic = isinstance(material, Superelastic)
-    allowed = interview.ask(
+    wording = WORDINGS["material", ""]["allowed_strain"]
+    hint = "Where the material yields: yield strength over elastic modulus."
+    return interview.ask(
         Question(
-            "--allowed-strain",
-            "Allowed strain, beyond which a simulation warns; none for no warning",
-            _strain,
+            wording.option,
+            wording.text,
+            lambda text: None if text.lower() == "none" else reading(text, above=0, at_most=1),
             default=ALLOWED_STRAIN if superelastic else "none",
-            hint="Superelastic nitinol usually recovers 8 %: 0.08."
-            if superelastic
-            else "Where the material yields: yield strength over elastic modulus.",
+            hint="Superelastic nitinol usually recovers 8 %: 0.08." if superelastic else hint,
         )
     )
-    return dataclasses.replace(material, allowed_strain=allowed)
 
 
-def _strain(text: str) -> float | None:
-    return None if text.lower() == "none" else reading(text, above=0, at_most=1)
+def _ask(
+    interview: Interview,
+    section: str,
+    kind: type,
+    key: str,
+    count: int | None = None,
+    *,
+    outer_diameter: float = 0.0,
+    **limits: float,
+) -> Any:
+    """Ask for a key of a part: a value, or a list with one for each of `count` notches."""
+    field = fields_of(kind)[key]
+    wording = WORDINGS.get((section, kind_of(kind)), {}).get(key)
+    if wording is not None and wording.below is not None:
+        limits["below"] = wording.below
+    read, is_choice = _reader(field, count, limits)
+    default = None
+    if not field.is_required():
+        default = "none" if field.default is None else f"{field.default}".removesuffix(".0")
+    if wording is None:
+        unit = (field.json_schema_extra or {}).get("unit")
+        text = f"{section}.{key}, {field.description}" + (f" [{unit}]" if unit else "")
+        option = OPTIONS.get((section, key), f"--set {section}.{key}")
+        return interview.ask(Question(option, text, read, default))
+    several = count is not None and count > 1 and not is_choice
+    each = f"; one value, or {count} joined by commas, base to tip" if several else ""
+    hint = wording.hint.format(outer_diameter=outer_diameter)
+    default = wording.default or default
+    return interview.ask(Question(wording.option, wording.text + each, read, default, hint))
 
 
-def _runs(rows: list[tuple[float, ...]]) -> list[tuple[tuple[float, ...], int]]:
-    """Gather equal neighbours: what a robot file writes with `repeat`."""
-    runs: list[tuple[tuple[float, ...], int]] = []
-    for row in rows:
-        if runs and runs[-1][0] == row:
-            runs[-1] = (row, runs[-1][1] + 1)
-        else:
-            runs.append((row, 1))
-    return runs
+def _reader(
+    field: Any, count: int | None, limits: dict[str, float]
+) -> tuple[Callable[[str], Any], bool]:
+    """Return what reads an answer for a field, and whether it is a choice of words."""
+    choices = typing.get_args(field.annotation)
+
+    def each(value: Any) -> Any:
+        return value if count is None else [value] * count
+
+    if typing.get_origin(field.annotation) is typing.Literal:
+        return lambda text: each(choice(text, choices)), True
+    constraints: Iterable[Any] = field.metadata
+    bounds: dict[str, float] = {
+        word: getattr(one, name)
+        for one in constraints
+        for name, word in _BOUNDS.items()
+        if getattr(one, name, None) is not None
+    } | limits
+    for limit, other in (("above", "at_least"), ("below", "at_most")):
+        if limit in bounds:  # the other one then is only the limit of the unit
+            bounds.pop(other, None)
+
+    def read(text: str) -> Any:
+        if type(None) in choices and text.lower() == "none":
+            return each(None)
+        return reading(text, **bounds) if count is None else readings(text, count, **bounds)
+
+    return read, False
 
 
 def _title(text: str) -> str:

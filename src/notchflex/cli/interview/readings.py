@@ -1,4 +1,4 @@
-"""What is typed as a reading: numbers, sums of numbers, one for each notch, words."""
+"""Typed readings: numbers, sums of numbers, one for each notch, words."""
 
 from __future__ import annotations
 
@@ -15,24 +15,20 @@ _OPERATIONS: dict[type, Callable[[float, float], float]] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
 }
+_BOUNDS = {
+    "above": (operator.gt, "greater than"),
+    "at_least": (operator.ge, "at least"),
+    "below": (operator.lt, "less than"),
+    "at_most": (operator.le, "at most"),
+}
 
 
-def reading(
-    text: str,
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    below: float | None = None,
-    at_most: float | None = None,
-) -> float:
-    """Return a number from what was typed; sums such as `1.62-0.22` are worked out.
+def reading(text: str, **bounds: float) -> float:
+    """Return a typed number; sums such as `1.62-0.22` are evaluated.
 
     Args:
         text: A number, or numbers joined by + - * /.
-        above: The number must be greater.
-        at_least: The number must not be less.
-        below: The number must be less.
-        at_most: The number must not be greater.
+        **bounds: `above`, `at_least`, `below`, `at_most`: limits of the number.
 
     Raises:
         InputError: Not a number, not finite, or outside its bounds.
@@ -44,21 +40,13 @@ def reading(
     try:
         value = _evaluate(ast.parse(text.replace("−", "-"), mode="eval").body)
     except (ValueError, SyntaxError, ZeroDivisionError, OverflowError, RecursionError, MemoryError):
-        got = repr(text) if text else "nothing"
         raise InputError.NOT_A_NUMBER(
-            f"got {got}; give a number such as 1.62, or a sum: 1.62-0.22."
+            f"got {_got(text)}; give a number such as 1.62, or a sum: 1.62-0.22."
         ) from None
-    bounds = [
-        (above, operator.gt, "greater than"),
-        (at_least, operator.ge, "at least"),
-        (below, operator.lt, "less than"),
-        (at_most, operator.le, "at most"),
-    ]
-    allowed = " and ".join(f"{words} {bound:g}" for bound, _, words in bounds if bound is not None)
-    wanted = f"a finite number {allowed}".strip()
-    if not math.isfinite(value) or any(
-        bound is not None and not holds(value, bound) for bound, holds, _ in bounds
-    ):
+    checks = [(*_BOUNDS[word], bounds[word]) for word in _BOUNDS if word in bounds]
+    if not math.isfinite(value) or not all(holds(value, bound) for holds, _, bound in checks):
+        allowed = " and ".join(f"{words} {bound:g}" for _, words, bound in checks)
+        wanted = f"a finite number {allowed}".strip()
         raise InputError.OUT_OF_RANGE(f"got {value:g}; give {wanted}.")
     # Nobody reads callipers to a nanometre; this drops the noise of 1.62-0.22.
     return round(value, 9)
@@ -85,13 +73,12 @@ def choice(text: str, allowed: tuple[str, ...]) -> str:
     Raises:
         InputError: Not one of them, or the beginning of several.
     """
-    found = [word for word in allowed if word == text] or [
+    matches = [word for word in allowed if word == text] or [
         word for word in allowed if text and word.startswith(text.lower())
     ]
-    if len(found) != 1:
-        got = repr(text) if text else "nothing"
-        raise InputError.UNKNOWN_NAME(f"got {got}; give {' or '.join(allowed)}.")
-    return found[0]
+    if len(matches) != 1:
+        raise InputError.UNKNOWN_NAME(f"got {_got(text)}; give {' or '.join(allowed)}.")
+    return matches[0]
 
 
 def whole(text: str, *, at_least: int, at_most: int) -> int:
@@ -103,11 +90,14 @@ def whole(text: str, *, at_least: int, at_most: int) -> int:
     try:
         value = int(text)
     except ValueError:
-        got = repr(text) if text else "nothing"
-        raise InputError.NOT_A_NUMBER(f"got {got}; give a whole number.") from None
+        raise InputError.NOT_A_NUMBER(f"got {_got(text)}; give a whole number.") from None
     if not at_least <= value <= at_most:
         raise InputError.OUT_OF_RANGE(f"got {value}; give {at_least} to {at_most}.")
     return value
+
+
+def _got(text: str) -> str:
+    return repr(text) if text else "nothing"
 
 
 def _evaluate(node: ast.expr) -> float:

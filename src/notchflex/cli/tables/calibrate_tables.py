@@ -18,27 +18,27 @@ _ROWS = 16
 """More candidates than that are thinned."""
 
 
-def print_calibration(found: Calibration) -> None:
+def print_calibration(fit: Calibration) -> None:
     """Print constants, their intervals, problems found, and the errors of every part."""
     from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose
     from notchflex.fit.documents import data_of
 
     console = terminal.output()
-    for label in found.given:
-        console.print(f"{label}: {', '.join(data_of(found, label))}", soft_wrap=True)
-    kind = type(found.problem.objective).__name__
-    count = len(found.searches)
-    console.print(f"{_numbers(found)}; {count} search{'es' if count > 1 else ''}")
-    chi = found.reduced_chi_squared
+    for label in fit.given:
+        console.print(f"{label}: {', '.join(data_of(fit, label))}", soft_wrap=True)
+    kind = type(fit.problem.objective).__name__
+    count = len(fit.searches)
+    console.print(f"{_numbers(fit)}; {count} search{'es' if count > 1 else ''}")
+    chi = fit.reduced_chi_squared
     noise = f"; reduced chi squared {chi:.3g} (about 1: as noise)" if math.isfinite(chi) else ""
-    console.print(f"{kind} {found.cost:.6g}{noise}")
+    console.print(f"{kind} {fit.cost:.6g}{noise}")
     console.print()
-    _print_constants(console, found)
+    _print_constants(console, fit)
     console.print()
-    for sentence in diagnose(found) or (NO_PROBLEMS,):
+    for sentence in diagnose(fit) or (NO_PROBLEMS,):
         console.print(sentence)
     console.print()
-    _print_errors(console, found)
+    _print_errors(console, fit)
 
 
 def print_left_out(left_out: LeftOut) -> None:
@@ -99,37 +99,37 @@ def print_posterior(drawn: Posterior) -> None:
     console.print(terminal.table(heads, rows))
 
 
-def _print_constants(console: Console, found: Calibration) -> None:
-    interval = [">95 % interval"] if found.intervals else []
+def _print_constants(console: Console, fit: Calibration) -> None:
+    interval = [">95 % interval"] if fit.intervals else []
     rows = [
         [
             name,
             f"{value:.5g}",
-            found.units[name],
-            *([_interval(found.intervals[name])] if name in found.intervals else []),
-            _plain(found.deviations[name], 2),
+            fit.units[name],
+            *([_interval(fit.intervals[name])] if name in fit.intervals else []),
+            _plain(fit.deviations[name], 2),
         ]
-        for name, value in found.values.items()
+        for name, value in fit.values.items()
     ]
     console.print(terminal.table(["constant", ">value", "unit", *interval, ">deviation"], rows))
 
 
-def _print_errors(console: Console, found: Calibration) -> None:
+def _print_errors(console: Console, fit: Calibration) -> None:
     from notchflex.fit.assessment.errors_of_parts import errors_of_parts
 
     heads = ["robot", "measured", ">rms error", ">between repeats", "unit"]
     rows = [
         [one.robot, one.title, _plain(one.error), _plain(one.repeats), one.unit]
-        for one in errors_of_parts(found)
+        for one in errors_of_parts(fit)
     ]
     console.print(terminal.table(heads, rows))
 
 
-def _numbers(found: Calibration) -> str:
+def _numbers(fit: Calibration) -> str:
     """Return how many numbers count, and how many do not."""
-    counted = found.counted
+    counted = fit.counted
     words = f"{counted} number{'s' * (counted > 1)} measured"
-    rest = len(found.residuals) - counted
+    rest = len(fit.residuals) - counted
     if not rest:
         return words
     return f"{words} (and {rest} total angle{'s' * (rest > 1)}, the sum of the notches)"

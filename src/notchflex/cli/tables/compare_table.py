@@ -33,7 +33,7 @@ def print_comparison(comparison: Comparison, others: dict[str, Comparison]) -> N
         some = columns[first : first + MOST_COLUMNS]
         heads = ["root-mean-square error\n", *(f">{head}" for head, _ in some)]
         rows = [
-            [label if len(label) <= 24 else f"{label[:23]}…", *(cells[n] for _, cells in some)]
+            [terminal.shortened(label, 24), *(cells[n] for _, cells in some)]
             for n, label in enumerate(models)
         ]
         console.print(terminal.table(heads, rows))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from itertools import groupby, pairwise
+from itertools import compress, groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from notchflex.cli import terminal
 from notchflex.robot import Robot
+from notchflex.robot.error_messages import fields_of
 from notchflex.robot.robot import to_table
 
 if TYPE_CHECKING:
@@ -22,25 +23,12 @@ _MEANINGS = {
     NOT_FOUND: "the solver did not converge at the tensions in question, so the notch may close; "
     "`notchflex simulate` shows how far it bends",
 }
-_UNITS = {
-    "elastic_modulus": "MPa",
-    "superelastic_modulus": "MPa",
-    "plastic_modulus": "MPa",
-    "density": "kg/m3",
-}
 SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
 """Heads for what every notch has, so that there is room for what is its own."""
 
 
 def print_robot(robot: Robot, title: str, length: float, notches: list[dict[str, Any]]) -> None:
-    """Print what `notchflex show` shows.
-
-    Args:
-        robot: The robot.
-        title: The first line.
-        length: Length of the robot, mm.
-        notches: The rows of `analysis.notch_table`.
-    """
+    """Print what `notchflex show` shows."""
     console = terminal.output()
     tube = robot.tube
     console.print(title, style="bold", soft_wrap=True)
@@ -48,8 +36,8 @@ def print_robot(robot: Robot, title: str, length: float, notches: list[dict[str,
         f"tube      outer diameter {tube.outer_diameter:g} mm, inner diameter "
         f"{tube.inner_diameter:g} mm, length {length:g} mm"
     )
-    for title in ("material", "friction"):
-        console.print(_hanging(title, _summary(to_table(robot)[title])))
+    for part in ("material", "friction"):
+        console.print(_summary(robot, part))
     for index, tendon in enumerate(robot.tendon, start=1):
         number = f" {index}" if len(robot.tendon) > 1 else ""
         end = robot.number_of_notches if tendon.end_body is None else tendon.end_body
@@ -71,24 +59,22 @@ def description_tables(robot: Robot) -> list[Table]:
     """Return how the notches are cut, with one table for each kind; equal notches share a row."""
     from notchflex.analysis.notch_table import named_values
 
-    rows: dict[str, dict[tuple[Any, ...], list[int]]] = {}
+    kinds: dict[str, dict[tuple[Any, ...], list[int]]] = {}
     names: dict[str, list[str]] = {}
     for number, notch in enumerate(robot.notches, start=1):
         values = named_values(notch)
         kind = values.pop("kind")
-        names[kind] = list(values)
-        rows.setdefault(kind, {}).setdefault(tuple(values.values()), []).append(number)
-    return [_description(kind, names[kind], alike) for kind, alike in rows.items()]
-
-
-def _description(kind: str, names: list[str], alike: dict[tuple[Any, ...], list[int]]) -> Table:
-    given = [place for place in range(len(names)) if any(one[place] is not None for one in alike)]
-    heads = [_head(names[place]) for place in given]
-    cells = [
-        [run_of(numbers), *(_value(values[place]) for place in given)]
-        for values, numbers in alike.items()
-    ]
-    return _filled([f"{kind}\nnotch", *heads], cells)
+        names[kind] = [SHORTER.get(name, name).replace("_", "\n") for name in values]
+        kinds.setdefault(kind, {}).setdefault(tuple(values.values()), []).append(number)
+    tables: list[Table] = []
+    for kind, alike in kinds.items():
+        used = [any(value is not None for value in column) for column in zip(*alike, strict=True)]
+        rows = [
+            [run_of(numbers), *map(_value, compress(values, used))]
+            for values, numbers in alike.items()
+        ]
+        tables.append(_filled([f"{kind}\nnotch", *compress(names[kind], used)], rows))
+    return tables
 
 
 def run_of(numbers: list[int]) -> str:
@@ -158,10 +144,6 @@ def _numbers(rows: list[dict[str, Any]], key: str, form: str, scale: float = 1.0
     return [format(value, form) if np.isfinite(value) else NO_NUMBER for value in values]
 
 
-def _head(name: str) -> str:
-    return SHORTER.get(name, name).replace("_", "\n")
-
-
 def _value(value: Any) -> str:
     if value is None:
         return NO_NUMBER
@@ -170,28 +152,23 @@ def _value(value: Any) -> str:
 
 def _filled(heads: list[str], rows: list[list[str]]) -> Table:
     """Make a table whose columns stand two characters apart, or one where it would be too wide."""
-    # Units stand on one line at the foot of the heads.
-    deepest = max(head.count("\n") for head in heads)
-    widths = [
-        max(map(len, (*head.split("\n"), *(row[place] for row in rows))))
-        for place, head in enumerate(heads)
-    ]
+    columns = zip(heads, *rows, strict=True)
+    widths = [max(map(len, (*head.split("\n"), *cells))) for head, *cells in columns]
     gap = 2 if sum(widths) + 2 * len(widths) <= terminal.NARROW else 1
-    heads = ["\n" * (deepest - head.count("\n")) + head for head in heads]
     return terminal.table([f">{head}" for head in heads], rows, gap=gap)
 
 
-def _summary(table: dict[str, Any]) -> str:
-    """Return the values of a part in one line."""
-    words = [str(table["kind"])]
+def _summary(robot: Robot, part: str) -> str:
+    """Return the values of a part in one line, or in some with its title beside them."""
+    fields = fields_of(type(getattr(robot, part)))
+    table = to_table(robot)[part]
+    words = [str(table.pop("kind"))]
     for key, value in table.items():
-        if key != "kind":
-            shown = value if isinstance(value, str) else f"{value:g}"
-            words.append(f"{key.replace('_', ' ')} {shown} {_UNITS.get(key, '')}".strip())
-    return ", ".join(words)
-
-
-def _hanging(title: str, text: str) -> str:
+        unit = (fields[key].json_schema_extra or {}).get("unit", "")
+        words.append(f"{key.replace('_', ' ')} {_value(value)} {unit}".strip())
     return textwrap.fill(
-        text, width=terminal.NARROW, initial_indent=title.ljust(10), subsequent_indent=" " * 10
+        ", ".join(words),
+        width=terminal.NARROW,
+        initial_indent=part.ljust(10),
+        subsequent_indent=" " * 10,
     )

@@ -10,8 +10,7 @@ import numpy as np
 
 from notchflex._quantity import Quantity
 from notchflex.errors import InputError
-from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES
-from notchflex.results.quantities.spans import holds
+from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES, holds
 from notchflex.robot.error_messages import nearest
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ MEANINGS = {
 
 
 @dataclass(frozen=True)
-class Column:
+class PathColumn:
     """A column of the table: its head, its unit and the text of every row."""
 
     head: str
@@ -61,11 +60,11 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Group:
+class ColumnGroup:
     """Columns that are shown or left out together.
 
     Attributes:
-        names: The quantities, as `--columns` takes them; none for the number of the step.
+        names: The quantities, as `--columns` takes them.
         rank: Groups of a low rank are shown first.
         columns: The columns, in their place in the table.
         meaning: Their text in the legend, "" for none.
@@ -73,7 +72,7 @@ class Group:
 
     names: tuple[str, ...]
     rank: int
-    columns: list[Column]
+    columns: list[PathColumn]
     meaning: str = ""
 
     @property
@@ -82,14 +81,14 @@ class Group:
         return sum(column.width for column in self.columns)
 
 
-def step_group(rows: Sequence[int]) -> Group:
+def step_column(rows: Sequence[int]) -> PathColumn:
     """Return the column with the number of every step."""
-    return Group((), 0, [Column("step", "", [str(row + 1) for row in rows])])
+    return PathColumn("step", "", [str(row + 1) for row in rows])
 
 
-def usual_groups(path: EquilibriumPath, rows: Sequence[int]) -> list[Group]:
+def usual_groups(path: EquilibriumPath, rows: Sequence[int]) -> list[ColumnGroup]:
     """Return the columns that are shown where none are named, in the order of the table."""
-    groups: list[Group] = []
+    groups: list[ColumnGroup] = []
     for tendon in range(path.tension.shape[1]):
         columns = [
             _components(path, rows, QUANTITIES[name])[tendon] for name in ("tension", "stroke")
@@ -102,7 +101,7 @@ def usual_groups(path: EquilibriumPath, rows: Sequence[int]) -> list[Group]:
                     column.cells[place] = _rounded(float(command[row]), ".3f")
         commanded = bool(np.isfinite(commands).any())
         meaning = "" if tendon else _meaning("tension", "T") + "; " + _meaning("stroke", "u")
-        groups.append(Group(("tension", "stroke"), 1 if commanded else 5, columns, meaning))
+        groups.append(ColumnGroup(("tension", "stroke"), 1 if commanded else 5, columns, meaning))
     if holds(path, QUANTITIES["total_chord_angle"]):
         groups.append(_group(path, rows, "total_chord_angle", 2))
     groups.append(_group(path, rows, "notch_angle", 4))
@@ -114,20 +113,19 @@ def usual_groups(path: EquilibriumPath, rows: Sequence[int]) -> list[Group]:
     peak = np.abs(path.peak_strain).max(axis=1)
     cells = [f"{100 * peak[row]:.2f}" if path.converged[row] else NO_NUMBER for row in rows]
     strain = f"strain: {MEANINGS['strain']} [%]"
-    groups.append(Group(("peak_strain",), 3, [Column("strain", "%", cells)], strain))
+    groups.append(ColumnGroup(("peak_strain",), 3, [PathColumn("strain", "%", cells)], strain))
     return groups
 
 
-def named_groups(path: EquilibriumPath, rows: Sequence[int], names: Sequence[str]) -> list[Group]:
+def named_groups(
+    path: EquilibriumPath, rows: Sequence[int], names: Sequence[str]
+) -> list[ColumnGroup]:
     """Return the columns of the quantities that were named, in that order."""
     return [_group(path, rows, name, 1) for name in names]
 
 
 def parse_columns(text: str) -> list[str]:
     """Return the quantities that `--columns` names.
-
-    Args:
-        text: Names of the table of quantities, joined by commas.
 
     Example:
         >>> parse_columns("tension, notch_angle")
@@ -147,10 +145,10 @@ def parse_columns(text: str) -> list[str]:
     return names
 
 
-def _group(path: EquilibriumPath, rows: Sequence[int], name: str, rank: int) -> Group:
+def _group(path: EquilibriumPath, rows: Sequence[int], name: str, rank: int) -> ColumnGroup:
     quantity = QUANTITIES[name]
     columns = _components(path, rows, quantity)
-    return Group((name,), rank, columns, _meaning(name, HEADS.get(name, "")))
+    return ColumnGroup((name,), rank, columns, _meaning(name, HEADS.get(name, "")))
 
 
 def _meaning(name: str, head: str) -> str:
@@ -160,39 +158,30 @@ def _meaning(name: str, head: str) -> str:
     return f"{head}: {text}{unit}" if head else f"{text}{unit}"
 
 
-def _components(path: EquilibriumPath, rows: Sequence[int], quantity: Quantity) -> list[Column]:
+def _components(path: EquilibriumPath, rows: Sequence[int], quantity: Quantity) -> list[PathColumn]:
     """Return a column for every component of a quantity that holds anything."""
     values = getattr(path, quantity.name, None)
     if values is None:
         return []
     table = np.asarray(values)
-    columns: list[Column] = []
+    columns: list[PathColumn] = []
     for index in np.ndindex(table.shape[1:]):
         component = table[:, *index]
-        if quantity.per in (("tendon", "span"), ("tendon", "contact")) and not _any(component):
+        several = quantity.per in (("tendon", "span"), ("tendon", "contact"))
+        if several and table.dtype.kind == "f" and not np.isfinite(component).any():
             continue  # a tendon that ends before the others has fewer
         cells = [
             _cell(quantity, component[row]) if _is_valid(path, quantity, row) else NO_NUMBER
             for row in rows
         ]
-        columns.append(_marked(path, rows, quantity, index, cells))
+        head, unit = _head(quantity, index, table.shape[1:]), _unit(quantity)
+        if quantity.name == "notch_angle":
+            closed = [path.converged[row] and path.closed[row, *index] for row in rows]
+            marks = [CLOSED if one else " " for one in closed]
+            cells = [cell + mark for cell, mark in zip(cells, marks, strict=True)]
+            head, unit = f"{head} ", f"{unit} "
+        columns.append(PathColumn(head, unit, cells))
     return columns
-
-
-def _marked(
-    path: EquilibriumPath,
-    rows: Sequence[int],
-    quantity: Quantity,
-    index: tuple[int, ...],
-    cells: list[str],
-) -> Column:
-    """Return a column with its head; a star marks the angle of a closed notch."""
-    head, unit = _head(quantity, index, np.shape(getattr(path, quantity.name))[1:]), _unit(quantity)
-    if quantity.name != "notch_angle":
-        return Column(head, unit, cells)
-    closed = [path.converged[row] and path.closed[row, index[0]] for row in rows]
-    cells = [cell + (CLOSED if there else " ") for cell, there in zip(cells, closed, strict=True)]
-    return Column(f"{head} ", f"{unit} ", cells)
 
 
 def _head(quantity: Quantity, index: tuple[int, ...], shape: tuple[int, ...]) -> str:
@@ -232,10 +221,6 @@ def _cell(quantity: Quantity, value: Any) -> str:
         return _rounded(100.0 * float(value), ".2f")
     form = {"deg": ".2f", "mm": ".3f", "N": ".3f"}.get(quantity.unit, ".4g")
     return _rounded(float(value) * quantity.scale, form)
-
-
-def _any(values: np.ndarray) -> bool:
-    return values.dtype.kind != "f" or bool(np.isfinite(values).any())
 
 
 def _rounded(value: float, form: str) -> str:

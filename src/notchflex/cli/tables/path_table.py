@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from notchflex.cli import terminal
-from notchflex.cli.tables.load_words import load_sentences
-from notchflex.cli.tables.path_columns import Column, Group, named_groups, step_group, usual_groups
-from notchflex.cli.tables.path_rows import all_rows, rows_note, shown_rows
+from notchflex.cli.tables.path_columns import (
+    ColumnGroup,
+    PathColumn,
+    named_groups,
+    step_column,
+    usual_groups,
+)
+from notchflex.cli.tables.path_rows import rows_note, shown_rows
+from notchflex.loads.summary import external_words
 from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from notchflex.loads.external import ExternalLoad
     from notchflex.results import EquilibriumPath
+
+MOST_LOADS = 3
+"""More different loads than this are only counted."""
 
 
 def print_path(
@@ -30,21 +41,18 @@ def print_path(
             do not fit are left out and named, those that were asked for are continued below.
         every_row: Whether all steps of a long path are shown.
     """
-    rows, stride = all_rows(path) if every_row else shown_rows(path)
+    rows, stride = shown_rows(path, every_row=every_row)
     room = terminal.width()
     console = terminal.output(room)
     console.print(title, style="bold", soft_wrap=True)
     for sentence in load_sentences(path.load.external):
         console.print(sentence, soft_wrap=True)
-    step = step_group(rows)
-    left_out: list[Group] = []
-    if columns:
-        groups = named_groups(path, rows, columns)
-        for block in _blocks(step, groups, room):
-            _print_block(console, path, rows, block)
-    else:
-        groups, left_out = _fitting(step, usual_groups(path, rows), room)
-        _print_block(console, path, rows, [*step.columns, *_columns(groups)])
+    step = step_column(rows)
+    groups = named_groups(path, rows, columns) if columns else usual_groups(path, rows)
+    left_out = [] if columns else _without_room(groups, room - step.width)
+    groups = [group for group in groups if group not in left_out]
+    for block in _blocks(step, groups, room):
+        _print_block(console, path, rows, block)
     _print_notes(console, groups, left_out, room)
     note = rows_note(len(path), len(rows), stride)
     if note:
@@ -56,81 +64,86 @@ def print_path(
 def print_beside(
     paths: Mapping[str, EquilibriumPath], *, columns: Sequence[str] = (), every_row: bool = False
 ) -> None:
-    """Print quantities of several paths under the same loads, side by side.
-
-    Args:
-        paths: Label to path.
-        columns: Quantities to show, by their names; the total angle where none are named.
-        every_row: Whether all steps of a long path are shown.
-    """
+    """Print quantities of several paths under the same loads, side by side."""
     first = next(iter(paths.values()))
-    rows, _ = all_rows(first) if every_row else shown_rows(first)
+    rows, _ = shown_rows(first, every_row=every_row)
     room = terminal.width()
     console = terminal.output(room)
-    step = step_group(rows)
+    step = step_column(rows)
     widest = max(8, (room - step.width - len(paths)) // len(paths))
     for name in columns or ("total_angle",):
         console.print()
         console.print(f"{QUANTITIES[name].title}, beside each other", style="bold")
-        groups: list[Group] = []
-        for label, path in paths.items():
-            (group,) = named_groups(path, rows, [name])
-            groups.append(Group(group.names, 1, _labelled(group, _shortened(label, widest))))
+        groups = [
+            _labelled(group, terminal.shortened(label, widest))
+            for label, path in paths.items()
+            for group in named_groups(path, rows, [name])
+        ]
         for block in _blocks(step, groups, room):
             _print_block(console, first, rows, block)
 
 
-def _labelled(group: Group, label: str) -> list[Column]:
-    """The columns of one of several paths, under its label."""
+def load_sentences(external: Sequence[ExternalLoad]) -> list[str]:
+    """Return lines with the external loads, and their steps if not at all of them."""
+    different = list(dict.fromkeys(external))
+    if all(one.is_nothing for one in different):
+        return []
+    if len(different) > MOST_LOADS:
+        return [f"external loads: {len(different)} different ones over the steps"]
+    lines: list[str] = []
+    for one in different:
+        steps = [number for number, other in enumerate(external, start=1) if other == one]
+        where = "" if len(different) == 1 else _steps(steps)
+        text = f"external loads{where}: {', '.join(external_words(one)) or 'none'}"
+        lines += textwrap.wrap(text, width=terminal.NARROW, subsequent_indent="    ")
+    return lines
+
+
+def _steps(steps: list[int]) -> str:
+    if len(steps) == 1:
+        return f", step {steps[0]}"
+    if steps == list(range(steps[0], steps[-1] + 1)):
+        return f", steps {steps[0]} to {steps[-1]}"
+    return f", {len(steps)} of the steps"
+
+
+def _labelled(group: ColumnGroup, label: str) -> ColumnGroup:
+    """Put the label of one of several paths above its columns."""
     several = len(group.columns) > 1
-    return [
-        Column(f"{label}\n{one.head}" if several else label, one.unit, one.cells)
-        for one in group.columns
+    columns = [
+        replace(column, head=f"{label}\n{column.head}" if several else label)
+        for column in group.columns
     ]
+    return ColumnGroup(group.names, 1, columns)
 
 
-def _shortened(label: str, width: int) -> str:
-    return label if len(label) <= width else f"{label[: width - 1]}…"
-
-
-def _fitting(step: Group, groups: list[Group], room: int) -> tuple[list[Group], list[Group]]:
-    """Return the groups that fit beside the step and those that do not, in their order."""
-    room -= step.width
-    chosen: list[Group] = []
+def _without_room(groups: list[ColumnGroup], room: int) -> list[ColumnGroup]:
+    """Return the groups that do not fit, low ranks first served."""
+    left_out: list[ColumnGroup] = []
     for group in sorted(groups, key=lambda group: group.rank):
         if group.width <= room:
             room -= group.width
-            chosen.append(group)
-    return (
-        [group for group in groups if group in chosen],
-        [group for group in groups if group not in chosen],
-    )
+        else:
+            left_out.append(group)
+    return left_out
 
 
-def _blocks(step: Group, groups: Sequence[Group], room: int) -> list[list[Column]]:
+def _blocks(step: PathColumn, groups: Sequence[ColumnGroup], room: int) -> list[list[PathColumn]]:
     """Divide columns into tables that fit, each with the steps; one column at least in each."""
-    blocks = [list(step.columns)]
-    for column in _columns(groups):
+    blocks = [[step]]
+    for column in (column for group in groups for column in group.columns):
         block = blocks[-1]
         if len(block) > 1 and sum(one.width for one in block) + column.width > room:
-            blocks.append([*step.columns, column])
+            blocks.append([step, column])
         else:
             block.append(column)
     return blocks
 
 
-def _columns(groups: Sequence[Group]) -> list[Column]:
-    return [column for group in groups for column in group.columns]
-
-
 def _print_block(
-    console: Console, path: EquilibriumPath, rows: Sequence[int], columns: Sequence[Column]
+    console: Console, path: EquilibriumPath, rows: Sequence[int], columns: Sequence[PathColumn]
 ) -> None:
-    # Units stand on one line at the foot of the heads.
-    deepest = max(column.head.count("\n") for column in columns)
-    above = ["\n" * (deepest - column.head.count("\n")) for column in columns]
-    heads = [f">{gap}{one.head}\n{one.unit}" for gap, one in zip(above, columns, strict=True)]
-    table = terminal.table(heads)
+    table = terminal.table([f">{column.head}\n{column.unit}" for column in columns])
     for place, row in enumerate(rows):
         style = None if path.converged[row] else "red"
         table.add_row(*(column.cells[place] for column in columns), style=style)
@@ -138,7 +151,7 @@ def _print_block(
 
 
 def _print_notes(
-    console: Console, shown: Sequence[Group], left_out: Sequence[Group], room: int
+    console: Console, shown: Sequence[ColumnGroup], left_out: Sequence[ColumnGroup], room: int
 ) -> None:
     """Explain the heads, and how to see what had no room."""
     meanings = dict.fromkeys(group.meaning for group in shown if group.meaning and group.columns)
@@ -159,7 +172,7 @@ def _print_notes(
             console.print(part.replace("\u00a0", " "), soft_wrap=True)
 
 
-def _title(group: Group) -> str:
+def _title(group: ColumnGroup) -> str:
     if group.names == ("tension", "stroke"):  # each tendon has a group of its own
         return " and ".join(column.head for column in group.columns)
     return "notch angles" if group.names == ("notch_angle",) else QUANTITIES[group.names[0]].title

@@ -30,9 +30,8 @@ def bench(
     outputs = Outputs(quiet=quiet, json=json)
     with terminal.working("timing") as progress:
         from notchflex.bench import bench_document, measured
-        from notchflex.cli.compile_cache import use_compile_cache
 
-        use_compile_cache()
+        terminal.use_compile_cache()
         rows = measured(only, progress)
     outputs.write_json(lambda: bench_document(rows))
     if outputs.prints_tables:

@@ -16,16 +16,14 @@ from notchflex.cli.arguments.fit import (
     Sources,
 )
 from notchflex.cli.arguments.loads import load_columns
-from notchflex.cli.arguments.measured import OnePath, from_rest, note_table
-from notchflex.cli.arguments.robots import Settings
-from notchflex.cli.exit_codes import BAD_INPUT, DONE, NOT_CONVERGED
+from notchflex.cli.arguments.robots import OnePath, Settings, read_data
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
+from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED
 from notchflex.errors import InputError
 from notchflex.results.files.writing import check_folder
 
 if TYPE_CHECKING:
     from notchflex.fit import Calibration
-    from notchflex.loads import LoadPath
 
 
 def calibrate(
@@ -63,24 +61,16 @@ def calibrate(
         candidates = load_columns(beyond.next, (), robot.number_of_tendons)
 
     with terminal.working("loading the solver"):
-        from notchflex.cli.compile_cache import use_compile_cache
-
-        use_compile_cache()
+        terminal.use_compile_cache()
         import notchflex.fit as fitting
-        from notchflex.loads import LoadPath
 
     _check_sensor(constants)
     measured = {
-        label: [
-            fitting.read_measurements(file, robots[label], from_rest=from_rest(path))
-            for file in files
-        ]
+        label: [read_data(file, robots[label], path) for file in files]
         for label, files in sources.data.items()
     }
-    for one in (one for every in measured.values() for one in every):
-        note_table(one)
     with terminal.bars() as progress:
-        found = fitting.calibrate(
+        fit = fitting.calibrate(
             robots,
             measured,
             [fitting.Constant(*one) for one in constants],
@@ -89,19 +79,18 @@ def calibrate(
             seed=search.seed,
             progress=progress,
         )
-        loads = None if candidates is None else LoadPath(*candidates)
-        analyses, problems = _analyse(found, beyond, loads, search.seed, progress)
+        analyses, problems = _analyse(fit, beyond, candidates, search.seed, progress)
     if output is not None:
         from notchflex.fit.fitted_robots import write_fitted
 
-        files = write_fitted(found, output, inputs=sources.files)
+        files = write_fitted(fit, output, inputs=sources.files)
         terminal.note(f"written: {', '.join(map(str, files))}.")
-    _write(found, analyses, outputs)
+    _write(fit, analyses, outputs)
     for problem in problems:
         terminal.error(problem)
-    if not found.converged:
-        terminal.error(f"not converged: {found.reason}. Try --starts or --bounds.")
-    return BAD_INPUT if problems else DONE if found.converged else NOT_CONVERGED
+    if not fit.converged:
+        terminal.error(f"not converged: {fit.reason}. Try --starts or --bounds.")
+    return BAD_INPUT if problems else DONE if fit.converged else NOT_CONVERGED
 
 
 def _check_sensor(constants: Sequence[ParameterSpec]) -> None:
@@ -115,7 +104,7 @@ def _check_sensor(constants: Sequence[ParameterSpec]) -> None:
 
 
 def _fitted_files(sources: DataSources, folder: str | None) -> dict[str, str]:
-    """Return the files of `--output`, checked, by the words that messages call them by."""
+    """Return the files of `--output`, checked, by what messages call them."""
     if folder is None:
         return {}
     names = [f"{label}.toml" for label in sources.robots]
@@ -124,73 +113,72 @@ def _fitted_files(sources: DataSources, folder: str | None) -> dict[str, str]:
 
 
 def _analyse(
-    found: Calibration,
+    fit: Calibration,
     beyond: BeyondFit,
-    candidates: LoadPath | None,
+    candidates: tuple[Any, Any] | None,
     seed: int,
     progress: Callable[[str, int, int], None] | None,
 ) -> tuple[dict[str, Any], list[str]]:
     """Make the analyses beyond the fit; one that fails must not lose the fit.
 
     Returns:
-        The results by their JSON keys, and what failed.
+        The results by their options, and what failed.
     """
     import notchflex.fit as fitting
+    from notchflex.loads import LoadPath
 
-    wanted: dict[str, tuple[str, Callable[[], object]]] = {}
-    if beyond.leave_out is not None:
-        by = beyond.leave_out
-        wanted["left_out"] = (
-            "--leave-out",
-            lambda: fitting.leave_out(found, by=by, seed=seed, progress=progress),
-        )
-    if candidates is not None:
-        wanted["next_measurement"] = (
-            "--next",
-            lambda: fitting.next_measurement(
-                found, candidates, robot=beyond.next_robot, narrow=beyond.narrow
-            ),
-        )
-    if beyond.posterior:
-        wanted["posterior"] = (
-            "--posterior",
-            lambda: fitting.sample_posterior(
-                found, draws=beyond.draws, seed=seed, progress=progress
-            ),
-        )
     results: dict[str, Any] = {}
     problems: list[str] = []
-    for key, (option, compute) in wanted.items():
+
+    def attempt(option: str, analysis: Callable[..., object], **arguments: Any) -> None:
         try:
-            results[key] = compute()
+            results[option] = analysis(fit, **arguments)
         except InputError as problem:
             problems.append(f"{option}: {problem}")
+
+    if by := beyond.leave_out:
+        attempt("--leave-out", fitting.leave_out, by=by, seed=seed, progress=progress)
+    if candidates is not None:
+        attempt(
+            "--next",
+            fitting.next_measurement,
+            candidates=LoadPath(*candidates),
+            robot=beyond.next_robot,
+            narrow=beyond.narrow,
+        )
+    if beyond.posterior:
+        attempt(
+            "--posterior",
+            fitting.sample_posterior,
+            draws=beyond.draws,
+            seed=seed,
+            progress=progress,
+        )
     return results, problems
 
 
-def _write(found: Calibration, analyses: dict[str, Any], outputs: Outputs) -> None:
+def _write(fit: Calibration, analyses: dict[str, Any], outputs: Outputs) -> None:
     from notchflex.cli.tables import calibrate_tables as tables
     from notchflex.fit import documents
 
-    make: dict[str, tuple[Callable[[Any], Any], Callable[[Any], None]]] = {
-        "left_out": (documents.left_out_document, tables.print_left_out),
-        "next_measurement": (documents.next_measurement_document, tables.print_next),
-        "posterior": (documents.posterior_document, tables.print_posterior),
+    formats: dict[str, tuple[str, Callable[[Any], Any], Callable[[Any], None]]] = {
+        "--leave-out": ("left_out", documents.left_out_document, tables.print_left_out),
+        "--next": ("next_measurement", documents.next_measurement_document, tables.print_next),
+        "--posterior": ("posterior", documents.posterior_document, tables.print_posterior),
     }
+
+    def document() -> dict[str, Any]:
+        parts = {formats[one][0]: formats[one][1](value) for one, value in analyses.items()}
+        return documents.calibration_document(fit) | parts
 
     def picture() -> Any:
         from notchflex.plotting import calibration_picture
 
-        return calibration_picture(found)
+        return calibration_picture(fit)
 
-    outputs.write_json(
-        lambda: (
-            documents.calibration_document(found)
-            | {key: make[key][0](value) for key, value in analyses.items()}
-        )
-    )
+    outputs.write_json(document)
     outputs.save_picture(picture)
     if outputs.prints_tables:
-        tables.print_calibration(found)
-        for key, value in analyses.items():
-            make[key][1](value)
+        tables.print_calibration(fit)
+        for option, value in analyses.items():
+            formats[option][2](value)

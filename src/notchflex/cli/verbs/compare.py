@@ -8,10 +8,17 @@ from cyclopts import Parameter
 
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import texts
-from notchflex.cli.arguments.measured import OnePath, from_rest, note_table
-from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files, variant
-from notchflex.cli.exit_codes import DONE, NOT_CONVERGED
+from notchflex.cli.arguments.robots import (
+    OnePath,
+    RobotName,
+    Settings,
+    chosen_robot,
+    read_data,
+    robot_files,
+    variant,
+)
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
+from notchflex.cli.terminal import DONE, NOT_CONVERGED
 
 if TYPE_CHECKING:
     from notchflex.comparison import Comparison
@@ -56,15 +63,10 @@ def compare(
     outputs = Outputs([*robot_files(robot), data], quiet=quiet, json=json, csv=csv, plot=plot)
     chosen = chosen_robot(robot, settings)
     values = dict(_variant(text) for text in beside)
-
-    from notchflex.fit.measurements.csv import read_measurements
-
-    measured = read_measurements(data, chosen, from_rest=from_rest(path))
+    measured = read_data(data, chosen, path)
     robots = {label: chosen.with_values(one) for label, one in values.items() if one is not None}
     with terminal.counting(f"solving {len(measured)} rows of {chosen.name}") as counted:
-        from notchflex.cli.compile_cache import use_compile_cache
-
-        use_compile_cache()
+        terminal.use_compile_cache()
         from notchflex import comparison as comparing
 
         comparison = comparing.compare(chosen, measured)
@@ -77,10 +79,6 @@ def compare(
                 else comparing.compare_kinematics(comparison)
             )
     _write(comparison, others, outputs)
-    if outputs.prints_tables:
-        from notchflex.cli.tables.compare_table import print_comparison
-
-        print_comparison(comparison, others)
     return _report(comparison, others)
 
 
@@ -92,6 +90,7 @@ def _variant(text: str) -> tuple[str, list[tuple[str, object]] | None]:
 
 
 def _write(comparison: Comparison, others: dict[str, Comparison], outputs: Outputs) -> None:
+    from notchflex.cli.tables.compare_table import print_comparison
     from notchflex.comparison import comparison_columns, comparison_document, errors_document
 
     def document() -> dict[str, Any]:
@@ -110,14 +109,14 @@ def _write(comparison: Comparison, others: dict[str, Comparison], outputs: Outpu
         columns = comparison_columns(comparison)
         write_csv(target, list(columns), zip(*columns.values(), strict=True))
     outputs.save_picture(picture)
+    if outputs.prints_tables:
+        print_comparison(comparison, others)
 
 
 def _report(comparison: Comparison, others: dict[str, Comparison]) -> int:
     """Write notes and failures; return the exit code."""
     from notchflex.comparison.tables import takes_stroke_of_model
 
-    measured = comparison.measured
-    note_table(measured)
     kinematics = next((one for one in others.values() if one.stroke_lost is not None), None)
     if kinematics is not None and takes_stroke_of_model(kinematics):
         terminal.note(
@@ -129,7 +128,7 @@ def _report(comparison: Comparison, others: dict[str, Comparison]) -> int:
     if not failed:
         return DONE
     terminal.error(
-        f"not converged: {len(failed)} of {len(measured)} points, first row {failed[0] + 1}: "
-        f"{comparison.reason[failed[0]]}. They are left out of the errors."
+        f"not converged: {len(failed)} of {len(comparison.measured)} points, first row "
+        f"{failed[0] + 1}: {comparison.reason[failed[0]]}. They are left out of the errors."
     )
     return NOT_CONVERGED

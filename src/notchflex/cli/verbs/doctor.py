@@ -14,8 +14,8 @@ from cyclopts import Parameter
 from notchflex import __version__
 from notchflex._extras import install_command
 from notchflex.cli import terminal
-from notchflex.cli.exit_codes import DONE
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet
+from notchflex.cli.terminal import DONE
 
 WRONG_SUMS = 1
 """Exit code where JAX computes wrong numbers."""
@@ -52,15 +52,15 @@ def doctor(
         removed = store.clear()
         terminal.note(f"removed {removed.programs} programs, {removed.size / 1e6:.1f} MB")
     with terminal.working("computing a known sum"):
-        found = examination()
-    outputs.write_json(lambda: found)
+        report = examination()
+    outputs.write_json(lambda: report)
     if outputs.prints_tables:
-        _print(found)
-    if found["healthy"]:
+        _print(report)
+    if report["healthy"]:
         return DONE
-    canary = found["canary"]
+    canary = report["canary"]
     terminal.error(
-        f"JAX {found['packages']['jax']} computes wrong numbers on this machine: a sum that is "
+        f"JAX {report['packages']['jax']} computes wrong numbers on this machine: a sum that is "
         f"{canary['expected']:.0f} came out as {canary['computed']:.0f}. Install another version: "
         "pip install 'jax!=0.10.2,!=0.11.0'"
     )
@@ -69,10 +69,9 @@ def doctor(
 
 def examination() -> dict[str, Any]:
     """Return the findings of `doctor` as plain values."""
-    from notchflex.cli.compile_cache import use_compile_cache
     from notchflex.solver.programs import shipped, store
 
-    use_compile_cache()
+    terminal.use_compile_cache()
     from lanewise import target
     from notchflex._canary import canary
     from notchflex._jax import jax
@@ -116,9 +115,6 @@ def examination() -> dict[str, Any]:
 def requirements(lines: Iterable[str] | None = None) -> dict[str, list[str]]:
     """Return the packages that each extra asks for; "" has what every installation needs.
 
-    Args:
-        lines: Requirements as a wheel states them; those of the installed program if None.
-
     Example:
         >>> lines = ["numpy>=2", "h5py>=3; extra == 'data'", "notchflex[data]; extra == 'all'"]
         >>> requirements(lines)
@@ -129,15 +125,15 @@ def requirements(lines: Iterable[str] | None = None) -> dict[str, list[str]]:
             lines = metadata.requires("notchflex") or []
         except metadata.PackageNotFoundError:
             lines = []
-    found: dict[str, list[str]] = {"": []}
+    report: dict[str, list[str]] = {"": []}
     for line in lines:
         what, _, when = line.partition(";")
         name = re.match(r"[\w.-]+", what.strip())
         extra = re.search(r"extra\s*==\s*[\"']([\w-]+)[\"']", when)
-        packages = found.setdefault(extra[1] if extra else "", [])
+        packages = report.setdefault(extra[1] if extra else "", [])
         if name and name[0] != "notchflex":
             packages.append(name[0])
-    return found
+    return report
 
 
 def _versions(packages: Iterable[str]) -> dict[str, str | None]:
@@ -167,7 +163,7 @@ def _extras() -> dict[str, Any]:
     }
 
 
-def _print(found: dict[str, Any]) -> None:
+def _print(report: dict[str, Any]) -> None:
     console = terminal.output()
 
     def section(title: str, rows: Iterable[tuple[str, str]]) -> None:
@@ -176,14 +172,14 @@ def _print(found: dict[str, Any]) -> None:
         console.print(terminal.table(["", ""], cells, gap=2, colour="cyan"))
 
     missing = "not installed"
-    device = found["device"]
-    backend, cache = found["backend"], found["compile_cache"]
+    device = report["device"]
+    backend, cache = report["backend"], report["compile_cache"]
     section(
-        f"notchflex {found['version']}",
+        f"notchflex {report['version']}",
         [
-            ("python", f"{found['python']}, {found['executable']}"),
-            ("system", found["system"]),
-            *((name, version or missing) for name, version in found["packages"].items()),
+            ("python", f"{report['python']}, {report['executable']}"),
+            ("system", report["system"]),
+            *((name, version or missing) for name, version in report["packages"].items()),
         ],
     )
     section(
@@ -192,7 +188,7 @@ def _print(found: dict[str, Any]) -> None:
             ("device", f"{device['kind']}: {', '.join(device['names'])}"),
             ("floats", "64 bits" if device["x64"] else "32 bits"),
             ("backend", _BACKENDS[backend["name"]].format(**backend)),
-            ("known sum", "right" if found["healthy"] else "WRONG"),
+            ("known sum", "right" if report["healthy"] else "WRONG"),
             (
                 "programs",
                 f"{cache['programs']} compiled, {cache['bytes'] / 1e6:.1f} MB of at most "
@@ -203,7 +199,7 @@ def _print(found: dict[str, Any]) -> None:
             ("shipped", f"{cache['shipped']} programs of typical calls; only a wheel carries them"),
         ],
     )
-    section("\nExtras", [(name, _extra_words(extra)) for name, extra in found["extras"].items()])
+    section("\nExtras", [(name, _extra_words(extra)) for name, extra in report["extras"].items()])
 
 
 def _extra_words(extra: dict[str, Any]) -> str:

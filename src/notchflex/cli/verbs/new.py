@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 import shlex
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Group, Parameter
 
+from notchflex.cli.arguments.conversion import flag
 from notchflex.cli.interview.ask import Interview
-from notchflex.cli.interview.comments import commented
 from notchflex.cli.interview.questions import interviewed
+from notchflex.cli.interview.wordings import commented
 from notchflex.errors import InputError
 from notchflex.results.files.writing import check_output, write_text
 from notchflex.robot.writing import robot_text
@@ -21,8 +23,6 @@ NOTCHES = Group("Notches (one value for all, or one for each, base to tip)", sor
 TENDONS = Group("Tendons (one value for each)", sort_key=3)
 MATERIAL = Group("Material and friction", sort_key=4)
 
-Answer = str | None
-
 _SECTIONS = ("notch", "tendon", "material", "friction")
 
 
@@ -30,62 +30,72 @@ def _option(group: Group, text: str) -> Parameter:
     return Parameter(group=group, help=text, allow_leading_hyphen=True)
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Answers:
+    """Answers given as options; None for what is to be asked."""
+
+    title: Annotated[str | None, Parameter(help="What tables and pictures call the robot.")] = None
+    outer_diameter: Annotated[str | None, _option(TUBE, "Outer diameter [mm].")] = None
+    inner_diameter: Annotated[str | None, _option(TUBE, "Inner diameter [mm].")] = None
+    base_length: Annotated[
+        str | None, _option(TUBE, "Uncut length between the held end and the first notch [mm].")
+    ] = None
+    kind: Annotated[
+        str | None,
+        _option(NOTCHES, "Kind of notch: `arc`, or another that `notchflex schema` lists."),
+    ] = None
+    cut: Annotated[
+        str | None,
+        _option(NOTCHES, "`on-axis` (laser, radial edges) or `off-axis` (saw, straight)."),
+    ] = None
+    notches: Annotated[str | None, _option(NOTCHES, "Number of notches.")] = None
+    depth: Annotated[
+        str | None, _option(NOTCHES, "Depth from the surface opposite the spine [mm].")
+    ] = None
+    height: Annotated[str | None, _option(NOTCHES, "Height along the tube [mm].")] = None
+    uncut_length: Annotated[
+        str | None, _option(NOTCHES, "Uncut length behind each notch, toward the tip [mm].")
+    ] = None
+    direction: Annotated[
+        str | None, _option(NOTCHES, "Side toward which each notch bends [deg]; 0 is x.")
+    ] = None
+    precurvature: Annotated[
+        str | None, _option(NOTCHES, "Angle of each notch when nothing pulls [deg].")
+    ] = None
+    tendon_radius: Annotated[
+        str | None, _option(TENDONS, "Distance of each tendon from the tube axis [mm].")
+    ] = None
+    tendon_direction: Annotated[
+        str | None, _option(TENDONS, "Side on which each tendon runs [deg]; 0 is x.")
+    ] = None
+    material: Annotated[
+        str | None, _option(MATERIAL, "`superelastic`, `linear`, or another kind of material.")
+    ] = None
+    elastic_modulus: Annotated[str | None, _option(MATERIAL, "Elastic modulus [MPa].")] = None
+    superelastic_modulus: Annotated[
+        str | None, _option(MATERIAL, "Modulus of the superelastic branch [MPa].")
+    ] = None
+    transition_strain: Annotated[
+        str | None, _option(MATERIAL, "Strain where the superelastic branch begins.")
+    ] = None
+    friction: Annotated[
+        str | None, _option(MATERIAL, "Friction coefficient between tendon and tube.")
+    ] = None
+    allowed_strain: Annotated[
+        str | None,
+        _option(MATERIAL, "Strain beyond which a simulation warns; `none` for no warning."),
+    ] = None
+    friction_kind: Annotated[
+        str | None, _option(MATERIAL, "Kind of friction: `capstan`, or another.")
+    ] = None
+
+
 def new(
     name: Annotated[str, Parameter(help="Name of the file; `.toml` is added.")],
     /,
     *,
-    title: Annotated[str | None, Parameter(help="What tables and pictures call the robot.")] = None,
-    outer_diameter: Annotated[Answer, _option(TUBE, "Outer diameter [mm].")] = None,
-    inner_diameter: Annotated[Answer, _option(TUBE, "Inner diameter [mm].")] = None,
-    base_length: Annotated[
-        Answer, _option(TUBE, "Uncut length between the held end and the first notch [mm].")
-    ] = None,
-    kind: Annotated[
-        Answer, _option(NOTCHES, "Kind of notch: `arc`, or another that `notchflex schema` lists.")
-    ] = None,
-    cut: Annotated[
-        Answer, _option(NOTCHES, "`on-axis` (laser, radial edges) or `off-axis` (saw, straight).")
-    ] = None,
-    notches: Annotated[Answer, _option(NOTCHES, "Number of notches.")] = None,
-    depth: Annotated[
-        Answer, _option(NOTCHES, "Depth from the surface opposite the spine [mm].")
-    ] = None,
-    height: Annotated[Answer, _option(NOTCHES, "Height along the tube [mm].")] = None,
-    uncut_length: Annotated[
-        Answer, _option(NOTCHES, "Uncut length behind each notch, toward the tip [mm].")
-    ] = None,
-    direction: Annotated[
-        Answer, _option(NOTCHES, "Side toward which each notch bends [deg]; 0 is x.")
-    ] = None,
-    precurvature: Annotated[
-        Answer, _option(NOTCHES, "Angle of each notch when nothing pulls [deg].")
-    ] = None,
-    tendon_radius: Annotated[
-        Answer, _option(TENDONS, "Distance of each tendon from the tube axis [mm].")
-    ] = None,
-    tendon_direction: Annotated[
-        Answer, _option(TENDONS, "Side on which each tendon runs [deg]; 0 is x.")
-    ] = None,
-    material: Annotated[
-        Answer, _option(MATERIAL, "`superelastic`, `linear`, or another kind of material.")
-    ] = None,
-    elastic_modulus: Annotated[Answer, _option(MATERIAL, "Elastic modulus [MPa].")] = None,
-    superelastic_modulus: Annotated[
-        Answer, _option(MATERIAL, "Modulus of the superelastic branch [MPa].")
-    ] = None,
-    transition_strain: Annotated[
-        Answer, _option(MATERIAL, "Strain where the superelastic branch begins.")
-    ] = None,
-    friction: Annotated[
-        Answer, _option(MATERIAL, "Friction coefficient between tendon and tube.")
-    ] = None,
-    allowed_strain: Annotated[
-        Answer,
-        _option(MATERIAL, "Strain beyond which a simulation warns; `none` for no warning."),
-    ] = None,
-    friction_kind: Annotated[
-        Answer, _option(MATERIAL, "Kind of friction: `capstan`, or another.")
-    ] = None,
+    answers: Answers = Answers(),
     set_: Annotated[
         list[str] | None,
         Parameter(
@@ -94,9 +104,7 @@ def new(
             help="Any other key of a part: `notch.slot_radius=0.275`, `friction.wrap=geometric`.",
         ),
     ] = None,
-    yes: Annotated[
-        bool, Parameter(name=("--yes", "-y"), negative=(), help="Take all defaults unasked.")
-    ] = False,
+    yes: Annotated[bool, flag("Take all defaults unasked.", name=("--yes", "-y"))] = False,
 ) -> None:
     """Ask for the calliper readings of a wrist and write a commented robot file.
 
@@ -111,53 +119,13 @@ def new(
             f"{path} is already there; choose another name, or remove it first."
         )
     check_output(str(path), "NAME")
-    further = [text.partition("=") for text in set_ or ()]
-    for key, equals, value in further:
-        section, dot, _ = key.partition(".")
-        if not (equals and dot and value) or section not in (
-            "notch",
-            "tendon",
-            "material",
-            "friction",
-        ):
-            raise InputError.BAD_SYNTAX(
-                f"--set {key}{equals}{value}: write it like notch.slot_radius=0.275, with one of "
-                f"{', '.join(_SECTIONS)}."
-            )
-    interview = Interview(
-        {
-            **{f"--set {key.strip()}": value.strip() for key, _, value in further},
-            "--kind": kind,
-            "--friction-kind": friction_kind,
-            "--title": title,
-            "--outer-diameter": outer_diameter,
-            "--inner-diameter": inner_diameter,
-            "--base-length": base_length,
-            "--cut": cut,
-            "--notches": notches,
-            "--depth": depth,
-            "--height": height,
-            "--uncut-length": uncut_length,
-            "--direction": direction,
-            "--precurvature": precurvature,
-            "--tendon-radius": tendon_radius,
-            "--tendon-direction": tendon_direction,
-            "--material": material,
-            "--elastic-modulus": elastic_modulus,
-            "--superelastic-modulus": superelastic_modulus,
-            "--transition-strain": transition_strain,
-            "--friction": friction,
-            "--allowed-strain": allowed_strain,
-        },
-        accept_defaults=yes,
-    )
+    settings = dict(map(_setting, set_ or ()))
+    options = {f"--{key.replace('_', '-')}": answer for key, answer in vars(answers).items()}
+    interview = Interview(settings | options, accept_defaults=yes)
     robot = interview.conduct(lambda interview: interviewed(interview, path.stem))
-    idle = [
-        one for one in interview.given if one.startswith("--set ") and one not in interview.used
-    ]
-    if idle:
+    if unused := [option for option in settings if option not in interview.used]:
         raise InputError.UNKNOWN_NAME(
-            f"{idle[0]}: no part of this robot asks for it, or another option does."
+            f"{unused[0]}: no part of this robot asks for it, or another option does."
         )
     text = commented(robot_text(robot), interview.defaulted)
     if path.exists():
@@ -166,3 +134,15 @@ def new(
         )
     write_text(path, text)
     print(f"Wrote {path}. Look at it with: notchflex show {shlex.quote(str(path))}")
+
+
+def _setting(text: str) -> tuple[str, str]:
+    """Return option and answer of one `--set`."""
+    key, _, value = text.partition("=")
+    section, _, name = key.partition(".")
+    if not (name and value) or section not in _SECTIONS:
+        raise InputError.BAD_SYNTAX(
+            f"--set {text}: write it like notch.slot_radius=0.275, with one of "
+            f"{', '.join(_SECTIONS)}."
+        )
+    return f"--set {key.strip()}", value.strip()

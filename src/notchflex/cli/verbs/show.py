@@ -43,9 +43,7 @@ def show(
     with terminal.working(f"solving {chosen.name}"):
         import numpy as np
 
-        from notchflex.cli.compile_cache import use_compile_cache
-
-        use_compile_cache()
+        terminal.use_compile_cache()
         from notchflex.analysis import tip_from_angles
         from notchflex.analysis.notch_table import notch_table
         from notchflex.results.files.json import document_head

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,7 +25,6 @@ from notchflex.cli.arguments.robots import (
     chosen_robot,
     robot_files,
 )
-from notchflex.cli.exit_codes import DONE, NOT_CONVERGED
 from notchflex.cli.outputs import (
     OUTPUT,
     CsvFile,
@@ -34,6 +34,9 @@ from notchflex.cli.outputs import (
     Quiet,
     output_file,
 )
+from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.errors import InputError
+from notchflex.results.files.writing import BROWSER, MOVING, PAPER
 
 if TYPE_CHECKING:
     from notchflex.loads import LoadPath
@@ -144,18 +147,17 @@ def simulate(
     from notchflex.cli.tables.path_columns import parse_columns
 
     terminal.be_quiet(quiet)
-    named = () if columns is None else parse_columns(columns)
+    shown = () if columns is None else parse_columns(columns)
     chosen = chosen_robot(robot, settings)
     title = changed_title(chosen, settings)
     robots = beside_robots(chosen, robot, beside)
-    if external and not tension and not stroke:  # the tendons hang slack, in one step
-        tensions = strokes = np.full((1, chosen.number_of_tendons), np.nan)
-    else:
-        tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
+    if external and not tension and not stroke:
+        tension = (TendonCommand("--tension", 1, [math.nan]),)  # all hang slack, in one step
+    tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
     outputs = Outputs(
         [*robot_files(robot), *beside_files(beside)],
         quiet=quiet,
-        pictures=simulate_files.pictures(several=bool(beside)),
+        pictures=PAPER + BROWSER + (() if beside else MOVING),  # several robots do not move
         json=json,
         csv=csv,
         nc=nc,
@@ -163,23 +165,25 @@ def simulate(
         plot=plot,
         save_state=save_state,
     )
-    simulate_files.check(outputs, steps=len(tensions))
+    if plot is not None and len(tensions) < 2 and simulate_files.is_animation(plot):
+        raise InputError.FILE_FORMAT(
+            f"--plot {plot}: one step cannot be animated; write a .png, .svg or .pdf."
+        )
     with terminal.counting(f"solving {len(tensions)} steps of {chosen.name}") as counted:
-        from notchflex.cli.compile_cache import use_compile_cache
         from notchflex.loads import LoadPath
 
-        use_compile_cache()
+        terminal.use_compile_cache()
         start = None if from_state is None else _start(from_state)
         turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
-        load = external.on(LoadPath(tension=tensions, stroke=strokes, base_rotation=turn))
+        load = external.on(LoadPath(tensions, strokes, turn))
         paths = _solve(robots, load, start, refinement, counted)
     simulate_files.write(paths, outputs, title)
     if outputs.prints_tables:
         from notchflex.cli.tables.path_table import print_beside, print_path
 
-        print_path(next(iter(paths.values())), title, columns=named, every_row=every_row)
+        print_path(next(iter(paths.values())), title, columns=shown, every_row=every_row)
         if beside:
-            print_beside(paths, columns=named, every_row=every_row)
+            print_beside(paths, columns=shown, every_row=every_row)
     return max(_report(path, label if beside else "") for label, path in paths.items())
 
 

@@ -47,10 +47,9 @@ def view(
     if warning := exposed(host):
         terminal.warn(f"{warning}.")
     with terminal.working(f"solving {chosen.name} at rest"):
-        from notchflex.cli.compile_cache import use_compile_cache
         from notchflex.viewer import Viewer
 
-        use_compile_cache()
+        terminal.use_compile_cache()
         viewer = Viewer(
             chosen,
             read=(lambda: chosen_robot(robot, settings)) if files else None,

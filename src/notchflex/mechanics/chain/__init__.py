@@ -3,7 +3,7 @@
 from notchflex.mechanics.chain.chain import Chain, Shaped, assemble, flexure_states, laws, shape_of
 from notchflex.mechanics.chain.pad import padded
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
-from notchflex.mechanics.chain.sites import sites_of
+from notchflex.mechanics.chain.sites import sites_of, unchecked_dimensions
 from notchflex.mechanics.chain.structure import structural
 
 __all__ = [
@@ -18,4 +18,5 @@ __all__ = [
     "sites_of",
     "structural",
     "tendons_in_plane",
+    "unchecked_dimensions",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.mechanics.ends import Side
-from notchflex.mechanics.flexure import Site
+from notchflex.mechanics.flexure import Site, unchecked
 from notchflex.robot import Robot
 
 
@@ -36,3 +36,24 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     return tuple(
         site(index) if notch.has_elastic_ends else None for index, notch in enumerate(notches)
     )
+
+
+def unchecked_dimensions(robot: Robot) -> list[str]:
+    """List where dimensions of notches with elastic ends leave the range that was checked.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        One sentence for each dimension, with the notches that it belongs to; none where all lie
+        inside, or the ends are rigid.
+    """
+    found: dict[str, list[str]] = {}
+    for number, (notch, site) in enumerate(zip(robot.notches, sites_of(robot), strict=True), 1):
+        if site is not None:
+            for sentence in unchecked(notch, robot.tube, site):
+                found.setdefault(sentence, []).append(str(number))
+    return [
+        f"notch{'es' if len(notches) > 1 else ''} {', '.join(notches)}: {sentence}."
+        for sentence, notches in found.items()
+    ]

@@ -4,7 +4,7 @@ from notchflex._packages import import_all
 from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.plane import flattened
-from notchflex.mechanics.flexure.registry import Site, rod
+from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.rod_kinematics import (
     free_pose,
@@ -48,5 +48,6 @@ __all__ = [
     "rod_end",
     "stack",
     "turn_doubt",
+    "unchecked",
     "with_level",
 ]

@@ -17,7 +17,7 @@ import dataclasses
 import numpy as np
 
 from notchflex._jax import constant
-from notchflex.mechanics.ends import NotchStiffness, notch_stiffness
+from notchflex.mechanics.ends import NotchStiffness, notch_stiffness, validity
 from notchflex.mechanics.flexure.notch_rod import (
     STRAIGHT,
     NeutralAxis,
@@ -27,7 +27,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     shifted,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import Site, rod
+from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import SECTION_OF_CUT
@@ -81,3 +81,10 @@ def _ends(stiffness: NotchStiffness, height: float) -> NotchEnds:
         even=constant(0.5 * stiffness.beta * height**2),
         material_share=constant(MATERIAL_SHARE),
     )
+
+
+@unchecked.register
+def _(notch: ArcNotch, tube: Tube, site: Site) -> list[str]:
+    depth = notch.section_depth(tube)
+    shape = tube.outer_radius, tube.inner_radius, notch.cut, depth, notch.height
+    return validity(*shape, site.proximal, site.distal)

@@ -49,3 +49,19 @@ def rod(notch: Any, tube: Tube, refinement: int = 0, site: Site | None = None) -
         f"no rod is registered for a notch of type {type(notch).__name__}; "
         "add one to notchflex/mechanics/flexure with @rod.register"
     )
+
+
+@singledispatch
+def unchecked(notch: Any, tube: Tube, site: Site) -> list[str]:
+    """List where the law of a notch with elastic ends was not checked.
+
+    Args:
+        notch: A notch description.
+        tube: The tube it is cut into.
+        site: What surrounds it.
+
+    Returns:
+        A sentence for each dimension outside the range that finite elements cover.
+    """
+    del notch, tube, site
+    return []

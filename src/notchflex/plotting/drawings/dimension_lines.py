@@ -69,19 +69,12 @@ def _arrows(axes: Axes, start: tuple[float, float], end: tuple[float, float]) ->
 
 
 def horizontal(axes: Axes, start: float, end: float, at: float, edge: float, text: str) -> None:
-    """Draw a dimension along the tube from `start` to `end`, with a text above it.
+    """Draw a dimension along the tube from `start` to `end` at a height, with a text above it.
 
-    Args:
-        axes: Axes in inches of paper.
-        start: Left end.
-        end: Right end.
-        at: Height of its line.
-        edge: Height at which its extension lines start.
-        text: Its text.
+    Its extension lines start at the height `edge`.
     """
-    over = 0.05 if at > edge else -0.05
     for x in (start, end):
-        line(axes, [x, x], [edge, at + over])
+        line(axes, [x, x], [edge, at + (0.05 if at > edge else -0.05)])
     _arrows(axes, (start, at), (end, at))
     label(axes, 0.5 * (start + end), at + 0.035, text, va="bottom")
 
@@ -91,40 +84,33 @@ def vertical(axes: Axes, start: float, end: float, at: float, edge: float) -> No
 
     Its extension lines start at `edge`.
     """
-    over = 0.05 if at > edge else -0.05
     for y in (start, end):
-        line(axes, [edge, at + over], [y, y])
+        line(axes, [edge, at + (0.05 if at > edge else -0.05)], [y, y])
     _arrows(axes, (at, start), (at, end))
 
 
 def levels(intervals: Sequence[tuple[float, float, str]]) -> list[int]:
-    """Return a level for every dimension along the tube, so that no texts overlap.
-
-    Args:
-        intervals: Left end, right end and text of each, in inches.
+    """Return levels of dimensions (left end, right end [in], text) at which no texts overlap.
 
     Example:
         >>> levels([(0.0, 2.0, "height 1"), (2.0, 4.0, "length 2"), (4.0, 4.1, "thickness 3")])
         [0, 0, 1]
     """
-    taken: list[list[tuple[float, float]]] = []
-    found: list[int] = []
+    occupied: list[list[tuple[float, float]]] = [[]]
+    numbers: list[int] = []
     for start, end, text in intervals:
         middle, half = 0.5 * (start + end), 0.5 * LETTER * len(text) + 0.04
         # Arrows outside of a short dimension need room too.
         out = 0.2 if end - start < SHORTEST else 0.0
-        room = (min(start - out, middle - half), max(end + out, middle + half))
-        free = [
-            number
-            for number, level in enumerate(taken)
-            if all(room[1] <= low + 1e-9 or room[0] >= high - 1e-9 for low, high in level)
-        ]
-        number = free[0] if free else len(taken)
-        if not free:
-            taken.append([])
-        taken[number].append(room)
-        found.append(number)
-    return found
+        low, high = min(start - out, middle - half), max(end + out, middle + half)
+        number = 0
+        while not all(high <= a + 1e-9 or low >= b - 1e-9 for a, b in occupied[number]):
+            number += 1
+            if number == len(occupied):
+                occupied.append([])
+        occupied[number].append((low, high))
+        numbers.append(number)
+    return numbers
 
 
 def broken(axes: Axes, x: float, low: float, high: float) -> None:

@@ -74,29 +74,21 @@ def dimensioned_figure(robot: Robot) -> Figure:
 
 
 def save_dimensioned(robot: Robot, target: str | FilePath) -> None:
-    """Write the dimensioned drawing of a robot as PNG, SVG or PDF, by the suffix.
-
-    Args:
-        robot: The robot.
-        target: Path that ends in .png, .svg or .pdf.
-
-    Raises:
-        InputError: Another suffix, no drawing of a kind of notch, or the file cannot be written.
-    """
+    """Write the dimensioned drawing of a robot; see `dimensioned_figure` and `save`."""
     save(dimensioned_figure(robot), target)
 
 
 def _shapes(robot: Robot) -> list[tuple[str, int]]:
     """Return the different notches: their numbers as text, and the index in `robot.notch`."""
-    found: dict[Notch, tuple[list[str], int]] = {}
+    shapes: dict[Notch, tuple[list[str], int]] = {}
     first = 1
     for place, notch in enumerate(robot.notch):
         last = first + notch.repeat - 1
         alike = dataclasses.replace(notch, repeat=1, precurvature_deg=0.0)
-        names, _ = found.setdefault(alike, ([], place))
+        names, _ = shapes.setdefault(alike, ([], place))
         names.append(str(first) if first == last else f"{first}–{last}")
         first = last + 1
-    return [(", ".join(names), place) for names, place in found.values()]
+    return [(", ".join(names), place) for names, place in shapes.values()]
 
 
 def _scale(view: NotchView, robot: Robot) -> float:

@@ -14,27 +14,18 @@ from notchflex.plotting.style import BLUE, VERMILLION
 from notchflex.robot import Robot
 from notchflex.robot.kinds import Notch
 
+Centre = tuple[float, float]
+
 BEYOND, SECTION = "#EAF1F6", BLUE
 """Colours of the tube behind the section and of the section."""
 
 
 def section_view(
-    axes: Axes,
-    robot: Robot,
-    notch: Notch,
-    view: NotchView,
-    scale: float,
-    centre: tuple[float, float],
+    axes: Axes, robot: Robot, notch: Notch, view: NotchView, scale: float, centre: Centre
 ) -> None:
     """Draw the cross-section as seen from the tip, with the bend upward.
 
-    Args:
-        axes: Axes in inches of paper.
-        robot: The robot.
-        notch: The notch.
-        view: Its views.
-        scale: Scale [in/mm].
-        centre: Position of the tube axis [in].
+    The tube axis is at a centre [in] on axes in inches of paper; the scale is in in/mm.
     """
     x, y = centre
     outer, inner = scale * robot.tube.outer_radius, scale * robot.tube.inner_radius
@@ -54,13 +45,10 @@ def section_view(
     else:
         left = Wedge(centre, outer, 0, 360, width=wall, **look)
         axes.add_patch(left)
-        low = y + level if view.toward else y - outer - 0.1
-        high = y + outer + 0.1 if view.toward else y + level
-        left.set_clip_path(
-            Rectangle(
-                (x - outer - 0.1, low), 2.0 * outer + 0.2, high - low, transform=axes.transData
-            )
-        )
+        size = outer + 0.1
+        low, high = (y + level, y + size) if view.toward else (y - size, y + level)
+        kept = Rectangle((x - size, low), 2.0 * size, high - low, transform=axes.transData)
+        left.set_clip_path(kept)
         chord = [math.sqrt(max(radius**2 - level**2, 0.0)) for radius in (inner, outer)]
         for sign in (-1.0, 1.0):
             ends = [x + sign * end for end in chord]
@@ -79,17 +67,11 @@ def section_view(
         foot -= 0.17
 
 
-def _directions(axes: Axes, notch: Notch, centre: tuple[float, float], outer: float) -> None:
+def _directions(axes: Axes, notch: Notch, centre: Centre, outer: float) -> None:
     """Draw the direction of bending, and the axes x and y of the base."""
     x, y = centre
-    draw.arrow(
-        axes,
-        (x, y + outer + 0.1),
-        (x, y + outer + 0.42),
-        color=VERMILLION,
-        lw=2.0,
-        mutation_scale=11.0,
-    )
+    look = {"color": VERMILLION, "lw": 2.0, "mutation_scale": 11.0}
+    draw.arrow(axes, (x, y + outer + 0.1), (x, y + outer + 0.42), **look)
     text = f"bends toward\ndirection {notch.direction_deg:g}°"
     draw.label(axes, x + 0.12, y + outer + 0.3, text, ha="left")
     corner = np.array([x + outer + 0.62, y - 0.72 * outer])
@@ -103,12 +85,7 @@ def _directions(axes: Axes, notch: Notch, centre: tuple[float, float], outer: fl
 
 
 def _section_tendons(
-    axes: Axes,
-    robot: Robot,
-    notch: Notch,
-    scale: float,
-    centre: tuple[float, float],
-    outer: float,
+    axes: Axes, robot: Robot, notch: Notch, scale: float, centre: Centre, outer: float
 ) -> None:
     """Draw the tendons, and the radius of the one nearest to the side of the bend."""
     turns = [math.radians(one.direction_deg - notch.direction_deg) for one in robot.tendon]

@@ -39,63 +39,37 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Cut:
-    """A cut in the side view.
+    """A cut in the side view."""
 
-    Attributes:
-        edge: Corners of its edge, the first and the last on the outer surface, (k, 2).
-        face: Ends of a second visible edge, as of a slanted cut face, (2, 2); or None.
-    """
-
-    edge: Points
-    face: Points | None = None
+    edge: Points  # its corners, the first and the last on the outer surface, (k, 2)
+    face: Points | None = None  # ends of a second visible edge, as of a slanted cut face, (2, 2)
 
 
 @dataclass(frozen=True)
 class NotchView:
-    """Side view and cross-section of one kind of notch.
+    """Side view and cross-section of one kind of notch."""
 
-    Attributes:
-        length: Length of tube in the side view [mm].
-        held: Whether the left end is the proximal face of the robot.
-        tip: Whether the right end is the tip.
-        breaks: Positions at which a part of the tube is omitted [mm].
-        cuts: The cuts.
-        along: Dimensions along the tube.
-        across: Columns of dimensions across the tube, from the tube axis.
-        projected: Extension lines of those: start, height [mm], index of the column.
-        section_at: Position of the cross-section [mm].
-        section_from: Height of the edge of the remaining section [mm], from the tube axis.
-        radial: Whether the edges of the cut are radial (on-axis) or one straight line.
-        toward: Whether the remaining section lies on the side of the bend.
-        notes: Further dimensions in words.
-        absent: Names of dimensions that are 0.
-    """
-
-    length: float
-    held: bool
-    tip: bool
-    breaks: Sequence[float]
+    length: float  # of tube in the side view [mm]
+    held: bool  # the left end is the proximal face of the robot
+    tip: bool  # the right end is the tip
+    breaks: Sequence[float]  # positions at which a part of the tube is omitted [mm]
     cuts: Sequence[Cut]
     along: Sequence[Dimension]
-    across: Sequence[Sequence[Dimension]]
-    projected: Sequence[tuple[float, float, int]]
-    section_at: float
-    section_from: float
-    radial: bool = False
-    toward: bool = False
-    notes: Sequence[str] = ()
-    absent: Sequence[str] = ()
+    across: Sequence[Sequence[Dimension]]  # in columns, from the tube axis
+    projected: Sequence[tuple[float, float, int]]  # their extension lines: start, height, column
+    section_at: float  # position of the cross-section [mm]
+    section_from: float  # height of the edge of the remaining section [mm], from the tube axis
+    radial: bool = False  # the edges of the cut are radial (on-axis), not one straight line
+    toward: bool = False  # the remaining section lies on the side of the bend
+    notes: Sequence[str] = ()  # further dimensions in words
+    absent: Sequence[str] = ()  # names of dimensions that are 0
 
 
 @singledispatch
 def notch_view(notch: Notch, robot: Robot, first: bool, following: Notch | None) -> NotchView:
-    """Describe the views of a notch.
+    """Describe the views of a notch of the robot file, with `repeat`.
 
-    Args:
-        notch: The notch of the robot file, with `repeat`.
-        robot: The robot.
-        first: Whether it is the first notch of the robot.
-        following: The next notch toward the tip; None for the last one.
+    It may be the first one of the robot; the next one toward the tip follows, if there is one.
 
     Raises:
         InputError: Its kind has no drawing.
@@ -218,11 +192,7 @@ def _strip(notch: StripNotch, robot: Robot, first: bool, following: Notch | None
             ],
             [Dimension(-0.5 * length, 0.5 * length, f"strip\nlength\n{length:.4g}")],
         ],
-        projected=[
-            (vertex, -corner, 0),
-            (line.at, 0.5 * length, 1),
-            (line.at, -0.5 * length, 1),
-        ],
+        projected=[(vertex, -corner, 0), (line.at, 0.5 * length, 1), (line.at, -0.5 * length, 1)],
         section_at=float(cuts[1].edge[0, 0]),
         section_from=corner,
         toward=True,

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.sheet import MARKERS, Area, Line, Mark, Panel, Span, dots
+from notchflex.plotting.sheet import MARKERS, Area, Curve, Mark, Panel, Span, dots
 from notchflex.plotting.style import BLUE, GREY, sequence_colours
 from notchflex.results.quantities.registry import QUANTITIES
 
@@ -18,80 +18,66 @@ if TYPE_CHECKING:
 
 MEASURED, MODEL, BAND = "measured", "model", "band"
 """Groups of marks in all panels."""
-
 MOST_NOTCHES = 6
 """Of a robot with more notches some are drawn."""
-
 MOST_NAMED = 8
 """Of so many notches a legend has the first and the last colour only."""
 
-
-class MeasuredPart(NamedTuple):
-    """A measured number of every row: robot, quantity, and component in the residuals."""
-
-    label: str
-    quantity: str
-    component: int
-    title: str
+_OTHERS = dots([], GREY, 3.5, marker="X", name="residuals of others", group="others")
+_NOTCHES = ("notch_angle", "edge_angle")
+_KINDS = dict.fromkeys((*_NOTCHES, "total_angle", "total_edge_angle", "tip_rotation"), "angle") | {
+    "tip_tension": "tension"
+}
 
 
-class _ModelLine(NamedTuple):
-    """The rows of one pull, or of all pulls from rest of one file, in the order of a line."""
-
-    x: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    model: NDArray[np.float64]
-    half: NDArray[np.float64]
-    pulls: NDArray[np.intp]
-    names: list[str]
-    """Names of the pulls of the rows."""
-
-
-def parts_shown(found: Calibration, label: str) -> list[MeasuredPart]:
-    """Return what is drawn of a robot: some notches, and every other number."""
+def data_panels(fit: Calibration, label: str) -> Iterator[Panel]:
+    """Yield the panels of a robot: some notches, and every other measured number."""
     from notchflex.fit.measurements.measurements import OBSERVED
 
-    residuals = found.residuals
-    own = residuals.robot == list(found.given).index(label)
-    parts: list[MeasuredPart] = []
-    for number, quantity in enumerate(OBSERVED):
-        there = np.unique(residuals.part[own & (residuals.quantity == number)])
+    for quantity in OBSERVED:
         if quantity == "axis_points":  # thirty points and more: only their residuals
             continue
-        if len(there) > MOST_NOTCHES:
-            spread = np.linspace(0, len(there) - 1, MOST_NOTCHES).round().astype(int)
-            there = there[spread]
-        parts += [
-            MeasuredPart(label, quantity, int(one), _title(quantity, int(one))) for one in there
-        ]
-    return parts
+        components = np.unique(fit.residuals.part[_rows_of(fit, label, quantity)])
+        if len(components) > MOST_NOTCHES:
+            spread = np.linspace(0, len(components) - 1, MOST_NOTCHES).round().astype(int)
+            components = components[spread]
+        for component in components.tolist():
+            yield data_panel(fit, label, quantity, component)
 
 
-def data_panel(found: Calibration, part: MeasuredPart) -> Panel:
+def data_panel(fit: Calibration, label: str, quantity: str, component: int) -> Panel:
     """Return one number over the load: measured, model, and the band of the model."""
-    from notchflex.fit.assessment.errors_of_parts import edge
+    from notchflex.fit.assessment.errors_of_parts import edge, part_title
 
-    _, unit, scale = edge(part.quantity)
+    residuals = fit.residuals
+    name, unit, scale = edge(quantity)
+    x, x_label = _abscissa(fit, label)
+    half = fit.half_width(residuals.slopes) * scale
     items: list[Mark] = []
-    for line in _lines(found, part):
-        measured, model, half = (one * scale for one in (line.measured, line.model, line.half))
-        if np.isfinite(half).all():
-            ends = [np.stack([line.x, model + way * half], axis=1) for way in (-1.0, 1.0)]
+    drawn = np.flatnonzero(_rows_of(fit, label, quantity) & (residuals.part == component))
+    for number, rows in _lines(fit, drawn, x):
+        sample = fit.problem.samples.every[number].measured
+        table = sample.observed[quantity]
+        measured = table.reshape(len(table), -1)[residuals.row[rows], component]
+        model = (measured + residuals.values[rows]) * scale
+        if np.isfinite(half[rows]).all():
+            ends = [np.stack([x[rows], model + way * half[rows]], axis=1) for way in (-1.0, 1.0)]
             items.append(band([np.concatenate([ends[0], ends[1][::-1]])]))
-        curve = np.stack([line.x, model], axis=1)
-        items.append(Line(curve, BLUE, group=MODEL, layer=3, hover=True))
-        for pull, name in dict.fromkeys(zip(line.pulls.tolist(), line.names, strict=True)):
-            mine = line.pulls == pull
-            points = np.stack([line.x[mine], measured[mine]], axis=1)
+        curve = np.stack([x[rows], model], axis=1)
+        items.append(Curve(curve, BLUE, group=MODEL, layer=3, hover=True))
+        for pull in dict.fromkeys(residuals.pull[rows].tolist()):
+            there = residuals.pull[rows] == pull
+            points = np.stack([x[rows][there], measured[there] * scale], axis=1)
+            title = f"{MEASURED}, pull {sample.pull[residuals.row[rows][there][0]]}"
             look: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
-            look |= {"name": f"{MEASURED}, pull {name}", "group": MEASURED, "layer": 4}
-            items.append(dots(points, GREY, 3.2, hover=True, **look))
-    return Panel(
-        items,
-        _abscissa(found, part.label)[1],
-        f"{_kind(part.quantity)} [{unit}]",
-        title=f"{part.label}: {part.title}" if len(found.given) > 1 else part.title,
-    )
+            look |= {"name": title, "group": MEASURED, "layer": 4, "hover": True}
+            items.append(dots(points, GREY, 3.2, **look))
+    if quantity in ("tip_position", "tip_rotation"):
+        title = f"{name}, {'xyz'[component]}"
+    else:
+        title = part_title(quantity, 0 if quantity.startswith("total_") else component + 1)
+    y_label = f"{_KINDS.get(quantity, 'position')} [{unit}]"
+    return Panel(items, x_label, y_label, title=_titled(fit, label, title))
 
 
 def band(polygons: Sequence[NDArray[np.float64]], name: str = "") -> Area:
@@ -99,128 +85,95 @@ def band(polygons: Sequence[NDArray[np.float64]], name: str = "") -> Area:
     return Area(polygons, BLUE, BLUE, 0.25, 0.0, name=name, group=BAND)
 
 
-def residual_panel(found: Calibration, label: str) -> Panel:
+def residual_panel(fit: Calibration, label: str) -> Panel:
     """Return the residuals of a robot over their noise, notches by colour.
 
     A total angle that is the sum of the notches has no noise of its own and is not drawn.
     """
-    own, angles = (one & np.isfinite(found.noise.deviation) for one in _own(found, label))
-    notch = found.residuals.part
-    points = np.stack(
-        [_abscissa(found, label)[0], found.residuals.values / found.noise.deviation], axis=1
-    )
-    items: list[Mark] = [
-        Span("y", -1.96, 1.96, GREY, opacity=0.15),
-        Span("y", 0.0, 0.0, GREY),
-    ]
-    if (own & ~angles).any():
-        items.append(replace(_OTHERS, points=points[own & ~angles], hover=True, layer=1))
-    for one, entry in _notch_entries(found).items():
-        mine = points[angles & (notch == one)]
-        if len(mine):
-            items.append(replace(entry, points=mine, hover=True, layer=3))
-    title = "model less measured"
-    return Panel(
-        items,
-        _abscissa(found, label)[1],
-        "residual / its noise [-]",
-        title=f"{label}: {title}" if len(found.given) > 1 else title,
-    )
+    residuals, noise = fit.residuals, fit.noise.deviation
+    x, x_label = _abscissa(fit, label)
+    points = np.stack([x, residuals.values / noise], axis=1)
+    angles = _rows_of(fit, label, *_NOTCHES) & np.isfinite(noise)
+    others = _rows_of(fit, label) & np.isfinite(noise) & ~angles
+    items: list[Mark] = [Span("y", -1.96, 1.96, GREY, opacity=0.15), Span("y", 0.0, 0.0, GREY)]
+    if others.any():
+        items.append(replace(_OTHERS, points=points[others], hover=True, layer=1))
+    for notch, entry in _notch_entries(fit).items():
+        there = angles & (residuals.part == notch)
+        if there.any():
+            items.append(replace(entry, points=points[there], hover=True, layer=3))
+    title = _titled(fit, label, "model less measured")
+    return Panel(items, x_label, "residual / its noise [-]", title=title)
 
 
-def residual_entries(found: Calibration) -> list[Line]:
+def residual_entries(fit: Calibration) -> list[Curve]:
     """Return the legend entries of the residuals: colours of notches, marks of all others."""
-    every = list(_notch_entries(found).values())
-    return [*(every if len(every) < MOST_NAMED else [every[0], every[-1]]), _OTHERS]
+    notches = list(_notch_entries(fit).values())
+    return [*(notches if len(notches) < MOST_NAMED else [notches[0], notches[-1]]), _OTHERS]
 
 
-_OTHERS = dots([], GREY, 3.5, marker="X", name="residuals of others", group="others")
-
-
-def _notch_entries(found: Calibration) -> dict[int, Line]:
+def _notch_entries(fit: Calibration) -> dict[int, Curve]:
     """Return the marker of every notch (from 0), the same for all robots."""
-    angles = np.any([_own(found, label)[1] for label in found.given], axis=0)
-    notches = np.unique(found.residuals.part[angles]).tolist()
-    colours = sequence_colours(len(notches))
-    names = [f"residuals of notch {notch + 1}" for notch in notches]
-    return {
-        notch: dots([], colour, name=name, group=name)
-        for notch, colour, name in zip(notches, colours, names, strict=True)
-    }
+    angles = np.any([_rows_of(fit, label, *_NOTCHES) for label in fit.given], axis=0)
+    notches = np.unique(fit.residuals.part[angles]).tolist()
+    entries: dict[int, Curve] = {}
+    for notch, colour in zip(notches, sequence_colours(len(notches)), strict=True):
+        name = f"residuals of notch {notch + 1}"
+        entries[notch] = dots([], colour, name=name, group=name)
+    return entries
 
 
-def _own(found: Calibration, label: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which residuals belong to a robot, and which of them are notch angles."""
+def _titled(fit: Calibration, label: str, title: str) -> str:
+    return f"{label}: {title}" if len(fit.given) > 1 else title
+
+
+def _rows_of(fit: Calibration, label: str, *quantities: str) -> NDArray[np.bool_]:
+    """Return which residuals belong to a robot, and to some of its quantities."""
     from notchflex.fit.measurements.measurements import OBSERVED
 
-    own = found.residuals.robot == list(found.given).index(label)
-    notches = [OBSERVED.index(name) for name in ("notch_angle", "edge_angle")]
-    return own, own & np.isin(found.residuals.quantity, notches)
+    of_robot = fit.residuals.robot == list(fit.given).index(label)
+    if not quantities:
+        return of_robot
+    return of_robot & np.isin(fit.residuals.quantity, [OBSERVED.index(one) for one in quantities])
 
 
-def _lines(found: Calibration, part: MeasuredPart) -> list[_ModelLine]:
-    """Return the rows of a part as lines: by load if measured from rest, else pull by pull."""
-    from notchflex.fit.measurements.measurements import OBSERVED
-
-    residuals = found.residuals
-    own = (
-        (residuals.robot == list(found.given).index(part.label))
-        & (residuals.quantity == OBSERVED.index(part.quantity))
-        & (residuals.part == part.component)
-    )
-    x = _abscissa(found, part.label)[0]
-    half = found.half_width(found.residuals.slopes)
-    lines: list[_ModelLine] = []
-    for number in np.unique(residuals.sample[own]):
-        measured = found.problem.samples.every[number].measured
-        mine = np.flatnonzero(own & (residuals.sample == number))
-        groups = [mine[np.argsort(x[mine], kind="stable")]]
-        if not measured.from_rest:
-            groups = [mine[residuals.pull[mine] == one] for one in np.unique(residuals.pull[mine])]
-        for rows in groups:
-            table = measured.observed[part.quantity]
-            seen = table.reshape(len(table), -1)[residuals.row[rows], part.component]
-            names = [str(measured.pull[row]) for row in residuals.row[rows]]
-            model = seen + residuals.values[rows]
-            lines.append(_ModelLine(x[rows], seen, model, half[rows], residuals.pull[rows], names))
-    return lines
+def _lines(
+    fit: Calibration, drawn: NDArray[np.intp], x: NDArray[np.float64]
+) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Yield the sample and the residuals of each line: by load if from rest, else by pull."""
+    residuals = fit.residuals
+    for number in np.unique(residuals.sample[drawn]).tolist():
+        rows = drawn[residuals.sample[drawn] == number]
+        if fit.problem.samples.every[number].measured.from_rest:
+            yield number, rows[np.argsort(x[rows], kind="stable")]
+        else:
+            for pull in np.unique(residuals.pull[rows]):
+                yield number, rows[residuals.pull[rows] == pull]
 
 
-def _abscissa(found: Calibration, label: str) -> tuple[NDArray[np.float64], str]:
+def _abscissa(fit: Calibration, label: str) -> tuple[NDArray[np.float64], str]:
     """Return tension or stroke of a tendon at every residual of a robot, and its label."""
-    residuals = found.residuals
+    residuals = fit.residuals
     x = np.full(len(residuals), np.nan)
-    samples = found.problem.samples.every
-    mine = [(number, one) for number, one in enumerate(samples) if one.label == label]
+    samples = {
+        number: one.measured.load
+        for number, one in enumerate(fit.problem.samples.every)
+        if one.label == label
+    }
     for name in ("tension", "stroke"):
-        tables = {number: getattr(one.measured.load, name) for number, one in mine}
-        first = next(iter(tables.values()))
-        for tendon in range(first.shape[1]):
-            columns = {number: table[:, tendon] for number, table in tables.items()}
-            varied = np.concatenate(list(columns.values()))
+        tables = {number: getattr(load, name) for number, load in samples.items()}
+        count = next(iter(tables.values())).shape[1]
+        for tendon in range(count):
+            varied = np.concatenate([table[:, tendon] for table in tables.values()])
             if not np.isfinite(varied).all() or np.ptp(varied) == 0.0:
                 continue
-            for number, column in columns.items():
+            for number, table in tables.items():
                 there = residuals.sample == number
-                x[there] = column[residuals.row[there]]
-            one_of_many = f" {tendon + 1}" if first.shape[1] > 1 else ""
-            row = QUANTITIES[name]
-            return x, row.label.replace(row.title, row.title + one_of_many, 1)
-    for number, _ in mine:
+                x[there] = table[residuals.row[there], tendon]
+            quantity = QUANTITIES[name]
+            title = quantity.title + (f" {tendon + 1}" if count > 1 else "")
+            return x, quantity.label.replace(quantity.title, title, 1)
+    for number in samples:
         there = residuals.sample == number
         x[there] = residuals.row[there] + 1
     return x, "row [number]"
-
-
-def _kind(quantity: str) -> str:
-    if quantity.endswith(("_angle", "_rotation")):
-        return "angle"
-    return "tension" if quantity == "tip_tension" else "position"
-
-
-def _title(quantity: str, component: int) -> str:
-    from notchflex.fit.assessment.errors_of_parts import edge, part_title
-
-    if quantity in ("tip_position", "tip_rotation"):
-        return f"{edge(quantity)[0]}, {'xyz'[component]}"
-    return part_title(quantity, 0 if quantity.startswith("total_") else component + 1)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,22 +21,14 @@ from notchflex.plotting.sheet import (
     MIXED,
     SOLID,
     Bars,
-    Line,
+    Curve,
     Mark,
     Note,
     Panel,
     dots,
     grid,
 )
-from notchflex.plotting.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    VERMILLION,
-    sequence_colours,
-)
+from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import DEGREES, QUANTITIES
 
 if TYPE_CHECKING:
@@ -47,21 +40,11 @@ MODEL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 MODEL_LINES = (SOLID, DASHED, DASH_DOT, DOTTED, MIXED)
 SHAPES = 6
 
-Values = NDArray[np.float64]
-
 
 def comparison_figure(
     comparison: Comparison, others: Mapping[str, Comparison] | None = None
 ) -> Figure:
-    """Draw a comparison with matplotlib; see `comparison_picture`.
-
-    Args:
-        comparison: The model and its measurement.
-        others: Label to comparison of other models with the same measurement.
-
-    Returns:
-        The figure; `notchflex.plotting.save` writes it.
-    """
+    """Draw a comparison with matplotlib; see `comparison_picture` for the arguments."""
     return comparison_picture(comparison, others).figure()
 
 
@@ -76,9 +59,6 @@ def comparison_picture(
     Args:
         comparison: The model and its measurement.
         others: Label to comparison of other models with the same measurement.
-
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
     """
     models = {"model": comparison, **(others or {})}
     panels = [*_angle_panels(comparison, models), _centre_lines(comparison)]
@@ -88,13 +68,13 @@ def comparison_picture(
     error = f"tip {comparison.tip_rmse:.2f} mm"
     if math.isnan(comparison.tip_rmse):
         error = f"total {comparison.rmse_total * DEGREES:.2f}°"
-    return Picture(
-        f"{comparison.robot.name}: {error} rms over {comparison.points} points",
-        2.9 * columns,
-        2.7 * math.ceil(len(panels) / columns),
-        grid(panels, columns),
-        _legend(models, comparison.measured.pull),
-    )
+    legend = list(_trials(comparison).values())[: len(MARKERS)]
+    legend += [
+        Curve([], colour, dash, name=one, group=one) for one, colour, dash in _styles(models)
+    ]
+    title = f"{comparison.robot.name}: {error} rms over {comparison.points} points"
+    size = 2.9 * columns, 2.7 * math.ceil(len(panels) / columns)
+    return Picture(title, *size, grid(panels, columns), legend)
 
 
 def _styles(models: Mapping[str, Any]) -> Iterator[tuple[str, str, tuple[float, ...]]]:
@@ -106,44 +86,45 @@ def _styles(models: Mapping[str, Any]) -> Iterator[tuple[str, str, tuple[float, 
 def _angle_panels(comparison: Comparison, models: Mapping[str, Comparison]) -> Iterator[Panel]:
     """Yield the angles of every notch and the total angle, measured and of the models."""
     x, x_label = _abscissa(comparison)
-    for title, measured, angle_of, rmse in _angles(comparison):
-        items: list[Mark] = list(_points(x, measured * DEGREES, comparison.measured.pull))
+    trial = np.array(comparison.measured.pull)
+    for notch in (*range(comparison.robot.number_of_notches), None):
+        measured = _measured(comparison, notch)
+        if np.isnan(measured).all():
+            continue
+        items: list[Mark] = []
+        for label, entry in _trials(comparison).items():
+            there = (trial == label) & np.isfinite(measured)
+            points = np.stack([x[there], measured[there] * DEGREES], axis=1)
+            items.append(replace(entry, points=points, size=3.2, name="", hover=True))
         for label, colour, dash in _styles(models):
-            one = models[label]
-            for part in _lines(one, x):
-                line = np.stack([x[part], angle_of(one)[part] * DEGREES], axis=1)
-                items.append(Line(line, colour, dash, group=label, layer=3, hover=True))
-        drawn = np.concatenate([measured, *map(angle_of, models.values())])
+            angles = _computed(models[label], notch) * DEGREES
+            for part in _lines(models[label], x):
+                line = np.stack([x[part], angles[part]], axis=1)
+                items.append(Curve(line, colour, dash, group=label, layer=3, hover=True))
+        drawn = np.concatenate([measured, *(_computed(one, notch) for one in models.values())])
+        error = comparison.rmse_total if notch is None else comparison.rmse_notches[notch]
+        title = "total" if notch is None else f"notch {notch + 1}"
         yield Panel(
             items,
             x_label,
             f"angle [{QUANTITIES['notch_angle'].unit}]",
-            title=f"{title}, error {rmse * DEGREES:.2f}° rms",
+            title=f"{title}, error {float(error) * DEGREES:.2f}° rms",
             # From 0 if no angle is negative.
             y_range=(0.0, None) if np.nanmin(drawn, initial=0.0) >= 0.0 else None,
             shared="x",
         )
 
 
-def _angles(
-    comparison: Comparison,
-) -> Iterator[tuple[str, Values, Callable[[Comparison], Values], float]]:
-    """Yield title, measured values, the model's values, and the error of each panel."""
-    for notch in range(comparison.robot.number_of_notches):
-        measured = comparison.measured_notch_angle[:, notch]
-        if not np.isnan(measured).all():
-
-            def angle_of(one: Comparison, notch: int = notch) -> Values:
-                return one.notch_angle[:, notch]
-
-            rmse = float(comparison.rmse_notches[notch])
-            yield f"notch {notch + 1}", measured, angle_of, rmse
-    measured = comparison.measured_total_angle
-    if not np.isnan(measured).all():
-        yield "total", measured, lambda one: one.total_angle, comparison.rmse_total
+def _measured(one: Comparison, notch: int | None) -> NDArray[np.float64]:
+    """Return the measured angles of a notch (from 0); of the whole robot for None."""
+    return one.measured_total_angle if notch is None else one.measured_notch_angle[:, notch]
 
 
-def _abscissa(comparison: Comparison) -> tuple[Values, str]:
+def _computed(one: Comparison, notch: int | None) -> NDArray[np.float64]:
+    return one.total_angle if notch is None else one.notch_angle[:, notch]
+
+
+def _abscissa(comparison: Comparison) -> tuple[NDArray[np.float64], str]:
     """Return the first tension or stroke that all rows have, and its label; else the row."""
     measured = comparison.measured
     tables = {"tension": measured.measured_tension, "stroke": measured.load.stroke}
@@ -154,7 +135,7 @@ def _abscissa(comparison: Comparison) -> tuple[Values, str]:
     return np.arange(1.0, len(measured) + 1.0), "row of the table"
 
 
-def _lines(comparison: Comparison, x: Values) -> list[NDArray[np.intp]]:
+def _lines(comparison: Comparison, x: NDArray[np.float64]) -> list[NDArray[np.intp]]:
     """Return the points of each line of the model: all by load if from rest, else by trial."""
     good = np.flatnonzero(comparison.converged)
     if comparison.measured.from_rest:
@@ -163,18 +144,10 @@ def _lines(comparison: Comparison, x: Values) -> list[NDArray[np.intp]]:
     return [good[trial[good] == label] for label in comparison.measured.pulls]
 
 
-def _points(x: Values, y: Values, trial: tuple[str, ...]) -> Iterator[Line]:
-    for label, entry in _trials(trial).items():
-        there = (np.array(trial) == label) & np.isfinite(y)
-        points = np.stack([x[there], y[there]], axis=1)
-        look: dict[str, Any] = {"marker": entry.marker, "hollow": True, "group": entry.group}
-        yield dots(points, GREY, 3.2, hover=True, **look)
-
-
-def _trials(trial: tuple[str, ...]) -> dict[str, Line]:
+def _trials(comparison: Comparison) -> dict[str, Curve]:
     """Return the legend entry of every trial."""
-    labels = list(dict.fromkeys(trial))
-    entries: dict[str, Line] = {}
+    labels = list(dict.fromkeys(comparison.measured.pull))
+    entries: dict[str, Curve] = {}
     for index, label in enumerate(labels):
         name = f"measured, trial {label}" if len(labels) > 1 else "measured"
         marker = MARKERS[index % len(MARKERS)]
@@ -196,7 +169,7 @@ def _centre_lines(comparison: Comparison) -> Panel:
             if np.isnan(row).any():
                 continue
             line = outline(shape_from_angles(robot, row), view).centre_line
-            items.append(Line(line, colour, dash, width))
+            items.append(Curve(line, colour, dash, width))
             if dash:
                 items.append(dots(line[-1:], colour, 4.0))
     return Panel(
@@ -233,11 +206,3 @@ def _errors(models: Mapping[str, Comparison]) -> Panel:
     most = 1.2 * max((value for value in values if value > 0.0), default=1.0)
     bars = Bars(values, list(models), colours)
     return Panel([bars], label, "", title=title, x_range=(0.0, most))
-
-
-def _legend(models: Mapping[str, Comparison], trial: tuple[str, ...]) -> list[Line]:
-    entries = list(_trials(trial).values())[: len(MARKERS)]
-    lines = [
-        Line([], colour, dash, name=label, group=label) for label, colour, dash in _styles(models)
-    ]
-    return entries + lines

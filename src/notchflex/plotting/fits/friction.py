@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from notchflex._quantity import DEGREES
 from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import BESIDE, Line, Mark, Panel, Span, dots, grid
+from notchflex.plotting.sheet import BESIDE, Curve, Mark, Panel, Span, dots, grid
 from notchflex.plotting.style import BLUE, GREY, ORANGE, VERMILLION
 
 if TYPE_CHECKING:
@@ -27,9 +27,6 @@ def friction_picture(rig: FrictionRig) -> Picture:
 
     Args:
         rig: The estimate.
-
-    Returns:
-        The picture; its `save` writes it as PNG, SVG, PDF or HTML.
 
     Example:
         >>> import notchflex as nf
@@ -84,4 +81,4 @@ def _other_model(
     along = np.log(places) - np.mean(np.log(x)) if logarithmic else places - x.mean()
     mean = float(np.mean(rig.readings.coefficient))
     line = np.stack([places, mean + slope * along], axis=1)
-    return [Line(line, ORANGE, name="not constant", group="not constant", layer=3)]
+    return [Curve(line, ORANGE, name="not constant", group="not constant", layer=3)]

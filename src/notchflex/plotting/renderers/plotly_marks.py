@@ -13,13 +13,17 @@ from notchflex.plotting.sheet import (
     Arrow,
     Bars,
     Correlations,
+    Curve,
     Faces,
-    Line,
+    Mark,
     Note,
     Panel,
     Span,
 )
 from notchflex.plotting.style import diverging_colours, rgb
+
+Layout = dict[str, Any]
+"""A trace, a layout or a part of it, as plotly takes it."""
 
 INCH = 100.0
 """Pixels for an inch of paper, if the window is as wide as the picture."""
@@ -32,15 +36,11 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
-def traces(
-    item: Any, panel: Panel, where: dict[str, Any], layout: dict[str, Any]
-) -> Iterator[dict[str, Any]]:
+def traces(item: Mark, panel: Panel, where: Layout, layout: Layout) -> Iterator[Layout]:
     """Yield the traces of a mark; shapes, notes and tick labels are added to `layout`."""
     match item:
-        case Line():
-            yield line_trace(item, panel)
-        case Area():
-            yield area_trace(item)
+        case Curve() | Area():
+            yield entry_trace(item, panel)
         case Faces():
             yield _mesh(item)
         case Arrow():
@@ -48,27 +48,16 @@ def traces(
         case Span():
             layout["shapes"].append(_shape(item, where))
             if item.name:  # a shape has no entry in a legend
-                look: dict[str, Any] = {"name": item.name, "group": item.group or item.name}
-                if item.low == item.high:
-                    yield line_trace(Line([], item.colour, item.dash, item.width, **look), None)
-                else:
-                    yield area_trace(Area([], item.colour, item.colour, item.opacity, 0.0, **look))
+                look: Layout = {"name": item.name, "group": item.group or item.name}
+                line = Curve([], item.colour, item.dash, item.width, **look)
+                band = Area([], item.colour, item.colour, item.opacity, 0.0, **look)
+                yield entry_trace(line if item.low == item.high else band)
         case Bars():
-            names = [for_browser(name) for name in item.names]
-            _axis(layout, where, "y").update(
-                tickvals=list(range(len(names))), ticktext=names, showgrid=False, ticks=""
-            )
-            yield {
-                "type": "bar", "orientation": "h", "x": list(item.values),
-                "marker": {"color": [css(colour) for colour in item.colours]}, "width": 0.6,
-                "text": [f"{value:.2f}" for value in item.values], "customdata": names,
-                "textposition": "outside", "cliponaxis": False, "showlegend": False,
-                "hovertemplate": "%{customdata}: %{x}<extra></extra>",
-            }  # fmt: skip
+            yield _bars(item, _axis(layout, where, "y"))
         case Correlations():
             yield _correlations(item, where, layout)
         case Note():
-            place: dict[str, Any] = {"x": 0.5, "y": 0.5}
+            place: Layout = {"x": 0.5, "y": 0.5}
             if item.corner:
                 place = {"x": 0.03, "y": 0.95, "xanchor": "left", "yanchor": "top"}
             layout["annotations"].append(
@@ -80,13 +69,17 @@ def traces(
             raise NotImplementedError(f"plotly draws no {type(item).__name__}")
 
 
-def line_trace(item: Line, panel: Panel | None) -> dict[str, Any]:
-    """Return a line as a trace; without a panel it is only the entry of a legend."""
+def entry_trace(item: Curve | Area, panel: Panel | None = None) -> Layout:
+    """Return a line or an area as a trace; without a panel it is only the entry of a legend."""
+    return _area(item) if isinstance(item, Area) else _line(item, panel)
+
+
+def _line(item: Curve, panel: Panel | None) -> Layout:
     in_space = panel is not None and panel.in_space
     rows = item.rows if len(item.rows) else np.full((1, 3 if in_space else 2), np.nan)
     colour = css(item.colour)
     symbol = _SYMBOLS.get(item.marker, "circle")
-    trace: dict[str, Any] = {
+    trace: Layout = {
         "type": "scatter3d" if in_space else "scatter", **dict(zip("xyz", rows.T, strict=False)),
         "mode": "+".join(["lines"] * (item.dash is not None) + ["markers"] * bool(item.marker)),
         "line": {"color": colour, "width": POINT * item.width * (2 if in_space else 1)},
@@ -96,24 +89,21 @@ def line_trace(item: Line, panel: Panel | None) -> dict[str, Any]:
     }  # fmt: skip
     if item.dash and not in_space:
         trace["line"]["dash"] = _dashes(item)
-    error = ""
     if item.error is not None:
         trace["error_y"] = {
             "type": "data", "array": np.asarray(item.error), "width": 0, "thickness": POINT * 0.7,
             "color": colour,
         }  # fmt: skip
         trace["text"] = [f" ± {one:.2g}" if np.isfinite(one) else "" for one in item.error]
-        error = "%{text}"
     if item.hover and panel is not None:
         name, x, y = map(for_browser, (item.name or item.group, panel.x_label, panel.y_label))
-        trace["hoverinfo"] = "all"
-        trace["hovertemplate"] = (
-            f"{name}<br>{x}: %{{x:.4g}}<br>{y}: %{{y:.4g}}{error}<extra></extra>"
-        )
+        error = "" if item.error is None else "%{text}"
+        hover = f"{name}<br>{x}: %{{x:.4g}}<br>{y}: %{{y:.4g}}{error}<extra></extra>"
+        trace |= {"hoverinfo": "all", "hovertemplate": hover}
     return trace
 
 
-def area_trace(item: Area) -> dict[str, Any]:
+def _area(item: Area) -> Layout:
     """Return polygons as a trace, closed and with a gap behind each."""
     gap = np.full((1, 2), np.nan)
     rows = np.concatenate([gap, *(part for one in item.polygons for part in (one, one[:1], gap))])
@@ -125,7 +115,7 @@ def area_trace(item: Area) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _mesh(item: Faces) -> dict[str, Any]:
+def _mesh(item: Faces) -> Layout:
     corners = item.corners.reshape(-1, 3)
     first = 4 * np.arange(len(item.corners))
     triangles = np.concatenate(
@@ -141,10 +131,10 @@ def _mesh(item: Faces) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _arrow(item: Arrow) -> Iterator[dict[str, Any]]:
+def _arrow(item: Arrow) -> Iterator[Layout]:
     start, end = np.asarray(item.start, float), np.asarray(item.end, float)
     step, colour = end - start, css(item.colour)
-    look: dict[str, Any] = {"hoverinfo": "skip", **_named(item)}
+    look: Layout = {"hoverinfo": "skip", **_named(item)}
     if len(start) == 3:
         ends = zip("xyz", np.stack([start, end]).T, strict=True)
         line = {"color": colour, "width": 3.0 * item.width}
@@ -167,33 +157,42 @@ def _arrow(item: Arrow) -> Iterator[dict[str, Any]]:
     }  # fmt: skip
 
 
-def _shape(item: Span, where: dict[str, Any]) -> dict[str, Any]:
+def _shape(item: Span, where: Layout) -> Layout:
     """Return what goes across the whole panel; it is shown and hidden with its group."""
-    own, other = ("x", "y") if item.axis == "x" else ("y", "x")
-    shape: dict[str, Any] = {
-        f"{own}0": item.low, f"{own}1": item.high, f"{own}ref": where[f"{own}axis"],
-        f"{other}0": 0, f"{other}1": 1, f"{other}ref": f"{where[f'{other}axis']} domain",
+    along, across = ("x", "y") if item.axis == "x" else ("y", "x")
+    shape: Layout = {
+        f"{along}0": item.low, f"{along}1": item.high, f"{along}ref": where[f"{along}axis"],
+        f"{across}0": 0, f"{across}1": 1, f"{across}ref": f"{where[f'{across}axis']} domain",
     }  # fmt: skip
     if group := item.group or item.name:
         shape["legendgroup"] = for_browser(group)
     if item.low == item.high:
-        line: dict[str, Any] = {"color": css(item.colour), "width": POINT * item.width}
+        line = {"color": css(item.colour), "width": POINT * item.width}
         return shape | {"type": "line", "line": line | {"dash": _dashes(item) or "solid"}}
     fill = css(item.colour, item.opacity)
     return shape | {"type": "rect", "line": {"width": 0}, "layer": "below", "fillcolor": fill}
 
 
-def _correlations(
-    item: Correlations, where: dict[str, Any], layout: dict[str, Any]
-) -> dict[str, Any]:
-    count = len(item.names)
-    for name, texts in (("x", [str(one + 1) for one in range(count)]), ("y", item.rows)):
-        size = POINT * min(7.0, 3.1 * item.font_size)
-        _axis(layout, where, name).update(
-            tickvals=list(range(count)), ticktext=[for_browser(text) for text in texts],
-            tickfont={"size": size}, showgrid=False,
-        )  # fmt: skip
+def _bars(item: Bars, axis: Layout) -> Layout:
     names = [for_browser(name) for name in item.names]
+    axis |= {"tickvals": list(range(len(names))), "ticktext": names, "showgrid": False, "ticks": ""}
+    return {
+        "type": "bar", "orientation": "h", "x": list(item.values),
+        "marker": {"color": [css(colour) for colour in item.colours]}, "width": 0.6,
+        "text": [f"{value:.2f}" for value in item.values], "customdata": names,
+        "textposition": "outside", "cliponaxis": False, "showlegend": False,
+        "hovertemplate": "%{customdata}: %{x}<extra></extra>",
+    }  # fmt: skip
+
+
+def _correlations(item: Correlations, where: Layout, layout: Layout) -> Layout:
+    names = [for_browser(name) for name in item.names]
+    numbers = [str(number + 1) for number in range(len(names))]
+    for name, texts in (("x", numbers), ("y", item.rows)):
+        _axis(layout, where, name).update(
+            tickvals=list(range(len(names))), ticktext=[for_browser(text) for text in texts],
+            tickfont={"size": POINT * min(7.0, 3.1 * item.font_size)}, showgrid=False,
+        )  # fmt: skip
     return {
         "type": "heatmap", "z": item.values, "zmin": -1.0, "zmax": 1.0, "showscale": False,
         "colorscale": [[i / 20, css(colour)] for i, colour in enumerate(diverging_colours(21))],
@@ -204,19 +203,19 @@ def _correlations(
     }  # fmt: skip
 
 
-def _axis(layout: dict[str, Any], where: dict[str, Any], name: str) -> dict[str, Any]:
+def _axis(layout: Layout, where: Layout, name: str) -> Layout:
     """Return the layout of the axis x or y of a panel, whose name for plotly is like x2."""
     return layout[f"{name}axis{where[f'{name}axis'][1:]}"]
 
 
-def _named(item: Any) -> dict[str, Any]:
+def _named(item: Mark) -> Layout:
     """Return the legend entry of a mark, and the group with which it is shown and hidden."""
     group = for_browser(item.group)
     named = {"name": for_browser(item.name) or group, "showlegend": bool(item.name)}
     return named | ({"legendgroup": group} if group else {})
 
 
-def _dashes(item: Line | Span) -> str:
+def _dashes(item: Curve | Span) -> str:
     return ",".join(f"{POINT * item.width * one:.1f}px" for one in item.dash or ())
 
 

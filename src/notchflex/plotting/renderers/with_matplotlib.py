@@ -21,8 +21,8 @@ from notchflex.plotting.sheet import (
     Arrow,
     Bars,
     Correlations,
+    Curve,
     Faces,
-    Line,
     Note,
     Panel,
     Sheet,
@@ -61,7 +61,7 @@ def figure_of(picture: Sheet) -> Figure:
         if picture.legend:
             entries = [
                 Line2D([], [], **_line_look(one))
-                if isinstance(one, Line)
+                if isinstance(one, Curve)
                 else _polygon(one, np.zeros((1, 2)), one.name)
                 for one in picture.legend
             ]
@@ -118,7 +118,7 @@ def draw_panel(axes: Any, panel: Panel) -> None:
 
 def _draw(axes: Any, item: Any) -> None:
     match item:
-        case Line():
+        case Curve():
             rows = item.rows if len(item.rows) else np.zeros((0, 3 if axes.name == "3d" else 2))
             axes.plot(*rows.T, **_line_look(item))
             if item.error is not None:
@@ -131,23 +131,31 @@ def _draw(axes: Any, item: Any) -> None:
         case Arrow():
             _draw_arrow(axes, item)
         case Span():
-            _draw_span(axes, item)
+            look: dict[str, Any] = {"color": item.colour, "label": for_paper(item.name) or None}
+            way = "v" if item.axis == "x" else "h"
+            if item.low == item.high:
+                look |= {"linestyle": _dashes(item.dash), "linewidth": item.width}
+                getattr(axes, f"ax{way}line")(item.low, **look)
+            else:
+                look |= {"alpha": item.opacity, "linewidth": 0.0}
+                getattr(axes, f"ax{way}span")(item.low, item.high, **look)
         case Bars():
-            _draw_bars(axes, item)
+            places = np.arange(len(item.values))
+            bars = axes.barh(places, item.values, color=item.colours, height=0.6)
+            axes.bar_label(bars, fmt="{:.2f}", padding=3, fontsize=8.0)
+            axes.set_yticks(places, [for_paper(name) for name in item.names])
+            axes.invert_yaxis()
+            axes.grid(visible=False, axis="y")
         case Correlations():
             _draw_correlations(axes, item)
         case Note():
             at = (0.03, 0.95) if item.corner else (0.5, 0.5)
             aligned = {"va": "top"} if item.corner else {"ha": "center"}
-            look: dict[str, Any] = {"transform": axes.transAxes, "color": item.colour} | aligned
+            look = {"transform": axes.transAxes, "color": item.colour, **aligned}
             write = axes.text2D if axes.name == "3d" else axes.text
             write(*at, for_paper(item.text), **look)
         case _:
             pass  # faces are drawn together, before
-
-
-def _label(name: str) -> str | None:
-    return for_paper(name) or None
 
 
 def _polygon(item: Area, points: Any, name: str) -> Polygon:
@@ -158,7 +166,7 @@ def _polygon(item: Area, points: Any, name: str) -> Polygon:
         linewidth=item.width,
         joinstyle="round",
         zorder=item.layer,
-        label=_label(name),
+        label=for_paper(name) or None,
     )
 
 
@@ -166,7 +174,7 @@ def _dashes(dash: tuple[float, ...] | None) -> Any:
     return "" if dash is None else (0, dash) if dash else "-"
 
 
-def _line_look(item: Line) -> dict[str, Any]:
+def _line_look(item: Curve) -> dict[str, Any]:
     return {
         "color": item.colour,
         "linestyle": _dashes(item.dash),
@@ -184,33 +192,21 @@ def _draw_arrow(axes: Any, item: Arrow) -> None:
     start, end = np.asarray(item.start, float), np.asarray(item.end, float)
     look: dict[str, Any] = {"color": item.colour, "linewidth": item.width}
     if len(start) == 3:
-        axes.quiver(*start, *(end - start), label=_label(item.name), **look)
+        axes.quiver(*start, *(end - start), label=for_paper(item.name) or None, **look)
         return
     shape: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 9.0}
     shape |= {"connectionstyle": f"arc3,rad={item.bend}", "shrinkA": 0.0, "shrinkB": 0.0}
     axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), zorder=item.layer, **shape, **look))
     axes.update_datalim(np.stack([start, end]) if item.reach is None else item.reach)
     if item.name:
-        axes.plot([], [], color=item.colour, marker=">", markersize=4.0, label=_label(item.name))
-
-
-def _draw_span(axes: Any, item: Span) -> None:
-    look: dict[str, Any] = {"color": item.colour, "label": _label(item.name)}
-    if item.low == item.high:
-        line = axes.axvline if item.axis == "x" else axes.axhline
-        line(item.low, linestyle=_dashes(item.dash), linewidth=item.width, **look)
-    else:
-        band = axes.axvspan if item.axis == "x" else axes.axhspan
-        band(item.low, item.high, alpha=item.opacity, linewidth=0.0, **look)
-
-
-def _draw_bars(axes: Any, item: Bars) -> None:
-    places = np.arange(len(item.values))
-    bars = axes.barh(places, item.values, color=item.colours, height=0.6)
-    axes.bar_label(bars, fmt="{:.2f}", padding=3, fontsize=8.0)
-    axes.set_yticks(places, [for_paper(name) for name in item.names])
-    axes.invert_yaxis()
-    axes.grid(visible=False, axis="y")
+        axes.plot(
+            [],
+            [],
+            color=item.colour,
+            marker=">",
+            markersize=4.0,
+            label=for_paper(item.name) or None,
+        )
 
 
 def _draw_correlations(axes: Any, item: Correlations) -> None:
@@ -235,7 +231,9 @@ def _draw_faces(axes: Any, faces: Sequence[Faces]) -> None:
     )
     for one in faces:
         if one.name:
-            axes.plot([], [], [], color=one.colour, linewidth=5.0, label=_label(one.name))
+            axes.plot(
+                [], [], [], color=one.colour, linewidth=5.0, label=for_paper(one.name) or None
+            )
 
 
 def _set_equal_in_space(axes: Any, panel: Panel) -> None:

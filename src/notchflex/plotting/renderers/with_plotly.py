@@ -13,9 +13,9 @@ import numpy as np
 
 from notchflex._extras import need
 from notchflex.plotting.labels import for_browser, heading_lines
-from notchflex.plotting.renderers.plotly_marks import INCH, POINT, area_trace, line_trace, traces
+from notchflex.plotting.renderers.plotly_marks import INCH, POINT, Layout, entry_trace, traces
 from notchflex.plotting.renderers.with_matplotlib import figure_of
-from notchflex.plotting.sheet import Area, Panel, Sheet
+from notchflex.plotting.sheet import Panel, Sheet
 from notchflex.results.files.writing import write_text
 
 NARROWEST = 0.75
@@ -35,7 +35,7 @@ def interactive_of(picture: Sheet) -> Any:
     paper.draw_without_rendering()  # arranges everything
     width, height = INCH * picture.width, INCH * picture.height
     heading = heading_lines(picture.title, picture.width)
-    layout: dict[str, Any] = {
+    layout: Layout = {
         "font": {"size": 9.0 * POINT, "family": "DejaVu Sans, Verdana, sans-serif",
                  "color": "#222"},
         "template": None, "paper_bgcolor": "white", "plot_bgcolor": "white",
@@ -60,8 +60,7 @@ def interactive_of(picture: Sheet) -> Any:
         _add_legend(legend, "legend", layout)
         layout["legend"] |= {"orientation": "h", "x": 0.5, "xanchor": "center"}
         for entry in picture.legend:
-            trace = area_trace(entry) if isinstance(entry, Area) else line_trace(entry, None)
-            figure.add_trace(trace | {"legend": "legend"})
+            figure.add_trace(entry_trace(entry) | {"legend": "legend"})
     figure.update_layout(layout)
     return figure
 
@@ -72,17 +71,10 @@ def save_html(picture: Sheet, target: str | FilePath) -> None:
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
     """
-    text = interactive_of(picture).to_html(
-        include_plotlyjs=True,
-        full_html=True,
-        default_width="100%",
-        div_id="notchflex",  # the same picture gives the same file
-        config={
-            "displaylogo": False,
-            "responsive": True,
-            "toImageButtonOptions": {"format": "svg"},
-        },
-    )
+    config = {"displaylogo": False, "responsive": True, "toImageButtonOptions": {"format": "svg"}}
+    options: dict[str, Any] = {"include_plotlyjs": True, "full_html": True, "config": config}
+    # With a fixed name of the element the same picture gives the same file.
+    text = interactive_of(picture).to_html(div_id="notchflex", default_width="100%", **options)
     narrowest = round(NARROWEST * INCH * picture.width)
     head = f"<head><title>{escape(picture.title)}</title>"
     head += f"<style>#notchflex {{min-width: {narrowest}px}}</style>"
@@ -90,8 +82,8 @@ def save_html(picture: Sheet, target: str | FilePath) -> None:
 
 
 def _add_axes(
-    panel: Panel, axes: Any, number: int, layout: dict[str, Any], shared: dict[str, str]
-) -> dict[str, str]:
+    panel: Panel, axes: Any, number: int, layout: Layout, shared: dict[str, str]
+) -> Layout:
     """Add the axes of a panel where matplotlib has them; return where its traces belong."""
     box = axes.get_position()
     suffix = "" if number == 1 else str(number)
@@ -101,47 +93,47 @@ def _add_axes(
              "y": box.y1, "yref": "paper", "yanchor": "bottom", "showarrow": False}
         )  # fmt: skip
     domain = {"x": [box.x0, box.x1], "y": [box.y0, box.y1]}
-    found: dict[str, Any] = {}
+    scales: dict[str, Layout] = {}
     for name in "xyz" if panel.in_space else "xy":
         label = for_browser(getattr(panel, f"{name}_label"))
-        found[name] = {
+        scales[name] = {
             "title": {"text": label, "standoff": 6, "font": {"size": 9.0 * POINT}},
             "gridcolor": "#e6e6e6", "zeroline": False,
             "range": list(getattr(axes, f"get_{name}lim")()),
         }  # fmt: skip
         if name in panel.whole:
-            found[name] |= {"tickformat": "d", "nticks": 8}
+            scales[name] |= {"tickformat": "d", "nticks": 8}
     if panel.in_space:
-        for axis in found.values():
+        for axis in scales.values():
             axis["title"].pop("standoff")
             axis |= {"nticks": 5, "backgroundcolor": "white"}
-        span = {name: float(np.ptp(axis["range"])) for name, axis in found.items()}
+        span = {name: float(np.ptp(axis["range"])) for name, axis in scales.items()}
         layout[f"scene{suffix}"] = {
             "domain": domain, "aspectmode": "manual",
             "aspectratio": {name: one / max(span.values()) for name, one in span.items()},
             "camera": {"eye": {"x": 0.8, "y": -1.7, "z": 0.55}},
-            **{f"{name}axis": axis for name, axis in found.items()},
+            **{f"{name}axis": axis for name, axis in scales.items()},
         }  # fmt: skip
         return {"scene": f"scene{suffix}"}
     for name, other in ("xy", "yx"):
-        found[name] |= {
+        scales[name] |= {
             "domain": domain[name], "anchor": other + suffix, "showline": True,
             "linecolor": "#444", "ticks": "outside", "ticklen": 4,
         }  # fmt: skip
-        own = name + suffix
-        if name in panel.shared and shared.setdefault(name, own) != own:
-            found[name]["matches"] = shared[name]
-        layout[f"{name}axis{suffix}"] = found[name]
+        axis = name + suffix
+        if name in panel.shared and shared.setdefault(name, axis) != axis:
+            scales[name]["matches"] = shared[name]
+        layout[f"{name}axis{suffix}"] = scales[name]
     if panel.most_x is not None:
-        found["x"]["nticks"] = panel.most_x
+        scales["x"]["nticks"] = panel.most_x
     if axes.get_aspect() == 1.0:
-        found["y"]["scaleanchor"] = f"x{suffix}"
+        scales["y"]["scaleanchor"] = f"x{suffix}"
         if axes.get_adjustable() == "box":
-            found["x"]["constrain"] = found["y"]["constrain"] = "domain"
+            scales["x"]["constrain"] = scales["y"]["constrain"] = "domain"
     return {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
 
 
-def _add_legend(legend: Any, name: str, layout: dict[str, Any]) -> dict[str, Any]:
+def _add_legend(legend: Any, name: str, layout: Layout) -> Layout:
     """Add a legend where matplotlib has it; return what its traces have for it."""
     if legend is None:
         return {"showlegend": False}

@@ -19,17 +19,10 @@ COLOUR = {DEAD: PURPLE, FOLLOWING: SKY, WEIGHT: GREY}
 
 
 class AppliedLoad(NamedTuple):
-    """One force or moment in the frame of the base.
-
-    Attributes:
-        name: "force" or "moment".
-        kind: One of `DEAD`, `FOLLOWING`, `WEIGHT`.
-        point: Point of action [mm].
-        vector: The force [N] or moment [N mm].
-    """
+    """One "force" [N] or "moment" [N mm] in the frame of the base, and its point of action [mm]."""
 
     name: str
-    kind: str
+    kind: str  # one of `DEAD`, `FOLLOWING`, `WEIGHT`
     point: NDArray[np.float64]
     vector: NDArray[np.float64]
 
@@ -49,11 +42,6 @@ def applied_loads(path: EquilibriumPath, step: int, shape: RobotShape) -> list[A
     """Return the forces and moments on a robot at one step of a path; a hung mass as its weight.
 
     Gravity on the robot's own mass is distributed and not included.
-
-    Args:
-        path: Solved path.
-        step: Index of the step.
-        shape: The shape of the robot at this step.
     """
     return [one for one in _every(path, step, shape) if one.size > 0.0]
 
@@ -63,8 +51,8 @@ def _every(path: EquilibriumPath, step: int, shape: RobotShape) -> Iterator[Appl
     world = path.body_rotation[step, 0]
 
     def carried(vector: object, body: int, following: bool) -> NDArray[np.float64]:
-        given = np.asarray(vector, float)
-        return shape.rotation[body] @ given if following else given @ world
+        stated = np.asarray(vector, float)
+        return shape.rotation[body] @ stated if following else stated @ world
 
     kind = FOLLOWING if load.following else DEAD
     point = shape.on_body(-1, np.array([0.0, 0.0, shape.body_length[-1]]) + load.tip_point)

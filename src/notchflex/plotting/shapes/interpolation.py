@@ -13,15 +13,9 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 def interpolate_poses(rotation: Array, position: Array, parts: int) -> tuple[Array, Array]:
-    """Insert poses between given ones.
+    """Insert poses between k ones: rotations (..., k, 3, 3) and positions (..., k, 3).
 
-    Args:
-        rotation: (..., k, 3, 3).
-        position: (..., k, 3).
-        parts: Number of steps from each pose to the next one.
-
-    Returns:
-        Rotations and positions of (k - 1) parts + 1 poses, with the given ones among them.
+    `parts` is the number of steps from each pose to the next one: (k - 1) parts + 1 poses.
 
     Example:
         >>> turned = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])

@@ -16,30 +16,21 @@ from numpy.typing import NDArray
 from notchflex.plotting.shapes.robot_shape import HELD, UP, RobotShape
 from notchflex.robot import Robot
 
+Wall = tuple[float, float] | None
 _CLAMP = 1.7  # half the width of the clamp, in outer radii
 
 
 @dataclass(frozen=True)
 class Outline:
-    """Polygons and lines in the plane of a view [mm], each (k, 2).
+    """Polygons and lines in the plane of a view [mm], each (k, 2)."""
 
-    Attributes:
-        bodies: Outline of every body, base first.
-        bores: Lines of the inner wall of every body, one for each side with a wall.
-        flexures: Strip of every notch.
-        tendons: Line of every tendon.
-        lips: Point of every notch where its edges meet when it closes.
-        centre_line: The tube axis from base to tip.
-        held: The clamp below the base.
-    """
-
-    bodies: list[NDArray[np.float64]]
-    bores: list[NDArray[np.float64]]
-    flexures: list[NDArray[np.float64]]
+    bodies: list[NDArray[np.float64]]  # base first
+    bores: list[NDArray[np.float64]]  # inner wall of every body, one for each side with a wall
+    flexures: list[NDArray[np.float64]]  # the strip of every notch
     tendons: list[NDArray[np.float64]]
-    lips: list[NDArray[np.float64]]
-    centre_line: NDArray[np.float64]
-    held: NDArray[np.float64]
+    lips: list[NDArray[np.float64]]  # where the edges of every notch meet when it closes
+    centre_line: NDArray[np.float64]  # from base to tip
+    held: NDArray[np.float64]  # the clamp below the base
 
 
 def project(points: Any, view: float) -> NDArray[np.float64]:
@@ -53,24 +44,14 @@ def _across(view: float) -> NDArray[np.float64]:
 
 
 def bending_plane(robot: Robot, offset: float = 1e-9) -> float | None:
-    """Return the direction [rad] of the plane in which all notches bend; None if they do not.
-
-    Args:
-        robot: The robot.
-        offset: Largest difference of directions [rad] in one plane.
-    """
+    """Return the direction [rad] of the plane in which all notches bend, up to an offset [rad]."""
     directions = np.radians([notch.direction_deg for notch in robot.notches])
     first = float(directions[0])
     return first if np.all(np.abs(np.sin(directions - first)) < offset) else None
 
 
 def outline(shape: RobotShape, view: float) -> Outline:
-    """Return the outline of a robot in one state.
-
-    Args:
-        shape: The robot.
-        view: Direction across the base that is drawn to the right [rad]; 0 is x.
-    """
+    """Return the outline of a robot, with a direction [rad] of the base drawn to the right."""
     across = _across(view)
     outer, inner = shape.robot.tube.outer_radius, shape.robot.tube.inner_radius
     bodies, bores = [], []
@@ -105,20 +86,14 @@ def outline(shape: RobotShape, view: float) -> Outline:
 
 
 def body_corners(shape: RobotShape, body: int, view: float) -> list[tuple[float, float]]:
-    """Return the outline of a body in its own frame: corners (across, along) [mm], in order.
-
-    Args:
-        shape: The robot.
-        body: Which body, 0 is the base.
-        view: Direction across the tube that is drawn to the right [rad].
-    """
+    """Return the outline of a body (0 is the base): corners (across, along) in its frame [mm]."""
     tube = shape.robot.tube
     right, left = _sides(shape, body, view)
     reach = _reach(shape, body, _across(view), tube.inner_radius)
     return _body(right, left, tube.outer_radius, reach)
 
 
-def _sides(shape: RobotShape, body: int, view: float) -> list[tuple[float, float] | None]:
+def _sides(shape: RobotShape, body: int, view: float) -> list[Wall]:
     """Return the ends of the wall of a body on the right and the left; None if no wall."""
     return [shape.walls(np.degrees(view) + turn)[body] for turn in (0.0, 180.0)]
 
@@ -144,11 +119,8 @@ def _reach(
     The inner radius, or less where a flexure is attached.
     """
     reach = [inner, inner]
-    joined = []
-    if body:
-        joined.append((shape.flexures[body - 1], -1))
-    if body < len(shape.flexures):
-        joined.append((shape.flexures[body], 0))
+    joined = [(shape.flexures[body - 1], -1)] if body else []
+    joined += [(one, 0) for one in shape.flexures[body : body + 1]]
     for one, end in joined:
         edges = np.stack([one.fibre(-one.spine)[end], one.position[end], one.fibre(one.near)[end]])
         local = (edges - shape.position[body]) @ shape.rotation[body] @ across
@@ -159,10 +131,7 @@ def _reach(
 
 
 def _body(
-    right: tuple[float, float] | None,
-    left: tuple[float, float] | None,
-    outer: float,
-    reach: tuple[float, float],
+    right: Wall, left: Wall, outer: float, reach: tuple[float, float]
 ) -> list[tuple[float, float]]:
     """Return the corners of a body (across, along), counter-clockwise from the lower right."""
     if right is None or left is None:
@@ -176,15 +145,6 @@ def _body(
     # Walls that overlap are connected at right angles, others diagonally.
     top = [(reach[0], high), (-reach[1], high)] if high > low else []
     foot = [(-reach[1], low), (reach[0], low)] if high > low else []
-    return [
-        (outer, right[0]),
-        (outer, right[1]),
-        (reach[0], right[1]),
-        *top,
-        (-reach[1], left[1]),
-        (-outer, left[1]),
-        (-outer, left[0]),
-        (-reach[1], left[0]),
-        *foot,
-        (reach[0], right[0]),
-    ]
+    upper = [(outer, right[1]), (reach[0], right[1]), *top, (-reach[1], left[1]), (-outer, left[1])]
+    lower = [(-outer, left[0]), (-reach[1], left[0]), *foot, (reach[0], right[0])]
+    return [(outer, right[0]), *upper, *lower]

@@ -8,24 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.plotting.branches import by_stroke, driven_by_stroke
-from notchflex.plotting.shapes.applied_loads import (
-    COLOUR,
-    AppliedLoad,
-    applied_loads,
-    out_of_plane,
-)
-from notchflex.plotting.shapes.faces import body_faces, flexure_faces, shaded
+from notchflex.plotting.curves import by_stroke, driven_by_stroke
+from notchflex.plotting.shapes.applied_loads import COLOUR, AppliedLoad, applied_loads, out_of_plane
 from notchflex.plotting.shapes.outline import bending_plane, outline, project
-from notchflex.plotting.shapes.robot_shape import RobotShape, shape_at
+from notchflex.plotting.shapes.robot_shape import FlexureShape, RobotShape, shape_at
 from notchflex.plotting.sheet import (
     BESIDE,
     FINE,
     Area,
     Arrow,
     Colour,
+    Curve,
     Faces,
-    Line,
     Mark,
     Note,
     Panel,
@@ -36,11 +30,18 @@ from notchflex.plotting.style import GREY, ORANGE, VERMILLION, rgb, sequence_col
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
+Quads = NDArray[np.float64]
+
 MOST_SHAPES = 5
 """More shapes than this hide each other."""
 
 ARROW, SHORTEST = 0.18, 0.25
 """Longest arrow in lengths of the robot, and shortest arrow in lengths of the longest."""
+
+ROUND = 32
+"""Flat pieces round the tube in space."""
+
+LIGHT = np.array([0.35, -0.75, 0.55]) / np.linalg.norm([0.35, -0.75, 0.55])
 
 _NOTHING = 1e-6
 """A tension [N] or stroke [mm] less than this is written as 0."""
@@ -49,16 +50,9 @@ _NOTHING = 1e-6
 def representative_steps(
     path: EquilibriumPath, most: int = MOST_SHAPES, among: Sequence[int] | None = None
 ) -> list[int]:
-    """Return the steps to draw: an even selection of the shapes of the robot.
+    """Return an even selection of converged steps (`among` some), straightest to most bent.
 
-    Args:
-        path: Solved path.
-        most: Maximum number of steps.
-        among: The steps to choose from; all if None.
-
-    Returns:
-        Indices of converged steps, from the straightest to the most bent; of equal shapes the
-        first.
+    Of equal shapes it has the first.
     """
     good = np.flatnonzero(np.asarray(path.converged) & np.isfinite(path.total_angle))
     if among is not None:
@@ -96,13 +90,8 @@ def shape_panel(
 ) -> Panel:
     """Return a robot at several steps of a path, to scale, with its loads.
 
-    Args:
-        path: Solved path.
-        steps: Indices of the steps.
-        view: Direction across the base that is drawn to the right [rad]; None to draw in space.
-        title: Title of the panel.
-        colours: A colour for each step; from dark to light if None.
-        legend: Position of the legend.
+    `view` is the direction across the base that is drawn to the right [rad]; None draws in space.
+    Every step has a colour, by default from dark to light.
     """
     if not steps:
         view = view or 0.0
@@ -118,7 +107,8 @@ def shape_panel(
             items += _from_the_side(shape, view, colour, label, order)
         closed += [shape.lips(int(notch)) for notch in np.flatnonzero(path.closed[step])]
         loads += applied_loads(path, step, shape)
-    top, extent = 3 * len(steps) + 5, _extent(path)
+    top, bodies = 3 * len(steps) + 5, np.diff(path.body_position[0], axis=0)
+    extent = float(np.linalg.norm(bodies, axis=1).sum() + path.robot.tube.outer_diameter)
     if closed:
         points = np.array(closed) if view is None else project(closed, view)
         name = "closed notch"
@@ -130,7 +120,9 @@ def shape_panel(
     if view is None:
         labels = "x [mm]", "y [mm]", "z, along the base [mm]"
         return Panel(items, *labels, title=title, legend=legend)
-    labels = f"across the base, {_across_name(view)} [mm]", "along the base, z [mm]"
+    degrees = round(float(np.degrees(view)), 6) % 360
+    across = {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
+    labels = f"across the base, {across} [mm]", "along the base, z [mm]"
     return Panel(items, *labels, title=title, legend=legend, equal=True, scale="shape")
 
 
@@ -153,17 +145,6 @@ def scaled_arrow(one: AppliedLoad, largest: float, longest: float) -> NDArray[np
     return longest * max(one.size / largest, SHORTEST) * one.vector / one.size
 
 
-def _across_name(view: float) -> str:
-    degrees = round(float(np.degrees(view)), 6) % 360
-    return {0.0: "x", 90.0: "y"}.get(degrees, f"x turned by {degrees:g}° about z")
-
-
-def _extent(path: EquilibriumPath) -> float:
-    """Return the approximate length of a robot [mm]."""
-    steps = np.diff(path.body_position[0], axis=0)
-    return float(np.linalg.norm(steps, axis=1).sum() + path.robot.tube.outer_diameter)
-
-
 def _from_the_side(
     shape: RobotShape, view: float, colour: Colour, label: str, order: int
 ) -> Iterator[Mark]:
@@ -177,9 +158,9 @@ def _from_the_side(
     yield Area(polygons, pale, colour, name=label, layer=2 + level, **look)
     gap = np.full((1, 2), np.nan)
     bores = np.concatenate([part for line in drawn.bores for part in (line, gap)])
-    yield Line(bores, colour, FINE, 0.5, layer=3 + level, **look)
+    yield Curve(bores, colour, FINE, 0.5, layer=3 + level, **look)
     for line in drawn.tendons:
-        yield Line(line, ORANGE, width=1.0, layer=4 + level, **look)
+        yield Curve(line, ORANGE, width=1.0, layer=4 + level, **look)
 
 
 def _in_space(shape: RobotShape, colour: Colour, label: str, first: bool) -> Iterator[Mark]:
@@ -187,9 +168,9 @@ def _in_space(shape: RobotShape, colour: Colour, label: str, first: bool) -> Ite
     if first:  # the base does not move: it is drawn once
         yield Faces(base, shaded(base, rgb(GREY)), GREY)
     faces = np.concatenate([*bodies, *flexure_faces(shape)])
-    yield Faces(faces, shaded(faces, colour), colour, label, label)
+    yield Faces(faces, shaded(faces, colour), colour, name=label, group=label)
     for number in range(len(shape.robot.tendon)):
-        yield Line(shape.tendon(number), ORANGE, width=0.9, group=label, layer=5)
+        yield Curve(shape.tendon(number), ORANGE, width=0.9, group=label, layer=5)
 
 
 def _load_arrows(
@@ -219,3 +200,49 @@ def _load_arrows(
             reach = np.array([start - longest, start + longest])
             look |= {"bend": 0.9, "reach": reach}
             yield Arrow(start - side, start + side, COLOUR[one.kind], **look)
+
+
+def body_faces(shape: RobotShape) -> Iterator[Quads]:
+    """Yield the outer wall of every body, (pieces, 4, 3)."""
+    outer = shape.robot.tube.outer_radius
+    edges = 2.0 * np.pi * np.arange(ROUND + 1) / ROUND
+    rim = outer * np.stack([np.cos(edges), np.sin(edges)], axis=1)
+    sides = [shape.walls(float(np.degrees(angle))) for angle in edges[:-1] + np.pi / ROUND]
+    for body in range(len(shape.position)):
+        corners = [
+            np.column_stack([rim[[i, i + 1, i + 1, i]], np.repeat(wall, 2)])
+            for i in range(ROUND)
+            if (wall := sides[i][body]) is not None and wall[1] > wall[0]
+        ]
+        if corners:
+            yield shape.on_body(body, corners)
+
+
+def flexure_faces(shape: RobotShape) -> Iterator[Quads]:
+    """Yield every flexure: the wall at its spine, or a band with its thickness and area."""
+    outer = shape.robot.tube.outer_radius
+    closes = np.asarray(shape.chain.rods.has_closure) > 0.0
+    for one, spine in zip(shape.flexures, closes, strict=True):
+        half = 0.5 * one.area / (one.spine + one.near)
+        band = [(-one.spine, -half), (-one.spine, half), (one.near, half), (one.near, -half)]
+        lines = _spine(one, outer) if spine else [*band, band[0]]
+        along = np.stack([one.fibre(across, out) for across, out in lines], axis=1)
+        corners = [along[:-1, :-1], along[:-1, 1:], along[1:, 1:], along[1:, :-1]]
+        yield np.stack(corners, axis=2).reshape(-1, 4, 3)
+
+
+def shaded(faces: Quads, colour: Any) -> list[Any]:
+    """Return the colours of the faces by their angle to the light."""
+    normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
+    size = np.linalg.norm(normal, axis=1)
+    facing = np.abs(normal @ LIGHT) / np.where(size > 0.0, size, 1.0)
+    base = np.array(rgb(colour))
+    base, pale = 0.8 * base, 1.0 - 0.45 * (1.0 - base)
+    return [tuple(base + part * (pale - base)) for part in facing]
+
+
+def _spine(one: FlexureShape, outer: float) -> list[tuple[Any, Any]]:
+    axis = outer - one.spine  # from the neutral axis to the axis of the tube
+    half = float(np.arccos(np.clip((axis[0] - one.near[0]) / outer, -1.0, 1.0)))
+    angles = np.pi + np.linspace(-half, half, 9)
+    return [(axis + outer * np.cos(angle), outer * np.sin(angle)) for angle in angles]

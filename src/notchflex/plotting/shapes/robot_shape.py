@@ -33,20 +33,14 @@ HELD = 0.8  # length of clamped tube drawn below the base, in outer radii
 class FlexureShape:
     """One flexure from its start to its end: k sections [mm] in the frame of the base.
 
-    Attributes:
-        rotation: Axes of each section as columns: across in the plane of bending, across out of
-            it, along; (k, 3, 3).
-        position: Its neutral axis, (k, 3).
-        spine: Distance of its edge against the first axis, (k,).
-        near: Distance of its edge along the first axis, (k,).
-        area: Its area [mm²], (k,).
+    The axes of a section are columns: across in the plane of bending, across out of it, along.
     """
 
-    rotation: Points
-    position: Points
-    spine: Points
-    near: Points
-    area: Points
+    rotation: Points  # (k, 3, 3)
+    position: Points  # of the neutral axis, (k, 3)
+    spine: Points  # distance of its edge against the first axis, (k,)
+    near: Points  # distance of its edge along the first axis, (k,)
+    area: Points  # mm², (k,)
 
     def fibre(self, across: Any, out: Any = 0.0) -> Points:
         """Return the line at (across, out) from the neutral axis, (k, 3)."""
@@ -56,21 +50,13 @@ class FlexureShape:
 
 @dataclass(frozen=True)
 class RobotShape:
-    """A robot of n notches in one state [mm], in the frame of its base.
-
-    Attributes:
-        robot: The robot.
-        chain: The robot as arrays.
-        rotation: Rotation of each body, (n + 1, 3, 3).
-        position: Its proximal face centre, (n + 1, 3).
-        flexures: The flexures, base to tip.
-    """
+    """A robot of n notches in one state [mm], in the frame of its base."""
 
     robot: Robot
     chain: Chain
-    rotation: Points
-    position: Points
-    flexures: list[FlexureShape]
+    rotation: Points  # of each body, (n + 1, 3, 3)
+    position: Points  # proximal face centre of each body, (n + 1, 3)
+    flexures: list[FlexureShape]  # base to tip
 
     @cached_property
     def body_length(self) -> Points:
@@ -97,11 +83,8 @@ class RobotShape:
     def contacts(self, number: int, radius: float | None = None) -> Points:
         """Return the friction contacts of a tendon (from 0), base to tip, (contacts, 3).
 
-        They are the edges of the bodies that it passes, except those of the body that it ends in.
-
-        Args:
-            number: The tendon.
-            radius: Distance [mm] of the points from the tube axis; None for that of the tendon.
+        They are the edges of the bodies that it passes, except those of the body that it ends in,
+        at a radius [mm] from the tube axis, by default that of the tendon.
         """
         edges = [points for points, on_body in self._along(number, radius) if on_body]
         return np.concatenate(edges)[1:-2]  # neither the foot, nor both edges of the last body
@@ -116,8 +99,7 @@ class RobotShape:
         walls = self.walls(self.robot.tendon[number].direction_deg)
         place = np.asarray(self.chain.tendon_place)[number]
         if radius is not None:
-            angle = np.radians(self.robot.tendon[number].direction_deg)
-            place = radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+            place = _radial(radius, self.robot.tendon[number].direction_deg)
         for body in range(len(self.position)):
             if body and not present[body - 1]:
                 break
@@ -131,12 +113,10 @@ class RobotShape:
     def lips(self, notch: int, radius: float | None = None) -> Points:
         """Return the point midway between the edges of a notch (from 0) that meet when it closes.
 
-        Args:
-            notch: The notch.
-            radius: Distance [mm] of the point from the tube axis; None for the outer radius.
+        It lies at a radius [mm] from the tube axis, by default the outer one.
         """
         outer = self.robot.tube.outer_radius if radius is None else radius
-        found: list[tuple[float, Points]] = []
+        candidates: list[tuple[float, Points]] = []
         for turn in (0.0, 180.0):
             side = self.robot.notches[notch].direction_deg + turn
             walls = self.walls(side)
@@ -146,12 +126,16 @@ class RobotShape:
             before = max(body for body in range(notch + 1) if walls[body] is not None)
             last = walls[before]
             assert last is not None
-            angle = np.radians(side)
-            across = outer * np.array([np.cos(angle), np.sin(angle), 0.0])
+            across = _radial(outer, side)
             first = self.on_body(before, across + last[1] * UP)
             second = self.on_body(notch + 1, across + behind[0] * UP)
-            found.append((float(np.linalg.norm(second - first)), 0.5 * (first + second)))
-        return min(found, key=lambda item: item[0])[1]
+            candidates.append((float(np.linalg.norm(second - first)), 0.5 * (first + second)))
+        return min(candidates, key=lambda item: item[0])[1]
+
+
+def _radial(radius: float, direction_deg: float) -> Points:
+    angle = np.radians(direction_deg)
+    return radius * np.array([np.cos(angle), np.sin(angle), 0.0])
 
 
 @lru_cache(maxsize=256)
@@ -187,14 +171,9 @@ def shape_from_modes(
 ) -> RobotShape:
     """Return the shape of a robot in one state; it does not depend on the pose of the base.
 
-    Args:
-        robot: The robot, n notches.
-        chain: Its chain.
-        modes: Amplitudes of the strain modes of each flexure.
-        body_position: Proximal face centre of each body [mm], (n + 1, 3).
-        body_rotation: Rotation of each body, (n + 1, 3, 3).
-        pieces: Minimum number of straight pieces of each flexure; the nodes of its rod may need
-            more.
+    The state is given by the amplitudes of the strain modes of each flexure, and the proximal face
+    centre [mm], (n + 1, 3), and the rotation of each body. `pieces` is the minimum number of
+    straight pieces of each flexure; the nodes of its rod may need more.
     """
     from notchflex._jax import jax
 
@@ -213,16 +192,16 @@ def shape_from_modes(
     flexures: dict[int, FlexureShape] = {}
     counts = (rods.length > 0.0).sum(axis=1)
     for count in np.unique(counts):  # flexures with the same number of nodes together
-        own = np.flatnonzero(counts == count)
-        there = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in own])
-        kept = np.concatenate([np.zeros((len(own), 1), int), there + 1], axis=1)
-        kept = np.concatenate([kept, np.full((len(own), 1), axes.shape[1] - 1)], axis=1)
+        alike = np.flatnonzero(counts == count)
+        there = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in alike])
+        kept = np.concatenate([np.zeros((len(alike), 1), int), there + 1], axis=1)
+        kept = np.concatenate([kept, np.full((len(alike), 1), axes.shape[1] - 1)], axis=1)
         parts = -(-pieces // (int(count) + 1))
-        row = own[:, None]
+        row = alike[:, None]
         turned, points = interpolate_poses(axes[row, kept], line[row, kept], parts)
         at_node = np.arange(points.shape[1]) / parts - 1.0
         section = rods.section
-        for j, nodes_there, frames, places_there in zip(own, there, turned, points, strict=True):
+        for j, nodes_there, frames, places_there in zip(alike, there, turned, points, strict=True):
             spine, near, area = (
                 np.interp(at_node, np.arange(count), values[j, nodes_there])
                 for values in (section.edge_spine, section.edge_near, section.area)
@@ -233,10 +212,10 @@ def shape_from_modes(
 
 def shape_at(path: EquilibriumPath, step: int, pieces: int = FLEXURE_POINTS) -> RobotShape:
     """Return the shape of a robot at one step of a path; for `pieces` see `shape_from_modes`."""
-    modes, own = path.run.solved.point.unknowns.modes[step], path.chain
-    chain = _of_space(path.robot, own.level, own.refinement)
-    places, turns = path.body_position[step], path.body_rotation[step]
-    return shape_from_modes(path.robot, chain, modes, places, turns, pieces)
+    modes = path.run.solved.point.unknowns.modes[step]
+    chain = _of_space(path.robot, path.chain.level, path.chain.refinement)
+    poses = path.body_position[step], path.body_rotation[step]
+    return shape_from_modes(path.robot, chain, modes, *poses, pieces)
 
 
 @lru_cache(maxsize=16)

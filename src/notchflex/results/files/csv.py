@@ -18,8 +18,7 @@ import numpy as np
 
 from notchflex._quantity import Quantity
 from notchflex.results.files.writing import write_text
-from notchflex.results.quantities.registry import AXES, QUANTITIES, span_names
-from notchflex.results.quantities.spans import holds, spans_of
+from notchflex.results.quantities.registry import AXES, QUANTITIES, holds, span_names, spans_of
 
 if TYPE_CHECKING:
     from pathlib import Path as FilePath

@@ -1,8 +1,8 @@
-"""Tables of numbers from CSV files: read line by line, refused with the line and the column.
+"""Tables of numbers from CSV files; errors name the line and the column.
 
 A table is UTF-8 with commas and its header first; empty lines and lines that start with `#` are
 skipped. Semicolons between the columns, as spreadsheets write them where numbers have a decimal
-comma, are read too. What stands in the columns is said by whoever asks for them.
+comma, are read too.
 """
 
 from __future__ import annotations
@@ -62,24 +62,23 @@ class Table:
             may_miss: Whether an entry may be empty, which is then NaN.
 
         Raises:
-            InputError: An entry is no finite number; the message names line and column.
+            InputError: An entry is not a finite number; the message names line and column.
         """
-        entries = zip(self.texts(column), self.lines, strict=True)
         return np.array(
             [
                 math.nan if may_miss and not text else self._number(text, column, line)
-                for text, line in entries
+                for text, line in zip(self.texts(column), self.lines, strict=True)
             ]
         )
 
     def _number(self, text: str, column: str, line: int) -> float:
+        at = f"{self.name}, line {line}: {column} is {text}"
         try:
             value = float(text.replace(self.decimal, ".", 1))
         except ValueError:
-            value, text = None, repr(text) if text else "nothing"
-        at = f"{self.name}, line {line}: {column} is {text}"
-        if value is None:
-            raise InputError.NOT_A_NUMBER(f"{at}; give a number.")
+            got = repr(text) if text else "nothing"
+            at = f"{self.name}, line {line}: {column} is {got}"
+            raise InputError.NOT_A_NUMBER(f"{at}; give a number.") from None
         if not math.isfinite(value):
             raise InputError.NOT_FINITE(f"{at}; give a finite number.")
         if abs(value) > LARGEST:
@@ -119,36 +118,35 @@ def read_table(source: str | os.PathLike[str]) -> Table:
             if any(map(str.strip, row)) and not row[0].lstrip().startswith("#")
         ]
     except csv.Error as problem:
-        raise InputError.FILE_UNREADABLE(f"{path} is no CSV: {problem}.") from None
-    header = table[0][1] if table else ()
-    lines, rows = zip(*table[1:], strict=True) if table[1:] else ((), ())
-    twice = [column for column in header if column and header.count(column) > 1]
-    uneven = [place for place, row in enumerate(rows) if len(row) != len(header)]
+        raise InputError.FILE_UNREADABLE(f"{path} is not a CSV: {problem}.") from None
     if not table:
         raise InputError.TABLE_ROWS(
             f"{path} is empty; it needs a header and at least one row of numbers."
         )
+    (_, header), *numbered = table
     if len(header) == 1 and "\t" in header[0]:
         raise InputError.FILE_FORMAT(
             f"{path}: the columns are separated by tabs; save it with commas between the columns "
             "and points in the numbers."
         )
-    if twice:
-        raise InputError.TABLE_COLUMNS(
-            f"{path}: the column {twice[0]} is there more than once; keep one."
-        )
-    if not rows:
+    for column in header:
+        if column and header.count(column) > 1:
+            raise InputError.TABLE_COLUMNS(
+                f"{path}: the column {column} is there more than once; keep one."
+            )
+    if not numbered:
         raise InputError.TABLE_ROWS(
             f"{path} has a header and no rows; it needs at least one row of numbers."
         )
-    if uneven:
-        raise InputError.TABLE_ROWS(
-            f"{path}, line {lines[uneven[0]]}: {len(rows[uneven[0]])} entries for {len(header)} "
-            "columns; every row needs one entry for each column."
-        )
-    return Table(
-        str(source), header, lines, rows, "." if separator == "," else _decimal(path, lines, rows)
-    )
+    for line, row in numbered:
+        if len(row) != len(header):
+            raise InputError.TABLE_ROWS(
+                f"{path}, line {line}: {len(row)} entries for {len(header)} columns; every row "
+                "needs one entry for each column."
+            )
+    lines, rows = zip(*numbered, strict=True)
+    decimal = "." if separator == "," else _decimal(path, lines, rows)
+    return Table(str(source), header, lines, rows, decimal)
 
 
 def _separator(text: str) -> str:
@@ -164,19 +162,18 @@ def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) ->
     Raises:
         InputError: Some numbers have a comma and others a point: one of them separates thousands.
     """
-    found: dict[str, tuple[int, str]] = {}
+    first: dict[str, tuple[int, str]] = {}
     for line, row in zip(lines, rows, strict=True):
         for entry in row:
-            number = _DECIMAL.fullmatch(entry)
-            if number is not None:
-                found.setdefault(number[1], (line, entry))
-    if len(found) == 2:
-        (line, entry), (other_line, other) = sorted(found.values())
+            if number := _DECIMAL.fullmatch(entry):
+                first.setdefault(number[1], (line, entry))
+    if len(first) == 2:
+        (line, entry), (other_line, other) = sorted(first.values())
         raise InputError.FILE_FORMAT(
             f"{path}: {entry} in line {line} and {other} in line {other_line} have different "
             "decimal separators; write all numbers with points, or all with commas."
         )
-    return next(iter(found), ".")
+    return next(iter(first), ".")
 
 
 def tendon_columns(header: Sequence[str], quantity: str, tendons: int) -> dict[int, str]:
@@ -187,14 +184,14 @@ def tendon_columns(header: Sequence[str], quantity: str, tendons: int) -> dict[i
         quantity: Name of a quantity of the table of quantities, such as "tension".
         tendons: How many tendons the robot has; the only one may go without its number.
     """
-    found: dict[int, str] = {}
+    columns: dict[int, str] = {}
     for tendon in range(tendons):
         labels: list[object] = [tendon + 1] if tendons > 1 else ["", 1]
-        names = [QUANTITIES[quantity].header(tendon=label) for label in labels]
-        there = [name for name in names if name in header]
-        if there:
-            found[tendon] = there[0]
-    return found
+        names = (QUANTITIES[quantity].header(tendon=label) for label in labels)
+        column = next((name for name in names if name in header), None)
+        if column is not None:
+            columns[tendon] = column
+    return columns
 
 
 def no_tendon_column(table: Table, tendons: int) -> InputError:

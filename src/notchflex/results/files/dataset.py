@@ -1,13 +1,14 @@
-"""A path as a labelled data set of xarray, and what a NetCDF file holds beside it.
+"""A path as a labelled data set of xarray, and as a NetCDF file that can be read back.
 
 Every quantity stands under the name that it has in Python, in the units of Python, with its title
-and unit. A NetCDF file that is read back holds the record of the path in a group of its own: the
-states, and what belongs to the frame of a base that is turned.
+and unit. A group of the file holds the rest of the record of the path: the states, and what belongs
+to the frame of a base that is turned.
 """
 
 from __future__ import annotations
 
 import json
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from notchflex._extras import need
 from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.results.files.record import Record, path_of, record_of
+from notchflex.results.files.writing import replacing
 from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
     from notchflex.results.path import EquilibriumPath
 
-RECORD_GROUP = "read_back"
+_GROUP = "read_back"
 """Group of a NetCDF file that holds what `read_path` needs beside the quantities."""
 
 _FACTS = "facts"
@@ -45,9 +47,16 @@ def dataset_of(path: EquilibriumPath) -> Dataset:
         if values.dtype.kind == "U":
             values = values.astype(object)
         variables[name] = (("step", *quantity.per), values, _described(quantity))
+    tendons, notches = path.tension.shape[1], path.notch_angle.shape[1]
     return xarray.Dataset(
         variables,
-        coords=_coordinates(path),
+        coords={
+            "step": np.arange(1, len(path) + 1),
+            "tendon": np.arange(1, tendons + 1),
+            "notch": np.arange(1, notches + 1),
+            "body": np.arange(notches + 1),
+            "axis": list(AXES),
+        },
         attrs={
             "title": path.robot.name,
             "program": f"{record.facts['program']} {record.facts['version']}",
@@ -57,12 +66,7 @@ def dataset_of(path: EquilibriumPath) -> Dataset:
 
 
 def record_dataset(path: EquilibriumPath) -> Dataset:
-    """Return the part of the record of a path that its quantities do not hold, as a data set.
-
-    Raises:
-        InputError: xarray is not installed.
-    """
-    need("xarray", "data", "to_xarray")
+    """Return the part of the record of a path that its quantities do not hold, as a data set."""
     import xarray
 
     record = record_of(path)
@@ -75,41 +79,67 @@ def record_dataset(path: EquilibriumPath) -> Dataset:
     return xarray.Dataset(variables, attrs={_FACTS: json.dumps(facts)})
 
 
-def path_of_datasets(data: Dataset, record: Dataset | None, source: str) -> EquilibriumPath:
-    """Return the path of what `dataset_of` and `record_dataset` made.
-
-    Args:
-        data: The quantities. Files of version 0.1.0 hold the record with them.
-        record: The rest of the record, if the file has its group.
-        source: Where they were read from, for messages.
+def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
+    """Write a path as NetCDF: what `to_xarray` has, and the rest of its record in a group.
 
     Raises:
-        InputError: They hold no path, or lack something.
+        InputError: A library is not installed, or the file cannot be written.
     """
-    rest = data if record is None else record
+    _need_netcdf()
+    data, record = dataset_of(path), record_dataset(path)
+    with replacing(target) as temporary:
+        data.to_netcdf(temporary, engine="h5netcdf")
+        record.to_netcdf(temporary, engine="h5netcdf", group=_GROUP, mode="a")
+
+
+def read_netcdf(file: str | FilePath) -> EquilibriumPath:
+    """Return the path of a file that `write_netcdf` wrote.
+
+    Raises:
+        InputError: A library is not installed, or the file holds no path or lacks something.
+    """
+    _need_netcdf()
+    import h5py
+    import xarray
+
+    try:
+        data = xarray.load_dataset(file, engine="h5netcdf")
+        with h5py.File(file, "r") as opened:
+            has_record = _GROUP in opened
+        # Files of version 0.1.0 hold the record beside the quantities.
+        group = {"group": _GROUP} if has_record else {}
+        record = xarray.load_dataset(file, engine="h5netcdf", **group)
+    except (OSError, ValueError, KeyError) as problem:
+        words = " ".join(str(problem).split())
+        raise InputError.FILE_UNREADABLE(f"{file} cannot be read as NetCDF: {words}.") from None
     if "robot_file" not in data.attrs:
         raise InputError.FILE_FORMAT(
-            f"{source} holds no path of notchflex; give a file that --nc or save_path wrote."
+            f"{file} holds no path of notchflex; give a file that --nc or save_path wrote."
         )
     if "step" not in data.dims:
         raise InputError.FILE_FORMAT(
-            f"{source} holds one state, not a path: the work done before it is not in it. "
+            f"{file} holds one state, not a path: the work done before it is not in it. "
             "Write the path that it belongs to, or the state alone with state.save."
         )
-    if _FACTS not in rest.attrs:
+    if _FACTS not in record.attrs:
         raise InputError.FILE_FORMAT(
-            f"{source} holds the quantities of a path, but not the states between its steps, so "
+            f"{file} holds the quantities of a path, but not the states between its steps, so "
             "no path can be made of it; write the path with notchflex.save_path."
         )
     try:
-        facts = {**json.loads(rest.attrs[_FACTS]), "robot": data.attrs["robot_file"]}
+        facts = {**json.loads(record.attrs[_FACTS]), "robot": data.attrs["robot_file"]}
     except (TypeError, ValueError):
         raise InputError.FILE_DAMAGED(
-            f"{source} is damaged: its facts are no JSON; write it again."
+            f"{file} is damaged: its facts are not JSON; write it again."
         ) from None
-    both = {**data.data_vars, **rest.data_vars}
+    both = {**data.data_vars, **record.data_vars}
     arrays = {str(name): np.asarray(values.to_numpy()) for name, values in both.items()}
-    return path_of(Record(facts, arrays), source)
+    return path_of(Record(facts, arrays), str(file))
+
+
+def _need_netcdf() -> None:
+    for module in ("xarray", "h5netcdf", "h5py"):
+        need(module, "data", "NetCDF")
 
 
 def _described(quantity: Quantity) -> dict[str, Any]:
@@ -117,19 +147,6 @@ def _described(quantity: Quantity) -> dict[str, Any]:
     if quantity.unit:
         attributes["units"] = quantity.python_unit
     if quantity.name == "contact_state":
-        attributes["flag_values"] = list(CONTACT_STATES)
-        attributes["flag_meanings"] = " ".join(
-            text.replace(" ", "_") for text in CONTACT_STATES.values()
-        )
+        words = (text.replace(" ", "_") for text in CONTACT_STATES.values())
+        attributes |= {"flag_values": list(CONTACT_STATES), "flag_meanings": " ".join(words)}
     return attributes
-
-
-def _coordinates(path: EquilibriumPath) -> dict[str, Any]:
-    tendons, notches = path.tension.shape[1], path.notch_angle.shape[1]
-    return {
-        "step": np.arange(1, len(path) + 1),
-        "tendon": np.arange(1, tendons + 1),
-        "notch": np.arange(1, notches + 1),
-        "body": np.arange(notches + 1),
-        "axis": list(AXES),
-    }

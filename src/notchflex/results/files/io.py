@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from notchflex._extras import need
 from notchflex.errors import InputError
-from notchflex.results.files.json import path_document, plain
+from notchflex.results.files.csv import write_path_csv
+from notchflex.results.files.dataframe import read_head, write_parquet
+from notchflex.results.files.dataset import read_netcdf, write_netcdf
+from notchflex.results.files.json import path_document, plain, write_json
 from notchflex.results.files.record import decoded, encoded, path_of, record_of
-from notchflex.results.files.writing import replacing
 
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
 READ_BACK = "read_back"
 """Key of a JSON document under which the exact numbers stand."""
-
-_KINDS = ".json, .nc, .parquet or .csv"
 
 
 def save_path(path: EquilibriumPath, file: str | FilePath) -> None:
@@ -31,7 +30,7 @@ def save_path(path: EquilibriumPath, file: str | FilePath) -> None:
 
     Args:
         path: Solved path.
-        file: Where to; ends in .json, .nc, .parquet or .csv. It is whole or not there.
+        file: Where to; ends in .json, .nc, .parquet or .csv. It is written whole or not at all.
 
     Raises:
         InputError: Another suffix, a library that is not installed, or it cannot be written.
@@ -49,28 +48,22 @@ def save_path(path: EquilibriumPath, file: str | FilePath) -> None:
     """
     match FilePath(file).suffix.lower():
         case ".json":
-            from notchflex.results.files.json import write_json
-
             write_json(file, whole_document(path))
         case ".nc":
             write_netcdf(file, path)
         case ".parquet":
-            from notchflex.results.files.parquet import write_parquet
-
             write_parquet(file, path)
         case ".csv":
-            from notchflex.results.files.csv import write_path_csv
-
             write_path_csv(file, path)
-        case other:
-            raise InputError.FILE_FORMAT(_no_kind(file, other, "written"))
+        case _:
+            raise _unknown_suffix(file, "written")
 
 
 def read_path(file: str | FilePath) -> EquilibriumPath:
     """Read a path back from a file; it equals the one that was written, its states too.
 
-    Nothing is solved: every number is that of the file. A simulation goes on from `.state` as from
-    that of the path that was written.
+    Nothing is solved: every number is that of the file. A simulation continues from `.state` as
+    from that of the path that was written.
 
     Args:
         file: A .json, .nc or .parquet that `notchflex simulate` or `save_path` wrote.
@@ -100,16 +93,12 @@ def read_path(file: str | FilePath) -> EquilibriumPath:
             "notchflex.read_table, or write .json, .nc or .parquet."
         )
     if suffix not in (".json", ".nc", ".parquet"):
-        raise InputError.FILE_FORMAT(_no_kind(file, suffix, "read"))
+        raise _unknown_suffix(file, "read")
     if not FilePath(file).is_file():
         raise InputError.FILE_NOT_FOUND(f"there is no file {file}.")
     if suffix == ".json":
         return _from_json(file)
-    if suffix == ".nc":
-        return _from_netcdf(file)
-    from notchflex.results.files.parquet import read_head
-
-    return path_of(read_head(file), str(file))
+    return read_netcdf(file) if suffix == ".nc" else path_of(read_head(file), str(file))
 
 
 def whole_document(path: EquilibriumPath) -> dict[str, Any]:
@@ -117,56 +106,11 @@ def whole_document(path: EquilibriumPath) -> dict[str, Any]:
     return {**path_document(path), READ_BACK: encoded(record_of(path))}
 
 
-def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
-    """Write a path as NetCDF: what `to_xarray` has, and the rest of its record in a group.
-
-    Raises:
-        InputError: A library is not installed, or the file cannot be written.
-    """
-    need_netcdf("NetCDF")
-    from notchflex.results.files.dataset import RECORD_GROUP, dataset_of, record_dataset
-
-    data, record = dataset_of(path), record_dataset(path)
-    with replacing(target) as temporary:
-        data.to_netcdf(temporary, engine="h5netcdf")
-        record.to_netcdf(temporary, engine="h5netcdf", group=RECORD_GROUP, mode="a")
-
-
-def need_netcdf(what: str) -> None:
-    """Raise if NetCDF cannot be written; for the argument see `need`."""
-    for module in ("xarray", "h5netcdf", "h5py"):
-        need(module, "data", what)
-
-
-def _from_netcdf(file: str | FilePath) -> EquilibriumPath:
-    need_netcdf("NetCDF")
-    import xarray
-
-    from notchflex.results.files.dataset import RECORD_GROUP, path_of_datasets
-
-    try:
-        data = xarray.load_dataset(file, engine="h5netcdf")
-        record = None
-        if RECORD_GROUP in _groups(file):
-            record = xarray.load_dataset(file, engine="h5netcdf", group=RECORD_GROUP)
-    except (OSError, ValueError, KeyError) as problem:
-        words = " ".join(str(problem).split())
-        raise InputError.FILE_UNREADABLE(f"{file} cannot be read as NetCDF: {words}.") from None
-    return path_of_datasets(data, record, str(file))
-
-
-def _groups(file: str | FilePath) -> list[str]:
-    import h5py
-
-    with h5py.File(file, "r") as opened:
-        return [str(name) for name in opened]
-
-
 def _from_json(file: str | FilePath) -> EquilibriumPath:
     try:
         document = json.loads(FilePath(file).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
-        reason = getattr(problem, "strerror", None) or f"it is no JSON ({problem})"
+        reason = getattr(problem, "strerror", None) or f"it is not JSON ({problem})"
         raise InputError.FILE_UNREADABLE(f"{file} cannot be read: {reason}.") from None
     if not isinstance(document, dict) or READ_BACK not in document:
         raise InputError.FILE_FORMAT(
@@ -187,16 +131,19 @@ def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
 
     Version 0.1.0 wrote zeros for the shape of those, and no `reason_code`.
     """
-    wanted = plain(path_document(path))["steps"]
-    if not isinstance(steps, list) or len(steps) != len(wanted):
+    expected = plain(path_document(path))["steps"]
+    if not isinstance(steps, list) or len(steps) != len(expected):
         return False
     return all(
         isinstance(other, dict) and one == {"reason_code": one["reason_code"], **other}
-        for one, other, tried in zip(wanted, steps, np.asarray(path.run.tried), strict=True)
+        for one, other, tried in zip(expected, steps, np.asarray(path.run.tried), strict=True)
         if tried
     )
 
 
-def _no_kind(file: str | FilePath, suffix: str, done: str) -> str:
+def _unknown_suffix(file: str | FilePath, done: str) -> InputError:
+    suffix = FilePath(file).suffix.lower()
     got = f"the suffix {suffix}" if suffix else "no suffix"
-    return f"{file}: got {got}; a path is {done} as {_KINDS}."
+    return InputError.FILE_FORMAT(
+        f"{file}: got {got}; a path is {done} as .json, .nc, .parquet or .csv."
+    )

@@ -12,8 +12,7 @@ import numpy as np
 from notchflex import __version__
 from notchflex._quantity import Quantity
 from notchflex.results.files.writing import write_text
-from notchflex.results.quantities.registry import CONTACT_STATES, QUANTITIES, units
-from notchflex.results.quantities.spans import holds, spans_of
+from notchflex.results.quantities.registry import CONTACT_STATES, QUANTITIES, holds, spans_of, units
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
@@ -22,12 +21,11 @@ if TYPE_CHECKING:
 
     from notchflex.results.path import EquilibriumPath
 
-PLAIN = tuple(
-    q for q in QUANTITIES.values() if q.key and q.per not in (("tendon", "contact"),)
-)  # all but the contacts, which are gathered contact by contact
+# Quantities of contacts are gathered contact by contact.
 CONTACTS = tuple(q for q in QUANTITIES.values() if q.key and q.per == ("tendon", "contact"))
+PLAIN = tuple(q for q in QUANTITIES.values() if q.key and q not in CONTACTS)
 
-# External loads are what a user gave, and no result: they are not registered as quantities.
+# External loads are input, not results: they are not registered as quantities.
 _LOAD_KEYS = {
     "tip_force": ("tip_force_N", "N"),
     "tip_moment": ("tip_moment_Nmm", "N mm"),
@@ -53,12 +51,12 @@ def path_document(path: EquilibriumPath) -> dict[str, Any]:
         objects. None stands where there is no number. Angles in deg, lengths in mm, forces in N.
         Where external loads act in any step, `load` holds those of every step.
     """
-    outside = _outside(path)
+    external = _external(path)
     failed = next((step for step, good in enumerate(path.converged) if not good), None)
-    steps = [_step(path, index, outside) for index in range(len(path))]
+    steps = [_step(path, index, external) for index in range(len(path))]
     return {
         **document_head(path.robot),
-        "units": units() | (LOAD_UNITS if outside else {}),
+        "units": units() | (LOAD_UNITS if external else {}),
         "converged": failed is None,
         "reason": "" if failed is None else str(path.reason[failed]),
         "reason_code": "" if failed is None else str(path.reason_code[failed]),
@@ -68,7 +66,7 @@ def path_document(path: EquilibriumPath) -> dict[str, Any]:
 
 def step_document(path: EquilibriumPath, index: int) -> dict[str, Any]:
     """Return one step (from 0) of the document of a path, of plain values."""
-    return plain(_step(path, index, _outside(path)))
+    return plain(_step(path, index, _external(path)))
 
 
 def document_head(robot: Robot) -> dict[str, Any]:
@@ -126,36 +124,36 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _step(path: EquilibriumPath, index: int, outside: list[dict[str, Any]]) -> dict[str, Any]:
+def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> dict[str, Any]:
     step: dict[str, Any] = {"step": index + 1}
     for quantity in PLAIN:
-        if not holds(path, quantity):
-            continue
-        holder = step
-        *outer, last = quantity.key.split(".")
-        for key in outer:
-            holder = holder.setdefault(key, {})
-        holder[last] = _value(path, quantity, index)
-    if outside:
-        step.setdefault("load", {}).update(outside[index])
+        if holds(path, quantity):
+            holder = step
+            *outer, last = quantity.key.split(".")
+            for key in outer:
+                holder = holder.setdefault(key, {})
+            holder[last] = _value(path, quantity, index)
+    if external:
+        step.setdefault("load", {}).update(external[index])
     step["contacts"] = [_contacts(path, tendon, index) for tendon in range(path.tension.shape[1])]
     return step
 
 
-def _outside(path: EquilibriumPath) -> list[dict[str, Any]]:
+def _external(path: EquilibriumPath) -> list[dict[str, Any]]:
     """External loads of every step; nothing at all where no step has any."""
-    external = path.load.external
-    if all(one.is_nothing for one in external):
+    if all(one.is_nothing for one in path.load.external):
         return []
-    return [_with_units(asdict(one)) for one in external]
+    return [_with_units(asdict(one)) for one in path.load.external]
 
 
 def _with_units(values: dict[str, Any]) -> dict[str, Any]:
     forces = values.pop("body_forces", None)
-    own = {
+    named = {
         _LOAD_KEYS.get(name, (name,))[0].rpartition(".")[2]: value for name, value in values.items()
     }
-    return own if forces is None else {**own, "body_forces": [_with_units(one) for one in forces]}
+    if forces is not None:
+        named["body_forces"] = [_with_units(one) for one in forces]
+    return named
 
 
 def _value(path: EquilibriumPath, quantity: Quantity, index: int) -> Any:

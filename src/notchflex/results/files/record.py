@@ -1,8 +1,8 @@
 """A path as plain arrays and facts, from which an equal path is made: what files carry.
 
-A record holds what a solver found (states, memory, everything told of them) and what it was asked
-(robot file, loads, settings). Reading it back solves nothing, so the numbers are those written,
-whatever the version or the machine that reads them.
+A record holds the results of the solver (states, memory, reported quantities) and its input (robot
+file, loads, settings). Reading it back solves nothing, so the numbers are those written, whatever
+the version or the machine that reads them.
 """
 
 from __future__ import annotations
@@ -49,6 +49,11 @@ class Record:
 def record_of(path: EquilibriumPath) -> Record:
     """Return the record of a path."""
     chain = path.chain
+    # The external loads: each different one, and which of them every step has.
+    external = {
+        "distinct": [asdict(one) for one in path.load.different],
+        "step": path.load.which.tolist(),
+    }
     facts = {
         "format": FORMAT,
         "program": "notchflex",
@@ -61,7 +66,7 @@ def record_of(path: EquilibriumPath) -> Record:
         "each_from_rest": path.each_from_rest,
         "base_rotation_rad": path.load.base_rotation.tolist(),
         "settings": {one.name: getattr(path.settings, one.name) for one in fields(path.settings)},
-        "external": _loads_of(path),
+        "external": json.dumps(external),
     }
     return Record(facts, dict(_arrays_of(path)))
 
@@ -78,17 +83,17 @@ def path_of(record: Record, source: str) -> EquilibriumPath:
     """Return the path of a record.
 
     Args:
-        record: What `record_of` returned, or what was read of it.
+        record: As `record_of` returns it.
         source: Where it was read from, for messages.
 
     Raises:
-        InputError: Something is missing or fits nothing.
+        InputError: Something is missing or does not fit.
     """
     if record.facts.get("format") != FORMAT:
         got = record.facts.get("format")
         raise InputError.FILE_FORMAT(
-            f"{source} is laid out as {got!r}, not as {FORMAT!r}: it cannot be made a path of by "
-            f"notchflex {__version__}; write it again with this version."
+            f"{source} has the format {got!r}, not {FORMAT!r}: notchflex {__version__} cannot make "
+            "a path of it; write it again with this version."
         )
     try:
         return _path_of(record)
@@ -106,14 +111,11 @@ def path_of(record: Record, source: str) -> EquilibriumPath:
 
 def encoded(record: Record) -> dict[str, Any]:
     """Return a record for JSON: numbers as their bytes, so that not one digit is lost."""
-    arrays = {
-        name: {
-            "type": (plain := np.ascontiguousarray(array).astype(_little(array))).dtype.str,
-            "shape": list(plain.shape),
-            "base64": base64.b64encode(plain.tobytes()).decode("ascii"),
-        }
-        for name, array in record.arrays.items()
-    }
+    arrays: dict[str, Any] = {}
+    for name, values in record.arrays.items():
+        array = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<"))
+        code = base64.b64encode(array.tobytes()).decode("ascii")
+        arrays[name] = {"type": array.dtype.str, "shape": list(array.shape), "base64": code}
     return {"facts": dict(record.facts), "arrays": arrays}
 
 
@@ -121,7 +123,7 @@ def decoded(document: Any, source: str) -> Record:
     """Return the record of what `encoded` returned.
 
     Raises:
-        InputError: It is none.
+        InputError: It is damaged.
     """
     try:
         arrays = {
@@ -138,38 +140,28 @@ def decoded(document: Any, source: str) -> Record:
         ) from None
 
 
-def _little(array: NDArray[Any]) -> Any:
-    return array.dtype.newbyteorder("<")
-
-
-def _loads_of(path: EquilibriumPath) -> str:
-    """The external loads: each different one, and which of them every step has."""
-    distinct = [asdict(one) for one in path.load.different]
-    return json.dumps({"distinct": distinct, "step": path.load.which.tolist()})
-
-
 def _loads_from(text: str) -> tuple[Any, ...]:
     from notchflex.loads import BodyForce, ExternalLoad
 
-    told = json.loads(text)
+    loads = json.loads(text)
     distinct = [
         ExternalLoad(**one | {"body_forces": [BodyForce(**force) for force in one["body_forces"]]})
-        for one in told["distinct"]
+        for one in loads["distinct"]
     ]
-    return tuple(distinct[number] for number in told["step"])
+    return tuple(distinct[number] for number in loads["step"])
 
 
 def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     import jax.tree_util as tree_util
 
-    from notchflex.results.recorded import BEFORE, TOLD
+    from notchflex.results.recorded import BEFORE, REPORTED
     from notchflex.results.state import leaf_name
 
     run = path.run
     turned = bool(path.load.base_rotation.any())
     yield "commanded_tension", path.load.tension
     yield "commanded_stroke", path.load.stroke
-    for name in TOLD:
+    for name in REPORTED:
         yield _key(name, turned), np.asarray(run.quantity(name))
     for name in _RUN:
         # A path counts more as not converged than the solver does.
@@ -187,7 +179,7 @@ def _path_of(record: Record) -> EquilibriumPath:
 
     from notchflex.loads import LoadPath
     from notchflex.results.path import EquilibriumPath
-    from notchflex.results.recorded import BEFORE, TOLD, Recorded
+    from notchflex.results.recorded import BEFORE, REPORTED, Recorded
     from notchflex.results.state import leaf_name
     from notchflex.robot import robot_from_text
     from notchflex.solver.newton import Settings
@@ -215,8 +207,8 @@ def _path_of(record: Record) -> EquilibriumPath:
         name = _STATE + leaf_name(key)
         state.append(_of_shape(arrays[name], (steps, *np.shape(leaf)), name))
     turned = bool(load.base_rotation.any())
-    told = {name: arrays[_key(name, turned)] for name in TOLD}
-    for name, values in told.items():
+    reported = {name: arrays[_key(name, turned)] for name in REPORTED}
+    for name, values in reported.items():
         _of_shape(values, (steps, *values.shape[1:]), name)
     run = {
         name: _of_shape(arrays["solver_converged" if name == "converged" else name], (steps,), name)
@@ -224,7 +216,7 @@ def _path_of(record: Record) -> EquilibriumPath:
     }
     recorded = Recorded(
         solved=tree_util.tree_unflatten(structure, state),
-        told=told,
+        reported=reported,
         first={name: arrays[_START + name] for name in BEFORE},
         held=(arrays[_HELD[0]], arrays[_HELD[1]]),
         **run,

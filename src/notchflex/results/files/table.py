@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from notchflex._quantity import Quantity
 from notchflex.errors import InputError
 from notchflex.results.files import csv_reading
-from notchflex.results.files.parquet import read_columns
+from notchflex.results.files.dataframe import read_columns
 from notchflex.results.quantities.registry import AXES, QUANTITIES
 
 _PATTERNS = {
@@ -47,27 +47,28 @@ def read_table(file: str | FilePath) -> dict[str, NDArray[Any]]:
         >>> path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 1.0, steps=3))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     nf.save_path(path, Path(folder) / "loop.csv")
-        ...     found = nf.read_table(Path(folder) / "loop.csv")
-        >>> found["notch_angle"].shape, "contact_slid" in found
+        ...     table = nf.read_table(Path(folder) / "loop.csv")
+        >>> table["notch_angle"].shape, "contact_slid" in table
         ((3, 5), False)
     """
-    found: dict[str, dict[tuple[int, ...], NDArray[Any]]] = {}
+    entries: dict[str, dict[tuple[int, ...], NDArray[Any]]] = {}
     for header, values in _columns(file).items():
         place = _place(header)
-        if place is not None:
-            quantity, index = place
-            try:
-                found.setdefault(quantity.name, {})[index] = _numbers(quantity, values)
-            except (TypeError, ValueError):
-                raise InputError.NOT_A_NUMBER(
-                    f"{file}: the column {header} holds what is no number; write the table again."
-                ) from None
-    if not found:
+        if place is None:
+            continue
+        quantity, index = place
+        try:
+            entries.setdefault(quantity.name, {})[index] = _numbers(quantity, values)
+        except (TypeError, ValueError):
+            raise InputError.NOT_A_NUMBER(
+                f"{file}: the column {header} holds what is not a number; write the table again."
+            ) from None
+    if not entries:
         raise InputError.TABLE_COLUMNS(
             f"{file} has no column of a path (such as {QUANTITIES['total_angle'].header()}); give "
             "a table that --csv or --parquet wrote."
         )
-    return {name: _joined(QUANTITIES[name], parts) for name, parts in found.items()}
+    return {name: _joined(QUANTITIES[name], parts) for name, parts in entries.items()}
 
 
 def _columns(file: str | FilePath) -> Mapping[str, Sequence[Any]]:

@@ -57,7 +57,7 @@ class Text(_Property[list[str], str]):
     """A text a step."""
 
 
-class Table(_Property[np.ndarray, np.ndarray]):
+class Array(_Property[np.ndarray, np.ndarray]):
     """An array a step."""
 
 
@@ -69,71 +69,71 @@ class _Quantities:
         raise NotImplementedError
 
     # Written by docs/make/quantity_properties.py:
-    commanded_tension = Table()
+    commanded_tension = Array()
     """Commanded tension, N, shape (t)."""
-    commanded_stroke = Table()
+    commanded_stroke = Array()
     """Commanded stroke, mm, shape (t)."""
-    tension = Table()
+    tension = Array()
     """Tendon tension, N, shape (t)."""
-    stroke = Table()
+    stroke = Array()
     """Tendon stroke, mm, shape (t)."""
-    notch_angle = Table()
+    notch_angle = Array()
     """Notch angle, rad, shape (n)."""
-    edge_angle = Table()
+    edge_angle = Array()
     """Edge angle, rad, shape (n)."""
-    chord_angle = Table()
+    chord_angle = Array()
     """Chord angle, rad, shape (n)."""
     total_chord_angle = Number()
     """Total chord angle, rad."""
     total_angle = Number()
     """Total bending angle, rad."""
-    tip_position = Table()
+    tip_position = Array()
     """Tip position, mm, shape (3)."""
-    tip_rotation = Table()
+    tip_rotation = Array()
     """Tip rotation, shape (3, 3)."""
-    body_position = Table()
+    body_position = Array()
     """Body position, mm, shape (bodies, 3)."""
-    body_rotation = Table()
+    body_rotation = Array()
     """Body rotation, shape (bodies, 3, 3)."""
-    span_tension = Table()
+    span_tension = Array()
     """Span tension, N, shape (t, spans)."""
-    notch_moment = Table()
+    notch_moment = Array()
     """Notch moment, N mm, shape (n)."""
-    outer_strain = Table()
+    outer_strain = Array()
     """Outer strain, shape (n)."""
-    peak_strain = Table()
+    peak_strain = Array()
     """Peak strain, shape (n)."""
-    gap = Table()
+    gap = Array()
     """Notch gap, mm, shape (n)."""
-    closed = Table()
+    closed = Array()
     """Closed, shape (n)."""
-    contact_force = Table()
+    contact_force = Array()
     """Contact force, N, shape (n)."""
-    contact_log_ratio = Table()
+    contact_log_ratio = Array()
     """Tension ratio over a contact, shape (t, contacts)."""
-    contact_slid = Table()
+    contact_slid = Array()
     """Slid length, mm, shape (t, contacts)."""
-    contact_turning = Table()
+    contact_turning = Array()
     """Turning at a contact, rad, shape (t, contacts)."""
-    contact_state = Table()
+    contact_state = Array()
     """State of a contact, shape (t, contacts)."""
-    contact_bound = Table()
+    contact_bound = Array()
     """Largest tension ratio over a contact, shape (t, contacts)."""
-    dissipation = Table()
+    dissipation = Array()
     """Dissipation, N mm, shape (t, contacts)."""
-    front_contact = Table()
+    front_contact = Array()
     """Friction front, shape (t)."""
-    front_eta = Table()
+    front_eta = Array()
     """Friction at the front, shape (t)."""
-    base_force = Table()
+    base_force = Array()
     """Base force, N, shape (3)."""
-    base_moment = Table()
+    base_moment = Array()
     """Base moment, N mm, shape (3)."""
     moment_error = Number()
     """Moment error."""
     stored_energy = Number()
     """Stored energy, N mm."""
-    tendon_work = Table()
+    tendon_work = Array()
     """Tendon work, N mm, shape (t)."""
     converged = Flag()
     """Converged."""
@@ -159,6 +159,3 @@ class PathQuantities(_Quantities):
 
 class EquilibriumQuantities(_Quantities):
     """Quantities of one equilibrium: n notches, t tendons, n + 1 bodies."""
-
-
-__all__ = ["QUANTITIES", "EquilibriumQuantities", "PathQuantities"]

@@ -6,8 +6,16 @@ a state, `path_formulas.py` for what follows along a path; see `notchflex._quant
 
 from __future__ import annotations
 
-from notchflex._quantity import DEGREES, Quantity
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from notchflex._quantity import DEGREES as DEGREES
+from notchflex._quantity import Quantity
 from notchflex.results.quantities.properties import QUANTITIES
+
+if TYPE_CHECKING:
+    from notchflex.results.path import EquilibriumPath
 
 AXES = ("x", "y", "z")
 
@@ -20,9 +28,6 @@ def span_names(count: int) -> list[str]:
 
     Args:
         count: Number of spans, 2 m for a tendon that runs through m bodies to its end.
-
-    Returns:
-        `["proximal", "gap_1", "body_1", "gap_2", ...]`, `count` names.
 
     Example:
         >>> span_names(4)
@@ -39,12 +44,18 @@ def units() -> dict[str, str]:
     return {q.key: q.unit for q in QUANTITIES.values() if q.key and q.unit}
 
 
-__all__ = [
-    "AXES",
-    "CONTACT_STATES",
-    "DEGREES",
-    "QUANTITIES",
-    "Quantity",
-    "span_names",
-    "units",
-]
+def holds(path: EquilibriumPath, quantity: Quantity) -> bool:
+    """Whether a path has a quantity; an optional one without any number counts as missing."""
+    values = getattr(path, quantity.name, None)
+    if values is None:
+        return False
+    return not quantity.optional or bool(np.isfinite(values).any())
+
+
+def spans_of(path: EquilibriumPath, tendon: int) -> int:
+    """Return how many spans a tendon (counted from 0) has: two for each body that it runs through.
+
+    Contacts lie between the spans, so there is one fewer of them.
+    """
+    # A tendon has a span before every edge that it meets; -1 only fills the table up.
+    return int((np.asarray(path.chain.contacts)[tendon] >= 0).sum())

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from notchflex.viewer.page.charts import loop_chart, tendon_chart
-from notchflex.viewer.page.legend import legend_html
-from notchflex.viewer.page.load_controls import LoadControls
-from notchflex.viewer.page.model_controls import ModelControls
-from notchflex.viewer.page.readout import notice, readout
-from notchflex.viewer.page.robot_controls import RobotControls
+from notchflex.viewer import parts
+from notchflex.viewer.page.chart import loop_chart, tendon_chart
+from notchflex.viewer.page.folders import LoadControls, PartControls, add_robot_folders
+from notchflex.viewer.page.readout import legend_html, notice, readout
 
 if TYPE_CHECKING:
     from notchflex.viewer.viewer import Viewer
@@ -30,27 +28,26 @@ class Page:
     """The panels beside the scene; all methods are called by the solver thread."""
 
     def __init__(self, viewer: Viewer) -> None:
-        """Add all panels."""
         self.viewer = viewer
         gui = viewer.server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
         gui.main_panel.dock_right()
         gui.main_panel.set_width(CONTROLS_WIDTH)
-        self._side = gui.add_panel()
-        with self._side.add_tab("State"):
+        side = gui.add_panel()
+        with side.add_tab("State"):
             self._readout = gui.add_html("")
             self._loop = gui.add_html("")
             self._legend = gui.add_html("")
             self._tendon = gui.add_html("")
-        self._side.dock_left()
-        self._side.set_width(CHARTS_WIDTH)
+        side.dock_left()
+        side.set_width(CHARTS_WIDTH)
         self._notice = gui.add_html("", order=0.0)
         self._folders: list[Any] = []
         gui.add_html(STYLE, order=99.0)
         self.rebuild()
 
     def rebuild(self) -> None:
-        """Replace the controls for another robot.
+        """Replace the controls, and the camera of browsers that connect later, for a new robot.
 
         Once for each change, because viser would send updates for controls that had been removed.
         """
@@ -58,11 +55,16 @@ class Page:
         for folder in self._folders:
             folder.remove()
         self.loads = LoadControls(viewer)
-        self.model = ModelControls(viewer)
-        self.robot = RobotControls(viewer)
-        self._folders = [*self.loads.folders, *self.model.folders, *self.robot.folders]
+        self.parts = {
+            section: PartControls(viewer, section, order)
+            for order, section in enumerate(parts.SECTIONS, start=3)
+        }
+        folders = [part.folder for part in self.parts.values()]
+        self._folders = [*self.loads.folders, *folders, *add_robot_folders(viewer)]
         self.name()
-        self._first_look()
+        eye = viewer.scene.eye(viewer.session.pointing)
+        camera = viewer.server.initial_camera
+        camera.position, camera.look_at = eye.position, eye.target
 
     def name(self) -> None:
         """Update the name of the robot and the legend."""
@@ -84,7 +86,8 @@ class Page:
         viewer = self.viewer
         self._notice.content = notice(viewer.message or viewer.note)
         self.loads.follow(viewer.goal)
-        self.model.follow(viewer.session.robot)
+        for part in self.parts.values():
+            part.follow(viewer.session.robot)
 
     def busy(self, sentence: str) -> None:
         """Show at once what takes longer."""
@@ -92,18 +95,8 @@ class Page:
         self.viewer.server.flush()
 
     def look(self, side: bool = False) -> None:
-        """Move the camera of every browser to the default view of the robot.
-
-        Args:
-            side: Look normal to the plane in which the robot bends.
-        """
+        """Move the camera of every browser to the first view; `side`: normal to the bend."""
         viewer = self.viewer
         for client in viewer.server.get_clients().values():
             eye = viewer.scene.eye(viewer.session.pointing, side, client.camera.aspect)
             client.camera.position, client.camera.look_at = eye.position, eye.target
-
-    def _first_look(self) -> None:
-        """Set the first camera of browsers that connect later."""
-        eye = self.viewer.scene.eye(self.viewer.session.pointing)
-        camera = self.viewer.server.initial_camera
-        camera.position, camera.look_at = eye.position, eye.target

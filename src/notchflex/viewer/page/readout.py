@@ -1,4 +1,4 @@
-"""The numbers of the state as a table for the page, and notices."""
+"""The numbers of the state and the legend of the colours as HTML, and notices."""
 
 from __future__ import annotations
 
@@ -7,11 +7,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from notchflex.plotting.curves import COLOUR
 from notchflex.plotting.style import BLUE, VERMILLION
-from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.viewer.page.charts import axis
-from notchflex.viewer.scene.colours import BEYOND, css, is_beyond
+from notchflex.results.quantities.registry import CONTACT_STATES, QUANTITIES
+from notchflex.robot import Robot
+from notchflex.viewer.page.chart import axis
+from notchflex.viewer.scene.marks import (
+    BEYOND,
+    CLOSED,
+    CONTACT,
+    LOAD,
+    METAL,
+    TENDON,
+    UNKNOWN,
+    css,
+    is_beyond,
+    strain_colour,
+)
 from notchflex.viewer.session import Session
+
+BALL, LINE = "ball", "line"
 
 _CELL = (
     'style="padding:1px 4px;text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"'
@@ -20,14 +35,7 @@ _WARNING = f' data-warning="true" style="background:{css(BEYOND)};color:white"'
 
 
 class ReadoutRow(NamedTuple):
-    """A row of the table.
-
-    Attributes:
-        name: Name in the HTML.
-        label: Label, with the unit.
-        value: The value as text.
-        warns: Whether it is marked as a warning.
-    """
+    """A row of the table: name in the HTML, label with unit, value, whether it is a warning."""
 
     name: str
     label: str
@@ -38,24 +46,24 @@ class ReadoutRow(NamedTuple):
 def rows(session: Session) -> list[ReadoutRow]:
     """Return the numbers of a session's state."""
     state, robot = session.state, session.robot
-    found: list[ReadoutRow] = []
+    table: list[ReadoutRow] = []
     for name in ("tension", "stroke"):
         values = np.asarray(getattr(state, name))
         for tendon, value in enumerate(values):
             of = f" {tendon + 1}" if len(values) > 1 else ""
             label = axis(name).replace("tendon ", f"tendon{of} ")
-            found.append(ReadoutRow(f"{name}_{tendon + 1}", label, fixed(float(value), 3)))
+            table.append(ReadoutRow(f"{name}_{tendon + 1}", label, fixed(float(value), 3)))
     angle = QUANTITIES["total_angle"].scale * float(state.total_angle)
-    found.append(ReadoutRow("total_angle", axis("total_angle"), fixed(angle, 2)))
-    place = ", ".join(fixed(float(value), 2) for value in state.tip_position)
-    found.append(ReadoutRow("tip_position", axis("tip_position"), place))
-    found.append(ReadoutRow("peak_strain", "largest strain", *_strain(session)))
+    position = ", ".join(fixed(float(value), 2) for value in state.tip_position)
     closed = [str(number) for number in np.flatnonzero(state.closed) + 1]
     text = ", ".join(closed) if len(closed) <= 8 else f"{len(closed)}"
-    found.append(
-        ReadoutRow("closed", f"closed notches of {robot.number_of_notches}", text or "none")
-    )
-    return found
+    return [
+        *table,
+        ReadoutRow("total_angle", axis("total_angle"), fixed(angle, 2)),
+        ReadoutRow("tip_position", axis("tip_position"), position),
+        ReadoutRow("peak_strain", "largest strain", *_strain(session)),
+        ReadoutRow("closed", f"closed notches of {robot.number_of_notches}", text or "none"),
+    ]
 
 
 def readout(session: Session) -> str:
@@ -76,9 +84,18 @@ def _strain(session: Session) -> tuple[str, bool]:
     text = f"{100.0 * largest:.2f} %"
     if allowed is None:
         return f"{text}, no limit set", False
-    if is_beyond(largest / allowed):
-        return f"{text} > {100.0 * allowed:g} % allowed", True
-    return f"{text} of {100.0 * allowed:g} % allowed", False
+    beyond = is_beyond(largest / allowed)
+    return f"{text} {'>' if beyond else 'of'} {100.0 * allowed:g} % allowed", beyond
+
+
+def fixed(value: float, digits: int) -> str:
+    """Return a number with some decimals, without a sign before a zero.
+
+    Example:
+        >>> fixed(-1e-9, 2), fixed(-0.126, 2)
+        ('0.00', '-0.13')
+    """
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def notice(text: str, waiting: bool = False) -> str:
@@ -96,11 +113,7 @@ def notice(text: str, waiting: bool = False) -> str:
 def beyond(label: str, value: float, ends: tuple[float, float], further: bool) -> str:
     """Return the notice that a value lies outside its slider, and which one is set.
 
-    Args:
-        label: Label of the slider, with its unit in brackets.
-        value: The typed value.
-        ends: Least and largest value of the slider.
-        further: Whether the end of the slider can be changed.
+    `label` is that of the slider; `further`: its end can be changed.
 
     Example:
         >>> beyond("tension [N]", 30.0, (0.0, 3.0), further=False)
@@ -115,11 +128,58 @@ def beyond(label: str, value: float, ends: tuple[float, float], further: bool) -
     )
 
 
-def fixed(value: float, digits: int) -> str:
-    """Return a number with some decimals, without a sign before a zero.
+class LegendEntry(NamedTuple):
+    """A colour in CSS, its mark (`BALL` or `LINE`), and what it means."""
 
-    Example:
-        >>> fixed(-1e-9, 2), fixed(-0.126, 2)
-        ('0.00', '-0.13')
-    """
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+    colour: str
+    mark: str
+    text: str
+
+
+def entries(robot: Robot) -> list[LegendEntry]:
+    """Return the meaning of each colour, except the scale of the strain."""
+    allowed = robot.material.allowed_strain
+    if allowed is None:
+        strain = LegendEntry(css(METAL), BALL, "notch: the robot file sets no allowed strain")
+    else:
+        strain = LegendEntry(css(BEYOND), BALL, f"notch strained beyond {100.0 * allowed:g} %")
+    return [
+        strain,
+        LegendEntry(css(CLOSED), BALL, "closed notch"),
+        *(LegendEntry(CONTACT[one], BALL, f"contact: {CONTACT_STATES[one]}") for one in CONTACT),
+        LegendEntry(UNKNOWN, BALL, "contact without friction, or slack"),
+        LegendEntry(css(TENDON), LINE, "tendon"),
+        *(LegendEntry(colour, LINE, f"loop: {way}") for way, colour in COLOUR.items()),
+        LegendEntry(LOAD["force"], LINE, "force at the tip"),
+        LegendEntry(LOAD["moment"], LINE, "moment at the tip"),
+    ]
+
+
+def strain_scale(count: int) -> list[str]:
+    """Return colours from zero strain to the allowed one."""
+    return [css(strain_colour(part)) for part in np.linspace(0.0, 1.0, count).tolist()]
+
+
+def legend_html(robot: Robot, cell: float) -> str:
+    """Return the legend as HTML; `cell` is the width of a cell of the grid [mm]."""
+    allowed, scale = robot.material.allowed_strain, ""
+    if allowed is not None:
+        scale = (
+            f'<div>notch strain 0 <span style="display:inline-block;width:70px;height:9px;'
+            f'background:linear-gradient(to right,{",".join(strain_scale(9))})"></span> '
+            f"{100.0 * allowed:g} % allowed</div>"
+        )
+    marks = "".join(_mark(one) for one in entries(robot) if not one.text.endswith("at the tip"))
+    return (
+        f'<div data-name="legend" style="font-size:12px;line-height:1.3;padding:0 6px">{scale}'
+        f"{marks}<div>axes x red, y green, z blue; grid {cell:g} mm</div></div>"
+    )
+
+
+def _mark(one: LegendEntry) -> str:
+    height, radius = (10, 5) if one.mark == BALL else (3, 0)
+    return (
+        f'<div><span style="display:inline-block;width:10px;height:{height}px;'
+        f"border-radius:{radius}px;vertical-align:middle;background:{one.colour};"
+        f'margin-right:5px"></span>{escape(one.text)}</div>'
+    )

@@ -2,36 +2,42 @@
 
 from __future__ import annotations
 
+import io
 import re
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from notchflex.errors import InputError
+from notchflex.plotting.renderers.with_matplotlib import draw_panel
+from notchflex.plotting.shapes.applied_loads import applied_loads
+from notchflex.plotting.shapes.robot_shape import shape_at
+from notchflex.plotting.style import house_style
 from notchflex.results.files.csv import write_path_csv
-from notchflex.robot import Robot, robot_text
+from notchflex.robot import robot_text
+from notchflex.viewer.page.chart import loop
+from notchflex.viewer.page.readout import BALL, entries, rows, strain_scale
 from notchflex.viewer.scene.camera import quaternions
 from notchflex.viewer.session import Session
 
 if TYPE_CHECKING:
     import viser
+    from matplotlib.axes import Axes
 
-    from notchflex.viewer.scene.scene import Scene
+    from notchflex.viewer.viewer import Viewer
 
 _WAIT = 20.0  # s, for a browser that is asked for a picture
 _FOV = 0.5  # rad, of saved pictures: from far away, with little perspective
+_SIZE, _DOTS = (12.0, 7.5), 160  # inches, dots per inch
+_SHAPE = (1080, 1050)  # pixels of the view of the robot, height and width
 
 
-def file_name(robot: Robot, ending: str) -> str:
-    """Return a plain name for a file of a robot.
-
-    Example:
-        >>> from notchflex import load_robot
-        >>> file_name(load_robot("pacheco2021-a"), "csv")
-        'pacheco-2021-wrist-a.csv'
-    """
-    plain = re.sub(r"[^a-z0-9]+", "-", robot.name.lower()).strip("-")
-    return f"{plain or 'robot'}.{ending}"
+def _send(client: viser.ClientHandle, name: str, ending: str, content: bytes) -> None:
+    plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+    client.send_file_download(f"{plain or 'robot'}.{ending}", content, save_immediately=True)
 
 
 def table_bytes(session: Session) -> bytes:
@@ -42,38 +48,26 @@ def table_bytes(session: Session) -> bytes:
         return target.read_bytes()
 
 
-def send_table(client: viser.ClientHandle, session: Session) -> None:
+def send_table(client: viser.ClientHandle, viewer: Viewer) -> None:
     """Send all steps as a CSV table."""
-    client.send_file_download(
-        file_name(session.robot, "csv"), table_bytes(session), save_immediately=True
-    )
+    _send(client, viewer.session.robot.name, "csv", table_bytes(viewer.session))
 
 
-def send_robot(client: viser.ClientHandle, session: Session) -> None:
+def send_robot(client: viser.ClientHandle, viewer: Viewer) -> None:
     """Send the robot as a robot file."""
-    text = robot_text(session.robot)
-    client.send_file_download(
-        file_name(session.robot, "toml"), text.encode(), save_immediately=True
-    )
+    robot = viewer.session.robot
+    _send(client, robot.name, "toml", robot_text(robot).encode())
 
 
-def send_picture(client: viser.ClientHandle, session: Session, scene: Scene, tendon: int) -> None:
+def send_picture(client: viser.ClientHandle, viewer: Viewer) -> None:
     """Send a picture of the robot as that browser sees it, with its loop and a legend.
-
-    Args:
-        client: The browser.
-        session: The robot and its load history.
-        scene: The scene of the browser.
-        tendon: The tendon of the loop, from 0.
 
     Raises:
         InputError: The browser does not answer.
     """
-    from notchflex.viewer.page.picture import SHAPE, picture
-
-    height, width = SHAPE
+    height, width = _SHAPE
     toward = client.camera.position - client.camera.look_at
-    eye = scene.picture_eye(toward, _FOV, width / height)
+    eye = viewer.scene.picture_eye(toward, _FOV, width / height)
     try:
         view = client.get_render(
             height,
@@ -88,5 +82,52 @@ def send_picture(client: viser.ClientHandle, session: Session, scene: Scene, ten
         raise InputError.NO_CONNECTION(
             "the browser sent no picture; bring its window to the front"
         ) from None
-    content = picture(session, view, tendon)
-    client.send_file_download(file_name(session.robot, "png"), content, save_immediately=True)
+    content = picture(viewer.session, view, viewer.page.loads.active)
+    _send(client, viewer.session.robot.name, "png", content)
+
+
+def picture(session: Session, view: NDArray[np.uint8], tendon: int) -> bytes:
+    """Return a PNG file: a view (height, width, 4), the loop of a tendon (from 0), a legend."""
+    from matplotlib.figure import Figure
+
+    with house_style():
+        figure = Figure(_SIZE, dpi=_DOTS)
+        title = figure.suptitle(session.robot.name, x=0.02, ha="left", fontsize=14)
+        title.set_parse_math(False)  # a name may hold any sign
+        axes = figure.add_axes((0.01, 0.02, 0.58, 0.9))
+        axes.imshow(view)
+        axes.set_axis_off()
+        draw_panel(figure.add_axes((0.67, 0.52, 0.31, 0.41)), loop(session, tendon))
+        _write(figure.add_axes((0.62, 0.02, 0.37, 0.42)), session)
+        target = io.BytesIO()
+        figure.savefig(target, format="png", dpi=_DOTS)
+    return target.getvalue()
+
+
+def _write(axes: Axes, session: Session) -> None:
+    """Write numbers and loads, and a legend of the colours."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.lines import Line2D
+
+    axes.set_axis_off()
+    loads = [one.label for one in applied_loads(session.solved, 0, shape_at(session.solved, 0))]
+    lines = [f"{row.label}: {row.value}" for row in rows(session)]
+    lines.append(f"loads at the tip: {', '.join(loads) or 'none'}")
+    look: dict[str, Any] = {"fontsize": 9, "parse_math": False, "transform": axes.transAxes}
+    axes.text(0.0, 1.0, "\n".join(lines), va="top", **look)
+    ball = {"linestyle": "none", "marker": "o", "markersize": 7}
+    handles: list[Line2D] = []
+    for colour, mark, text in entries(session.robot):
+        shape: dict[str, Any] = ball if mark == BALL else {}
+        handles.append(Line2D([], [], color=colour, label=text, **shape))
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.02, -0.02), "ncols": 2}
+    axes.legend(handles=handles, fontsize=8, handlelength=1.2, **place)
+    allowed = session.robot.material.allowed_strain
+    if allowed is None:
+        return
+    scale = axes.inset_axes((0.24, 0.44, 0.34, 0.035))
+    colours = ListedColormap(strain_scale(64))
+    scale.imshow(np.linspace(0.0, 1.0, 64)[None], aspect="auto", cmap=colours)
+    scale.set_axis_off()
+    for x, text in ((0.0, "notch strain   0"), (0.6, f"{100.0 * allowed:g} % allowed")):
+        axes.text(x, 0.457, text, va="center", fontsize=8, transform=axes.transAxes)

@@ -14,12 +14,7 @@ FOV = np.radians(75.0)
 
 
 class CameraPose(NamedTuple):
-    """A camera.
-
-    Attributes:
-        position: Its position [mm].
-        target: The point in the centre of its picture [mm].
-    """
+    """Position of a camera and the point in the centre of its picture [mm]."""
 
     position: Vector
     target: Vector
@@ -34,14 +29,11 @@ class CameraPose(NamedTuple):
 def framed(
     points: Vector, toward: Vector, aspect: float, fov: float = FOV, room: float = 1.0
 ) -> CameraPose:
-    """Return a camera that shows points as large as possible.
+    """Return a camera that shows points [mm], (p, 3), as large as possible.
 
-    Args:
-        points: The points [mm], (p, 3).
-        toward: Direction from the points to the camera, not along z.
-        aspect: Width of the picture by its height.
-        fov: Vertical angle of view [rad].
-        room: Size of the picture in that of the points.
+    It stands in the direction `toward`, not along z, and has a vertical angle of view `fov` [rad]
+    and a picture with width / height `aspect`; `room` is the size of the picture in that of the
+    points.
 
     Example:
         >>> wall = np.array([[-1.0, 0.0, -1.0], [1.0, 0.0, 1.0]])
@@ -50,9 +42,9 @@ def framed(
     """
     forward, right, up = _axes(toward)
     axes = np.stack([right, up, forward])
-    own = points @ axes.T
-    middle = 0.5 * (own.min(axis=0) + own.max(axis=0))
-    x, y, depth = (own - middle).T
+    seen = points @ axes.T
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    x, y, depth = (seen - middle).T
     slope = np.tan(0.5 * fov)
     # Near points must lie inside the edges of the picture too.
     away = room * np.maximum(np.abs(x) / (slope * aspect), np.abs(y) / slope) - depth
@@ -64,19 +56,15 @@ def framed(
 def first_eye(
     direction_deg: float, length: float, turn: Vector, side: bool, aspect: float
 ) -> CameraPose:
-    """Return a camera for a robot at rest, with room for it to bend.
+    """Return a camera for a robot at rest of a length [mm], with room to bend in a direction.
 
-    Args:
-        direction_deg: Direction in which it bends.
-        length: Its length [mm].
-        turn: Rotation of its base, (3, 3).
-        side: Look normal to the plane in which it bends; else a little from above.
-        aspect: Width of the picture by its height.
+    `turn` is the rotation of its base. With `side` it looks normal to the plane in which the robot
+    bends, else a little from above.
     """
     angle = np.radians(direction_deg)
     across = np.array([np.cos(angle), np.sin(angle), 0.0])
     along = np.array([0.0, 0.0, 1.0])
-    # RobotShape to either side it is about half as wide as it is long.
+    # To either side it is about half as wide as it is long.
     corners = [across * x + along * z for x in (-0.2, 0.75) for z in (-0.15, 1.05)]
     toward = turn @ np.cross(across, along)
     if abs(toward[2]) > 0.9:  # its plane is level: from the front

@@ -1,10 +1,8 @@
-"""Tendons, and marks of their contacts and of closed notches.
-
-Marks lie outside the tube, where the wall does not hide them.
-"""
+"""Colours of strains and contacts; tendons, and marks outside the tube that hides them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,8 +10,87 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.plotting.shapes.robot_shape import RobotShape
-from notchflex.results import EquilibriumPath
-from notchflex.viewer.scene.colours import CLOSED, TENDON, UNKNOWN, contact_colours, linear
+from notchflex.plotting.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from notchflex.results import Equilibrium, EquilibriumPath
+
+Colour = tuple[int, int, int]
+
+
+def rgb(code: str) -> Colour:
+    """Return a colour code such as `#0072B2` as three numbers from 0 to 255."""
+    red, green, blue = bytes.fromhex(code[1:])
+    return red, green, blue
+
+
+METAL: Colour = (176, 182, 190)
+TENDON = rgb(ORANGE)
+CLOSED = rgb(BLACK)
+BEYOND: Colour = (214, 0, 147)
+"""Colour of a strain above the allowed one, outside the scale."""
+LOAD = {"force": PURPLE, "moment": SKY}
+CONTACT = {0: GREEN, 1: BLUE, -1: VERMILLION}
+"""Colour of a friction contact by its state: sticking, slipping toward the base or the tip."""
+UNKNOWN = GREY
+SLACK = 1e-9
+"""A tendon with less tension [N] at the base is slack."""
+SMOOTH = 1e-9
+"""A contact with a smaller bound of its log tension ratio has no friction."""
+
+# From zero strain to the allowed one, also for eyes that do not distinguish red and green.
+_SCALE = np.array([(60, 80, 160), (80, 160, 190), (240, 215, 90), (230, 130, 40), (190, 20, 20)])
+STEPS = 64
+"""Number of colours of strain; a notch is updated only if its colour changes."""
+
+
+def is_beyond(part: float) -> bool:
+    """Return whether a strain, as a fraction of the allowed one, exceeds it."""
+    return abs(part) > 1.0
+
+
+def strain_colour(part: float | None) -> Colour:
+    """Return the colour of a strain by its fraction of the allowed one; None if none is set."""
+    if part is None or not np.isfinite(part):
+        return METAL
+    if is_beyond(part):
+        return BEYOND
+    place = round(min(abs(part), 1.0) * STEPS) / STEPS * (len(_SCALE) - 1)
+    red, green, blue = (np.interp(place, np.arange(len(_SCALE)), part) for part in _SCALE.T)
+    return round(float(red)), round(float(green)), round(float(blue))
+
+
+def contact_colours(state: Equilibrium, tendon: int) -> list[str]:
+    """Return the colours of the contacts of a tendon (from 0), base to tip.
+
+    A contact without friction, or of a slack tendon, neither sticks nor slips.
+    """
+    codes = np.asarray(state.contact_state, float)[tendon]
+    bound = np.asarray(state.contact_bound, float)[tendon]
+    slack = float(state.tension[tendon]) < SLACK
+    return [
+        UNKNOWN if slack or not holds > SMOOTH else CONTACT[int(one)]
+        for one, holds in zip(codes, bound, strict=True)
+        if np.isfinite(one) and np.isfinite(holds)
+    ]
+
+
+def linear(codes: Sequence[str]) -> NDArray[np.uint8]:
+    """Return colour codes as linear light from 0 to 255, (count, 3).
+
+    viser takes the colours of batched meshes and arrows as linear light, and all others as sRGB.
+
+    Example:
+        >>> linear(["#0072B2", "#FFFFFF"]).tolist()
+        [[0, 43, 114], [255, 255, 255]]
+    """
+    part = np.array([rgb(code) for code in codes], float).reshape(-1, 3) / 255.0
+    light = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * light).astype(np.uint8)
+
+
+def css(colour: Colour) -> str:
+    """Return a colour in CSS."""
+    return "#" + "".join(f"{part:02x}" for part in colour)
+
 
 # In outer radii of the tube: thickness of tendons, radius of marks, distance of their centres from
 # the tube axis.
@@ -33,74 +110,55 @@ class Shown:
 
 
 class Marks:
-    """Tendons and marks of a robot in a scene of viser.
-
-    Args:
-        scene: The scene.
-        root: Name of the parent node.
-        rest: The shape of the robot at rest.
-    """
+    """Tendons and marks of a robot at rest as children of a node of a viser scene."""
 
     def __init__(self, scene: Any, root: str, rest: RobotShape) -> None:
-        """Add them."""
         import trimesh
 
         self._outer = outer = rest.robot.tube.outer_radius
         ball = trimesh.creation.icosphere(subdivisions=2, radius=_CONTACT * outer)
-        tendons = range(rest.robot.number_of_tendons)
-        self._tendons = [
-            scene.add_line_segments(
-                f"{root}/tendon_{number + 1}",
-                _segments(rest.tendon(number)),
-                TENDON,
-                thickness=_TENDON * outer,
+        self._tendons: list[Any] = []
+        self._contacts: list[Any] = []
+        for tendon in range(rest.robot.number_of_tendons):
+            name, line = f"{root}/tendon_{tendon + 1}", _segments(rest, tendon)
+            thick = _TENDON * outer
+            self._tendons.append(scene.add_line_segments(name, line, TENDON, thickness=thick))
+            points = self._beside(rest, tendon)
+            self._contacts.append(
+                scene.add_batched_meshes_simple(
+                    f"{root}/contacts_{tendon + 1}",
+                    ball.vertices,
+                    ball.faces,
+                    batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1)),
+                    batched_positions=points,
+                    batched_colors=linear([UNKNOWN] * len(points)),
+                    lod="off",
+                )
             )
-            for number in tendons
-        ]
-        places = [self._beside(rest, number) for number in tendons]
-        self._contacts = [
-            scene.add_batched_meshes_simple(
-                f"{root}/contacts_{number + 1}",
-                ball.vertices,
-                ball.faces,
-                batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1)),
-                batched_positions=place,
-                batched_colors=linear([UNKNOWN] * len(place)),
-                lod="off",
-            )
-            for number, place in enumerate(places)
-        ]
         self._closed = [
             scene.add_icosphere(f"{root}/closed_{number + 1}", _LIPS * outer, color=CLOSED)
             for number in range(len(rest.flexures))
         ]
 
     def _beside(self, shape: RobotShape, tendon: int) -> NDArray[np.float32]:
-        """Return the positions of the contact marks of a tendon (from 0)."""
         return shape.contacts(tendon, _CONTACT_AT * self._outer).astype(np.float32)
 
     def move(self, path: EquilibriumPath, shape: RobotShape, shown: Shown) -> None:
-        """Move them to a new state.
-
-        Args:
-            path: The state, as a path of one step.
-            shape: The shape of the robot in that state.
-            shown: What is visible.
-        """
-        for number, (line, balls) in enumerate(zip(self._tendons, self._contacts, strict=True)):
+        """Move them to the state of a path of one step, with its shape."""
+        for tendon, (line, balls) in enumerate(zip(self._tendons, self._contacts, strict=True)):
             line.visible, balls.visible = shown.tendons, shown.contacts
             if shown.tendons:
-                line.points = _segments(shape.tendon(number)).astype(np.float32)
+                line.points = _segments(shape, tendon)
             if shown.contacts:
-                balls.batched_positions = self._beside(shape, number)
-                codes = contact_colours(path[0], number)
-                balls.batched_colors = linear(codes)
-        for number, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
+                balls.batched_positions = self._beside(shape, tendon)
+                balls.batched_colors = linear(contact_colours(path[0], tendon))
+        for notch, (ball, closed) in enumerate(zip(self._closed, path.closed[0], strict=True)):
             ball.visible = bool(closed)
             if closed:
-                ball.position = shape.lips(number, _LIPS_AT * self._outer)
+                ball.position = shape.lips(notch, _LIPS_AT * self._outer)
 
 
-def _segments(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the straight pieces between points, (pieces, 2, 3)."""
+def _segments(shape: RobotShape, tendon: int) -> NDArray[np.float32]:
+    """Return the straight pieces of a tendon (from 0), (pieces, 2, 3)."""
+    points = shape.tendon(tendon).astype(np.float32)
     return np.stack([points[:-1], points[1:]], axis=1)

@@ -15,13 +15,10 @@ from notchflex.plotting.shapes.interpolation import rotation_of
 from notchflex.plotting.shapes.robot_shape import HELD, RobotShape, shape_at
 from notchflex.results import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.viewer.controls import POINTING, Controls
-from notchflex.viewer.reach import GRAVITY, Reach, round_up
+from notchflex.viewer.controls import GRAVITY, POINTING, Controls, Reach, round_up
 from notchflex.viewer.scene.camera import CameraPose, first_eye, framed, quaternions
-from notchflex.viewer.scene.colours import LOAD, METAL, linear, strain_colour
-from notchflex.viewer.scene.marks import Marks, Shown
-from notchflex.viewer.scene.skins import PIECES, FlexureSurface, at_rest, skins
-from notchflex.viewer.scene.solids import body_solids
+from notchflex.viewer.scene.marks import LOAD, METAL, Marks, Shown, linear, strain_colour
+from notchflex.viewer.scene.solids import PIECES, FlexureSurface, at_rest, body_solids, skins
 
 if TYPE_CHECKING:
     import viser
@@ -31,24 +28,16 @@ _FRAME = 2.2
 # In lengths of the robot.
 _ARROW, _SHORTEST = 0.35, 0.06
 _SMOOTH = np.radians(30.0)  # flatter edges than this are shaded as round
-SEE_THROUGH = 0.35
+_TRANSPARENT = 0.35
 # Directions of lights, and their intensities.
 _LIGHTS = (((0.6, -1.0, 0.8), 1.6), ((-1.0, -0.3, 0.5), 0.7), ((0.3, 1.0, 0.4), 0.7))
 ROOT = "/robot"
 
 
 class Scene:
-    """A robot in the scene of a viser server.
-
-    Args:
-        server: The server; what its scene holds under `/robot` is replaced.
-        robot: The robot.
-        reach: Ranges of its sliders, for the length of arrows.
-        shown: What is visible.
-    """
+    """A robot under `/robot` in the scene of a viser server; `reach` gives the length of arrows."""
 
     def __init__(self, server: viser.ViserServer, robot: Robot, reach: Reach, shown: Shown) -> None:
-        """Send the solids."""
         self.server, self.robot, self.reach, self.shown = server, robot, reach, shown
         self.rest = at_rest(robot)
         self.length = float(np.linalg.norm(np.diff(self.rest.position, axis=0), axis=1).sum())
@@ -58,42 +47,31 @@ class Scene:
 
     def _build(self) -> None:
         """Add all nodes."""
-        scene, rest = self.server.scene, self.rest
-        # No environment map: it takes a browser without a graphics card half a minute. No shadows:
-        # they cost it more than all the rest.
-        scene.configure_environment_map(None)
-        scene.configure_default_lights(enabled=False)
-        scene.add_light_hemisphere(
-            "/lights/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.2
-        )
-        for number, (place, intensity) in enumerate(_LIGHTS):
-            scene.add_light_directional(
-                f"/lights/lamp_{number}", intensity=intensity, position=place
-            )
-        outer = self.robot.tube.outer_radius
+        import trimesh
+
+        scene, rest, outer = self.server.scene, self.rest, self.robot.tube.outer_radius
+        self._add_lights()
         self._root = scene.add_frame(ROOT, show_axes=False)
-        self._bodies = [
-            _solid(scene, f"{ROOT}/body_{number}", mesh.vertices, mesh.faces)
-            for number, mesh in enumerate(body_solids(rest))
-        ]
+        self._bodies: list[Any] = []
+        for number, mesh in enumerate(body_solids(rest)):
+            solid = trimesh.Trimesh(*mesh, process=False)
+            shaded = trimesh.graph.smooth_shade(solid, angle=_SMOOTH)
+            name = f"{ROOT}/body_{number}"
+            node = scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)
+            self._bodies.append(node)
         self._skins: list[FlexureSurface] = skins(rest)
         self._skins_of: dict[str, list[FlexureSurface]] = {}
+        look: dict[str, Any] = {"color": METAL, "flat_shading": True}
         self._flexures = [
-            scene.add_mesh_simple(
-                f"{ROOT}/flexure_{number + 1}",
-                skin.at(sections),
-                skin.faces,
-                color=METAL,
-                flat_shading=True,
-            )
-            for number, (skin, sections) in enumerate(zip(self._skins, rest.flexures, strict=True))
+            scene.add_mesh_simple(f"{ROOT}/flexure_{number + 1}", skin.at(one), skin.faces, **look)
+            for number, (skin, one) in enumerate(zip(self._skins, rest.flexures, strict=True))
         ]
         self._see_through = False
         self._colours: list[Any] = [METAL] * len(self._flexures)
         self._marks = Marks(scene, ROOT, rest)
-        long, thin = _FRAME * outer, 0.05 * outer
-        self._base_frame = scene.add_frame(f"{ROOT}/base", axes_length=long, axes_radius=thin)
-        self._tip_frame = scene.add_frame(f"{ROOT}/tip", axes_length=long, axes_radius=thin)
+        axes: dict[str, Any] = {"axes_length": _FRAME * outer, "axes_radius": 0.05 * outer}
+        self._base_frame = scene.add_frame(f"{ROOT}/base", **axes)
+        self._tip_frame = scene.add_frame(f"{ROOT}/tip", **axes)
         self._arrows = scene.add_arrows(
             f"{ROOT}/loads",
             np.zeros((1, 2, 3)),
@@ -107,31 +85,26 @@ class Scene:
             scene.add_label(f"{ROOT}/load_{number}", "", visible=False, anchor="bottom-center")
             for number in range(2)
         ]
-        self._grid_cell = round_up(0.05 * self.length)
-        self._grid = scene.add_grid(
-            "/grid",
-            width=3.0 * self.length,
-            height=3.0 * self.length,
-            cell_size=self._grid_cell,
-            section_size=5.0 * self._grid_cell,
-            shadow_opacity=0.0,
+        self.grid_cell = round_up(0.05 * self.length)  # mm
+        size = 3.0 * self.length
+        cells: dict[str, Any] = {"cell_size": self.grid_cell}
+        cells["section_size"] = 5.0 * self.grid_cell
+        self._grid = scene.add_grid("/grid", size, size, shadow_opacity=0.0, **cells)
+
+    def _add_lights(self) -> None:
+        # No environment map: it takes a browser without a graphics card half a minute. No shadows:
+        # they cost it more than all the rest.
+        scene = self.server.scene
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_hemisphere(
+            "/lights/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.2
         )
+        for number, (place, bright) in enumerate(_LIGHTS):
+            scene.add_light_directional(f"/lights/lamp_{number}", intensity=bright, position=place)
 
-    @property
-    def grid_cell(self) -> float:
-        """Width of a cell of the grid on the floor [mm]."""
-        return self._grid_cell
-
-    def update(self, path: EquilibriumPath, controls: Controls) -> RobotShape:
-        """Move everything to a new state.
-
-        Args:
-            path: The state, as a path of one step.
-            controls: The settings.
-
-        Returns:
-            The shape of the robot in that state.
-        """
+    def update(self, path: EquilibriumPath, controls: Controls) -> None:
+        """Move everything to the state of a path of one step."""
         shape = shape_at(path, 0, PIECES)
         held = shape.position[:1] - [0.0, 0.0, HELD * self.robot.tube.outer_radius]
         self._seen = np.concatenate([held, shape.position, shape.tip[None]])
@@ -143,7 +116,6 @@ class Scene:
             self._marks.move(path, shape, self.shown)
             self._move_loads(path, shape)
             self._base_frame.visible = self._tip_frame.visible = self.shown.frames
-        return shape
 
     def _turn(self, pointing: str) -> None:
         self._pose = rotation_of(np.array(POINTING[pointing]))
@@ -177,7 +149,7 @@ class Scene:
         if self._see_through != self.shown.see_through:
             self._see_through = self.shown.see_through
             for node in self._bodies:
-                node.opacity = SEE_THROUGH if self._see_through else None
+                node.opacity = _TRANSPARENT if self._see_through else None
         self._tip_frame.position, self._tip_frame.wxyz = shape.tip, turned[-1]
         for node, skin, sections in zip(self._flexures, self._skins, shape.flexures, strict=True):
             node.vertices = skin.at(sections).astype(np.float32)
@@ -208,24 +180,12 @@ class Scene:
         return size * one.vector / one.size
 
     def eye(self, pointing: str, side: bool = False, aspect: float = 1.0) -> CameraPose:
-        """Return the default camera, with room for the robot to bend.
-
-        Args:
-            pointing: Direction of the tube, a key of `POINTING`.
-            side: Look normal to the plane in which the robot bends; else a little from above.
-            aspect: Width of the picture by its height.
-        """
+        """Return the first camera, with room for the robot to bend; see `first_eye`."""
         turn = rotation_of(np.array(POINTING[pointing]))
         return first_eye(self.robot.notches[0].direction_deg, self.length, turn, side, aspect)
 
     def picture_eye(self, toward: NDArray[np.float64], fov: float, aspect: float) -> CameraPose:
-        """Return a camera that shows the whole robot in its current state.
-
-        Args:
-            toward: Direction from the robot to the camera.
-            fov: Vertical angle of view [rad].
-            aspect: Width of the picture by its height.
-        """
+        """Return a camera that shows the whole robot in its current state; see `framed`."""
         outer = 1.3 * self.robot.tube.outer_radius
         box = outer * np.array(list(np.ndindex(2, 2, 2))) * 2.0 - outer
         points = (self._seen[:, None] + box).reshape(-1, 3)
@@ -235,12 +195,3 @@ class Scene:
         """Remove all nodes."""
         self._root.remove()
         self._grid.remove()
-
-
-def _solid(scene: Any, name: str, vertices: Any, faces: Any) -> Any:
-    """Add a solid with sharp edges and smooth round faces."""
-    import trimesh
-
-    whole = trimesh.Trimesh(vertices, faces, process=False)
-    shaded = trimesh.graph.smooth_shade(whole, angle=_SMOOTH)
-    return scene.add_mesh_simple(name, shaded.vertices, shaded.faces, color=METAL)

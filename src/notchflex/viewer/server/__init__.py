@@ -1,1 +1,0 @@
-"""The server of the page: address, origin of requests."""

@@ -1,0 +1,95 @@
+"""What surrounds a notch with elastic ends, its closing, and the dimensions that were checked."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.mechanics.chain import sites_of, unchecked_dimensions
+from notchflex.mechanics.ends import Side, notch_stiffness
+from notchflex.mechanics.section import SECTION_OF_CUT
+from reference_data import FOLDER
+
+MODULUS = 60_000.0
+
+
+def wrist(**keys: object) -> nf.Robot:
+    """Wrist A with off-axis cuts, its base held 1.2 mm before the first notch."""
+    options = {"depth": 1.40, "height": 0.8, "uncut_length": 1.2, "repeat": 5, "ends": "shell"}
+    return nf.Robot(
+        name="wrist",
+        tube=nf.Tube(1.62, 1.40, base_length=1.2),
+        notch=(nf.ArcNotch("off-axis", **(options | keys)),),
+        tendon=(nf.Tendon(0.70, path="straight"),),
+        material=nf.Linear(MODULUS),
+        friction=nf.Frictionless(),
+    )
+
+
+def test_sites_from_base_to_tip():
+    first, second, *_, last = sites_of(wrist())
+    assert first.proximal == Side("clamped", 1.2)
+    assert first.distal == second.proximal == Side("between", 1.2)
+    assert last.distal == Side("free", 1.2)
+    assert last.poisson_ratio == 0.33
+    assert sites_of(wrist(ends="rigid")) == (None,) * 5
+
+
+def test_a_base_of_no_length_is_rigid():
+    bare = replace(wrist(), tube=nf.Tube(1.62, 1.40))
+    assert bare.notches[0] == bare.notches[1]
+    near, far = (notch_stiffness(0.81, 0.7, "off-axis", 1.4, 0.8, 0.33, *pair) for pair in (
+        (Side("clamped", 0.0), Side("between", 1.2)), (Side("between", 1.2),) * 2))  # fmt: skip
+    assert 0.8 < near.weak < far.weak
+    assert nf.solve(bare, nf.Load(tension=1.0)).converged
+
+
+def test_dimensions_outside_the_range_are_named():
+    assert unchecked_dimensions(wrist()) == []
+    (sentence,) = unchecked_dimensions(wrist(depth=1.2))
+    assert sentence.startswith("notches 1, 2, 3, 4, 5: depth / outer diameter is 0.741")
+    shallow = nf.simulate(wrist(depth=1.2), nf.Load(tension=0.5))
+    from notchflex.results.warnings import path_warnings
+
+    assert sentence in path_warnings(shallow)
+
+
+def test_an_elastic_stop(margin):
+    robot = wrist(closing="elastic")
+    path = nf.simulate(robot, nf.pull(0.0, 8.0, steps=17))
+    assert path.converged.all()
+    ring = Side("between", 1.2)
+    law = notch_stiffness(0.81, 0.7, "off-axis", 1.4, 0.8, 0.33, ring, ring)
+    section = SECTION_OF_CUT["off-axis"](0.81, 0.7, 1.4)
+    closing = law.closing_factor * 0.8 / (0.81 + section.centroid)
+    angle, force = path.notch_angle[:, 2], path.contact_force[:, 2]
+    closed = force > 0.0
+    assert closed.sum() >= 3
+    assert (angle[~closed] < closing).all()
+    stop = law.closed_ratio * MODULUS * section.second_moment_weak / law.weak
+    arm = 0.8 / closing
+    beyond = stop * (angle[closed] - closing)
+    margin.within("moment of the stop, relative", force[closed] * arm / beyond - 1.0, 1e-9)
+    rigid = nf.simulate(wrist(), nf.Load(tension=8.0))
+    assert rigid.notch_angle[0, 2] == pytest.approx(closing / law.closing_factor)
+
+
+def test_work_is_stored_with_elastic_ends_and_stops(margin):
+    path = nf.simulate(wrist(closing="elastic"), nf.pull(0.0, 8.0, steps=4001))
+    work = np.trapezoid(path.tension[:, 0], path.stroke[:, 0])
+    margin.within("work over stored energy", work / path.stored_energy[-1] - 1.0, 1e-6)
+
+
+def test_sideways_force(margin):
+    state = nf.solve(wrist(), nf.Load(tension=0.0, tip_force=(0.0, 0.02, 0.0)))
+    with (FOLDER / "fem_wrist_sideways.csv").open(newline="", encoding="utf-8") as file:
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    turns = state.body_rotation[1:]
+    twist = 0.5 * (turns[:, 1, 0] - turns[:, 0, 1])
+    bend = 0.5 * (turns[:, 1, 2] - turns[:, 2, 1])
+    margin.within("twist", twist / [row["twist"] for row in rows] - 1.0, 0.03)
+    margin.within("sideways bend", bend / [row["bend"] for row in rows] - 1.0, 0.07)
