@@ -213,10 +213,10 @@ def _blind(
         missed = fit.residuals.root_mean_squares()
         noise = [missed.get(OBSERVED[one], np.nan) for one in residuals.quantity]
         sizes = [size**2 for _, size in before.values()]
-        covariance = block_diag(fit.covariance, np.diag(sizes)) if own else fit.covariance
-        depends = residuals.slopes.any(axis=0)
-        slopes = residuals.slopes[:, depends]
-        spread = np.einsum("ri,ij,rj->r", slopes, covariance[np.ix_(depends, depends)], slopes)
+        covariance = np.asarray(block_diag(fit.covariance, np.diag(sizes)))
+        depends = np.flatnonzero(residuals.slopes.any(axis=0))
+        slopes, covariance = residuals.slopes[:, depends], covariance[np.ix_(depends, depends)]
+        spread = np.sum(slopes @ covariance * slopes, axis=1)
         deviation = np.sqrt(np.maximum(spread, 0.0) + np.square(noise))
     return Fold(
         name, fit, errors, errors_of_all, residuals is not None, residuals, deviation, before

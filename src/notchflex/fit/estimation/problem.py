@@ -77,9 +77,11 @@ class Problem:
         known = np.isfinite(self.noise.deviation)
         more: list[tuple[float, int, int, float]] = []
         for number, unknown in enumerate(self.unknowns):
+            if unknown.prior is None:
+                continue
+            mean, deviation = unknown.prior
             owners = {labels.index(one.label) for one in unknown.sets}
-            for robot in owners if unknown.prior is not None else ():
-                mean, deviation = unknown.prior
+            for robot in owners:
                 mine = known & (residuals.robot == robot)
                 noise = float(np.sqrt(np.mean(self.noise.deviation[mine] ** 2) / len(owners)))
                 off = (float(values[number]) - mean) / deviation

@@ -67,12 +67,11 @@ class Residuals:
         slopes[np.arange(len(value)), number] = slope
         like = np.array([int(np.argmax(self.robot == one)) for one in robot])
         added = {"values": value, "slopes": slopes}
+        columns = {one.name: np.asarray(getattr(self, one.name)) for one in fields(self)}
         return Residuals(
             **{
-                one.name: np.concatenate(
-                    [getattr(self, one.name), added.get(one.name, getattr(self, one.name)[like])]
-                )
-                for one in fields(self)
+                name: np.concatenate([column, added.get(name, column[like])])
+                for name, column in columns.items()
             }
         )
 
