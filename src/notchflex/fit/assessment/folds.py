@@ -20,6 +20,9 @@ from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.residuals import Residuals
 from notchflex.fit.model.samples import Samples
 
+PHOTOGRAPH = 0.6
+"""Part of the largest load at which the command line takes a photograph."""
+
 Data = dict[str, tuple[Measurements, ...]]
 """Measurements by label of their robot."""
 
@@ -103,8 +106,8 @@ def leave_out(
     Args:
         found: A fit to everything.
         by: "pull" or "robot".
-        photograph: Also update these constants by one row of the robot left out, the one whose
-            load is nearest to this part of its largest (about 0.6), and try them on its other rows.
+        photograph: Also update these constants by one row of the robot left out, whose load is
+            nearest to this part of its largest (such as 0.6), and try them on its other rows.
         starts: Number of starting points of each search.
         seed: Seed of the starting points.
         progress: Called with the name of the task, how much of it is done, and how much there is.
