@@ -17,7 +17,8 @@ FOLDER = Path(nf.__file__).parent
 # fmt: off
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
-    "Linear", "Superelastic", "Frictionless", "Capstan", "Load", "LoadPath", "pull", "solve",
+    "Linear", "Superelastic", "Nitinol", "Frictionless", "Capstan", "Load", "LoadPath", "pull",
+    "solve",
     "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",
     "closing", "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError",
     "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",

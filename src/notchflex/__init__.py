@@ -20,6 +20,7 @@ _HOME = {
             "Corner",
             "Frictionless",
             "Linear",
+            "Nitinol",
             "Robot",
             "StripNotch",
             "Superelastic",

@@ -67,6 +67,7 @@ from notchflex.robot import Capstan as Capstan
 from notchflex.robot import Corner as Corner
 from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
+from notchflex.robot import Nitinol as Nitinol
 from notchflex.robot import Robot as Robot
 from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic

@@ -118,6 +118,20 @@ def test_a_recomputed_function():
     np.testing.assert_array_equal(result, [0.0, 2.0, 4.0])
 
 
+def test_a_function_with_a_rule_for_vmap():
+    @jax.custom_batching.custom_vmap
+    def until_all_are_small(x):
+        return jax.lax.while_loop(lambda y: jnp.any(y > 1.0), lambda y: 0.5 * y, x)
+
+    @until_all_are_small.def_vmap
+    def _(size, batched, x):
+        del size
+        return until_all_are_small(x), batched[0]
+
+    (result,) = compiled(jax.vmap(until_all_are_small), np.array([1.0, 6.0, 0.5]))
+    np.testing.assert_array_equal(result, [0.125, 0.75, 0.0625])
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.uint64, np.complex128])
 def test_other_numbers_are_refused(dtype):
     with pytest.raises(UnsupportedPrimitiveError, match=np.dtype(dtype).name):

@@ -218,3 +218,45 @@ def test_lanes_picked_in_any_order(size):
         return joined, mixed * rows, around - rows, rows[1:] / (2.0 + rows[:-1])
 
     check(function, given(size), long=(size, size + 1))
+
+
+def eliminated(vector, size, width):
+    """Loops along the lanes over small matrices that are computed and used lane by lane."""
+    table = jnp.sin(jnp.moveaxis(jnp.reshape(vector, (width, width, size)), -1, 0))
+
+    def step(carry, matrix):
+        own = carry @ (matrix + jnp.eye(width))
+        return own / (1.0 + jnp.sum(own**2)), (own, own[0, 0] > 0.1, own[:0])
+
+    last, (found, signs, none) = jax.lax.scan(step, jnp.eye(width), table, reverse=size % 2 == 0)
+    back = jax.lax.scan(lambda one, own: (one @ own, one), last, found)[1]
+    return last, found * table, jnp.where(signs, back[:, 0, 1], 0.5), none
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_loops_along_the_lanes(size):
+    vector = np.random.default_rng(size).normal(size=9 * size)
+    check(lambda x: eliminated(x, size, 3), vector, long=(size, size + 1))
+
+
+def test_loops_along_the_lanes_copy_no_single_entries():
+    """What rows a loop reads and writes as they are: no loop for each entry of its matrices."""
+
+    def loops(width):
+        def function(vector):
+            _, products, chosen, _ = eliminated(vector, 27, width)
+            return jnp.sum(products, axis=(1, 2)), chosen
+
+        text = lower(function, [np.ones(27 * width**2)], (27, 28))[0].text
+        return text.count(" = phi ")
+
+    assert loops(2) == loops(4)
+
+
+def test_arrays_that_are_read_only_or_empty():
+    made, _ = program(lambda x, y: (2.0 * x, y + 1.0), [np.ones(3), np.ones(0)], ())
+    fixed = np.arange(3.0)
+    fixed.flags.writeable = False
+    twice, none = made([fixed, np.ones(0)])
+    assert twice.tolist() == [0.0, 2.0, 4.0]
+    assert none.size == 0

@@ -114,7 +114,7 @@ OUTSIDE = [
     # words
     (('"on-axis"', '"onaxis"'), ["`notch[1].cut`", '"on-axis"', '"off-axis"', "did you mean"]),
     (('kind = "capstan"', 'kind = "capstn"'), ["`friction.kind`", "did you mean `capstan`"]),
-    (('kind = "superelastic"', 'kind = "x"'), ["`material.kind`", '"linear", "superelastic"']),
+    (('kind = "superelastic"', 'kind = "x"'), ["`material.kind`", '"linear", "nitinol"']),
     (('kind = "arc"', 'kind = "v"'), ["`notch[1].kind`", '"arc", "strip", "u-link"']),
     (("coefficient = 0.13", 'coefficient = 0.1\nwrap = "x"'), ["`friction.wrap`", "whole-before"]),
     (("radius = 0.70", 'radius = 0.70\npath = "arc"'), ["`tendon[1].path`", '"wall-arc"']),

@@ -95,6 +95,15 @@ def test_angles_and_tips(case, allowed, margin):
     margin.within("tip, part of its path", error / moved, TIP)
 
 
+@pytest.mark.parametrize("case", ["A_se_mu0_medium", "A_se_mu013_coarse"])
+def test_yielding_fibres(case, margin):
+    bilinear = nf.Nitinol(elastic_modulus=10_000.0, plateau_stress=280.0, plateau_modulus=3_000.0)
+    path, _, theta = solved(case, bilinear)
+    error = np.degrees(path.notch_angle) / theta - 1.0
+    margin.within("middle notches, relative", error[:, :4], 0.03)
+    margin.within("last notch, relative", error[:, 4], 0.06)
+
+
 def test_the_papers_law_is_far_off():
     """The test can fail: rigid ends miss the same numbers by a third."""
     path, _, theta = solved("A_lin_mu0_medium", nf.Linear(60_000.0))

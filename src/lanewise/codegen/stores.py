@@ -39,7 +39,7 @@ class StoreWriter:
             for run in find_runs(store.refs.tolist(), store.offsets.tolist()):
                 part = target.part(run.offset, run.offset_stride if run.count > 1 else 1)
                 if run.count > 1:
-                    self._write_run(run, kind, part, mask)
+                    self._write_run(run, kind, part, mask, store.row)
                 else:
                     self._write_entry(run.ref(0), kind, part, 0, mask)
                 self.builder.limit_block()
@@ -65,13 +65,15 @@ class StoreWriter:
             storage.copy(address, saved, length, storage.graph.kind[node])
             storage.address[node] = saved
 
-    def _write_run(self, run: Run, kind: str, target: Address, mask: str | None) -> None:
+    def _write_run(self, run: Run, kind: str, target: Address, mask: str | None, row: int) -> None:
         storage, builder = self.storage, self.builder
         if storage.in_memory(run.node):
             self._copy_run(self.values.run_address(run), run.count, kind, target, mask)
         elif run.lane == 0 and run.lane_stride == 1 and target.stride == 1:
             at = builder.pointer(target.pointer, target.first)
-            builder.store(at, self.values.value(run.node), kind, True, run.count)
+            # A whole vector can be loaded again at once, one stored under a mask much later.
+            lanes = WIDTH if run.count == row else run.count
+            builder.store(at, self.values.value(run.node), kind, True, lanes)
         else:
             for number in range(run.count):
                 self._write_entry(run.ref(number), kind, target, number, mask)

@@ -20,11 +20,13 @@ class Store:
         refs: References to the entries, flat.
         buffer: The buffer.
         offsets: Position of each entry in the buffer.
+        row: Length of the buffer's rows, if each is padded to whole vectors; else 0.
     """
 
     refs: References
     buffer: Buffer
     offsets: np.ndarray
+    row: int = 0
 
 
 @dataclass(eq=False)

@@ -45,6 +45,23 @@ class BufferLayout:
         rest = [length for a, length in enumerate(shape) if a != axis]
         return others * padded, np.moveaxis(positions.reshape(*rest, size), -1, axis)
 
+    def stacked(self, shape: tuple[int, ...], length: int) -> tuple[int, np.ndarray]:
+        """Return the same for arrays of one shape, one for each step of a loop.
+
+        Steps along a lane axis are rows, so that what reads or writes all steps takes vectors. In a
+        batch, where vectors are those of its rows anyway, each step's array is contiguous.
+
+        Args:
+            shape: Shape of the array of one step.
+            length: Number of steps, the leading axis of the positions that are returned.
+        """
+        along_lanes = not self.batched and length in self.arrays.lane_sizes
+        if along_lanes and self.arrays.lane_axis(shape) is None:
+            return self.positions((length, *shape))
+        size, positions = self.positions(shape)
+        starts = np.arange(length).reshape(-1, *(1,) * positions.ndim) * size
+        return size * length, starts + positions
+
     def allocate(self, shape: tuple[int, ...], kind: str) -> Layout:
         """Return a new buffer in the arena for an array."""
         size, positions = self.positions(shape)
@@ -67,10 +84,12 @@ class BufferLayout:
         """Return the store of an array to a buffer, in rows as the buffer has them."""
         buffer, positions = layout
         refs = np.broadcast_to(refs, positions.shape)
+        row = 0
         if self._has_rows(positions.shape):
             axis = self.arrays.lane_axis(positions.shape)
             refs = self.arrays.rows(self.arrays.loaded(refs), axis)
-        return Store(refs.ravel(), buffer, positions.ravel())
+            row = positions.shape[axis or 0]
+        return Store(refs.ravel(), buffer, positions.ravel(), row)
 
     def store_results(
         self, results: Sequence[References], buffer: Callable[[int, int], Buffer]

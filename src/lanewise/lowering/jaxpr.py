@@ -17,11 +17,11 @@ from lanewise.lowering.arrays import ArrayLowering
 from lanewise.lowering.buffers import BufferLayout, Layout
 from lanewise.lowering.data_movement import DATA_MOVEMENT
 from lanewise.lowering.primitives import ELEMENTWISE, PRIMITIVES, kind_of
-from lanewise.lowering.scan_inputs import ScanInputs
+from lanewise.lowering.scan_inputs import ScanInputs, slice_of
 
 # Primitives that call another function.
 _CALLS = {"jit", "pjit", "closed_call", "core_call", "remat", "remat2", "checkpoint"}.union(
-    ("custom_jvp_call", "custom_vjp_call")
+    ("custom_jvp_call", "custom_vjp_call", "custom_vmap_call")
 )
 
 
@@ -108,7 +108,7 @@ class JaxprLowering:
                     operands[at] = self.arrays.elementwise("to_float", operands[at])
             return self.function(_elementary(name, len(operands)), operands, scalar=True)
         if name in _CALLS:
-            inner = params["jaxpr" if "jaxpr" in params else "call_jaxpr"]
+            inner = next(params[key] for key in ("jaxpr", "call_jaxpr", "call") if key in params)
             if hasattr(inner, "consts"):
                 return self.function(inner, operands, scalar=scalar)
             return self._jaxpr(inner, [], operands, scalar)
@@ -160,7 +160,7 @@ class JaxprLowering:
         layouts = self._allocate(avals[:carried])
         initial = self._store(start, layouts)
         body = self.graph.block.nested(repeats=True)
-        inputs = ScanInputs(self.arrays, body, length, self.buffers.batched)
+        inputs = ScanInputs(self.buffers, body, length)
         present = [inputs.present(refs) for refs in arrays]
         initial += inputs.initial
         with self.inside(body):
@@ -169,35 +169,29 @@ class JaxprLowering:
             results = self.function(closed, [*operands[:consts], *carry, *present])
             updates = self._store(results[:carried], layouts)
             steps = self._scan_results(avals[carried:], length)
-            updates += self._store(results[carried:], steps)
-        inputs.slices += [buffer for buffer, _ in steps]
+            present = [(slice_of(whole, at), at[0]) for whole, at in steps]
+            updates += self._store(results[carried:], present)
+        inputs.slices += [buffer for buffer, _ in present]
         loop = ScanLoop(
             initial, length, params["reverse"], inputs.slices, inputs.inputs, body, updates
         )
         self.add_region(loop, self.graph.block)
-        return [*self._read(layouts, self.graph.block), *self._stacked(steps, length)]
+        return [*self._read(layouts, self.graph.block), *self._in_buffers(steps)]
+
+    def _in_buffers(self, layouts: Sequence[Layout]) -> list[References]:
+        """Return the entries of buffers; what uses them loads them."""
+        block = self.graph.block
+        return [reference(self.graph.add_buffer(one, block)) + at for one, at in layouts]
 
     def _scan_results(self, avals: Sequence[Any], length: int) -> list[Layout]:
-        """Return the slices that a step writes its results to."""
+        """Return buffers for the results of all steps of a scan, steps as leading axis."""
         layouts: list[Layout] = []
-        batched = self.buffers.batched
         for aval in avals:
-            size, positions = self.buffers.positions(aval.shape)
+            size, positions = self.buffers.stacked(aval.shape, length)
             kind = kind_of(aval.dtype)
-            whole = Buffer("arena", size * length, batched=batched, kind=kind)
-            layouts.append(
-                (Buffer("slice", size, whole, 0, batched, kind, size, length), positions)
-            )
+            whole = Buffer("arena", size, batched=self.buffers.batched, kind=kind)
+            layouts.append((whole, positions))
         return layouts
-
-    def _stacked(self, steps: Sequence[Layout], length: int) -> list[References]:
-        """Return the results of all steps of a scan, as arrays with steps as leading axis."""
-        results: list[References] = []
-        for own, positions in steps:
-            starts = np.arange(length).reshape(-1, *(1,) * positions.ndim) * own.stride
-            node = self.graph.add_buffer(own.source, self.graph.block)
-            results.append(reference(node) + starts + positions)
-        return results
 
     def cond(self, operands: list[References], params: dict[str, Any]) -> list[References]:
         """Lower `cond` and `switch`: results that all branches share need no buffer."""

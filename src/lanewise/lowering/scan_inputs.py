@@ -13,7 +13,7 @@ import numpy as np
 
 from lanewise.ir.control_flow import Store
 from lanewise.ir.graph import LANE_BITS, LANE_MASK, Block, Buffer, Graph, References, reference
-from lanewise.lowering.arrays import ArrayLowering
+from lanewise.lowering.buffers import BufferLayout
 
 
 @dataclass
@@ -21,19 +21,17 @@ class ScanInputs:
     """Collect what a scan needs of its input arrays.
 
     Attributes:
-        arrays: Lowers operations on arrays.
+        buffers: Lays out arrays in memory.
         body: The block of the loop.
         length: Number of steps.
-        batched: Whether the loop belongs to rows of a batch.
         initial: Stores before the loop.
         slices: Buffers of the present step.
         inputs: References into the buffers that these are slices of.
     """
 
-    arrays: ArrayLowering
+    buffers: BufferLayout
     body: Block
     length: int
-    batched: bool
     initial: list[Store] = field(default_factory=list[Store])
     slices: list[Buffer] = field(default_factory=list[Buffer])
     inputs: list[int] = field(default_factory=list[int])
@@ -44,7 +42,7 @@ class ScanInputs:
         Args:
             refs: Entries, steps as leading axis.
         """
-        graph = self.arrays.graph
+        graph = self.buffers.graph
         rows = _without_loads(graph, refs).reshape(self.length, -1)
         first = rows[0]
         result = first.copy()
@@ -61,12 +59,12 @@ class ScanInputs:
                 result[members] = self._strided(first[members], int(steps[0, members[0]]))
             rest = moving[~even]
             if rest.size:
-                result[rest] = self._copied(self.arrays.loaded(rows[:, rest]))
+                result[rest] = self._copied(self.buffers.arrays.loaded(rows[:, rest]))
         return result.reshape(refs.shape[1:])
 
     def _strided(self, first: References, stride: int) -> References:
         """Return the entries of a buffer that advances by a stride."""
-        graph = self.arrays.graph
+        graph = self.buffers.graph
         whole: Buffer = graph.args[int(first[0]) >> LANE_BITS][0]
         lanes = first & LANE_MASK
         start = int(lanes.min())
@@ -78,13 +76,28 @@ class ScanInputs:
 
     def _copied(self, refs: References) -> References:
         """Return the entries of an array that is copied to memory before the loop."""
-        graph = self.arrays.graph
-        kind, size = graph.kind[int(refs[0, 0]) >> LANE_BITS], refs.shape[1]
-        whole = Buffer("arena", refs.size, batched=self.batched, kind=kind)
-        self.initial.append(Store(refs.ravel(), whole, np.arange(refs.size)))
-        own = Buffer("slice", size, whole, 0, self.batched, kind, size, self.length)
+        graph = self.buffers.graph
+        kind, batched = graph.kind[int(refs[0, 0]) >> LANE_BITS], self.buffers.batched
+        size, positions = self.buffers.stacked((refs.shape[1],), self.length)
+        whole = Buffer("arena", size, batched=batched, kind=kind)
+        row = self.length if size > positions.size else 0
+        self.initial.append(Store(refs.T.ravel(), whole, positions.T.ravel(), row))
+        own = slice_of(whole, positions)
         self.slices.append(own)
-        return reference(graph.add_buffer(own, self.body)) + np.arange(size)
+        return reference(graph.add_buffer(own, self.body)) + positions[0]
+
+
+def slice_of(whole: Buffer, positions: np.ndarray) -> Buffer:
+    """Return what one step of a loop sees of a buffer.
+
+    Args:
+        whole: The buffer.
+        positions: Position in it of every entry, steps as leading axis.
+    """
+    steps, size = len(positions), int(positions[0].max(initial=0)) + 1
+    strides = np.diff(positions, axis=0).ravel()
+    stride = int(strides[0]) if strides.size else size
+    return Buffer("slice", size, whole, 0, whole.batched, whole.kind, stride, steps)
 
 
 def _without_loads(graph: Graph, refs: References) -> References:

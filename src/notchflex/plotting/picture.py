@@ -60,8 +60,10 @@ def _picture(result: Any) -> Picture:
         Batch: batch_picture,
         Comparison: comparison_picture,
     }
-    if isinstance(result, Mapping) and all(
-        isinstance(one, EquilibriumPath) for one in result.values()
+    if (
+        isinstance(result, Mapping)
+        and not isinstance(result, Batch)
+        and all(isinstance(one, EquilibriumPath) for one in result.values())
     ):
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
     if not isinstance(result, tuple(kinds)):

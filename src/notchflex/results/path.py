@@ -88,7 +88,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         Args:
             name: Name of a property, such as "notch_angle".
         """
-        kept = self._kept
+        kept = vars(self).setdefault("_kept", {})
         if name not in kept:
             if name not in QUANTITIES:
                 known = ", ".join(QUANTITIES)
@@ -97,7 +97,8 @@ class EquilibriumPath(PathQuantities, Displayed):
             if quantity.source in ("path", "derived"):
                 kept[name] = quantity.formula(self)
             else:  # vectors and rotations of the solver are in the frame of the base
-                turn, values = self.base_to_world, self.solver_quantity(name)
+                turn = self.base_to_world if quantity.in_world else None
+                values = self.solver_quantity(name)
                 kept[name] = values if turn is None else quantity.turned(values, turn)
         return kept[name]
 
@@ -113,10 +114,6 @@ class EquilibriumPath(PathQuantities, Displayed):
         if tried.all():
             return values
         return values[np.maximum.accumulate(np.where(tried, np.arange(len(tried)), 0))]
-
-    @cached_property
-    def _kept(self) -> dict[str, Any]:
-        return {}
 
     @cached_property
     def base_to_world(self) -> Float[np.ndarray, "3 3"] | None:

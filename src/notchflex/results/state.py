@@ -21,6 +21,7 @@ from notchflex.solver.continuation import SolverState, at_rest
 
 _MODES = ".point.unknowns.modes"
 _LOADS = ".applied"
+_MATERIAL = ".memory.material"
 _FORMAT = "notchflex state 3"
 
 
@@ -30,8 +31,8 @@ class State(Displayed):
 
     Attributes:
         robot: Name of the robot it belongs to.
-        solved: Unknowns, base tensions (N), memory of the contacts, stroke (mm) and loads, those as
-            of space.
+        solved: Unknowns, base tensions (N), memory of contacts and material, stroke (mm) and
+            loads, those as of space.
         level: For which loads its chain was assembled.
         loaded: Whether loads other than the tendons' act in it.
         refinement: How many more modes its chain has than for usual loads.
@@ -243,6 +244,9 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solver
         if name == _MODES and array.ndim == leaf.ndim and array.shape[-1] < leaf.shape[-1]:
             # The modes of every level are the first ones of the next.
             array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
+        if name == _MATERIAL and array.ndim == leaf.ndim and array.shape[1] == 1:
+            # A notch under tendons alone bends alike all along: it has one node.
+            array = np.repeat(array, leaf.shape[1], axis=1)
         if array.shape != leaf.shape:
             raise InputError.STATE_OF_ANOTHER_ROBOT(
                 f"{whose} with other notches or tendons than this robot; "

@@ -11,6 +11,7 @@ from notchflex.robot.friction.corner import Corner
 from notchflex.robot.friction.frictionless import Frictionless
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.materials.linear import Linear
+from notchflex.robot.materials.nitinol import Nitinol
 from notchflex.robot.materials.superelastic import Superelastic
 from notchflex.robot.notches.arc import ArcNotch
 from notchflex.robot.notches.opening import Opening
@@ -36,6 +37,7 @@ __all__ = [
     "Frictionless",
     "Linear",
     "Material",
+    "Nitinol",
     "Notch",
     "Opening",
     "Robot",

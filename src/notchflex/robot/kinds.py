@@ -138,6 +138,11 @@ class Material:
         quantity("", "strain beyond which a simulation warns", above=0),
     ] = None
 
+    @property
+    def by_fibres(self) -> bool:
+        """Whether its law sums up the fibres of a section."""
+        return False
+
 
 @part(kw_only=True)
 class Friction:

@@ -23,7 +23,7 @@ class SolverState(NamedTuple):
 
     Attributes:
         point: Unknowns and base tensions.
-        memory: History of the contacts, as of this state.
+        memory: History of contacts and material, as of this state.
         stroke: Tendon drawn out at the base, mm.
         applied: External loads on the bodies; None for a chain assembled for tendons alone.
     """
@@ -76,7 +76,8 @@ def at_rest(chain: Chain) -> SolverState:
         log_ratio=none,
     )
     slack = constant(np.zeros(chain.tendons))
-    return SolverState(Iterate(unknowns, slack), Memory(none, none, none), slack, unloaded(chain))
+    memory = Memory(none, none, none, chain.law.rest(chain.rods.section))
+    return SolverState(Iterate(unknowns, slack), memory, slack, unloaded(chain))
 
 
 def unloaded(chain: Chain) -> BodyLoads | None:
@@ -123,7 +124,7 @@ def solve_load_step(
         aim = jnp.minimum(result.reached + part, stop)
         towards = interpolate_command(chain, command, last, aim)
         new = _solve_substep(chain, towards, result.solved, settings, aim)
-        memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound)
+        memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound, new.material)
         keep = partial(jax.tree.map, lambda old, new_leaf: jnp.where(new.converged, new_leaf, old))
         result = LoadStepResult(
             solved=keep(result.solved, SolverState(new.point, memory, new.stroke, towards.applied)),

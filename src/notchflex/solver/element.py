@@ -6,7 +6,7 @@ together with the balance.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from jaxtyping import Array, Bool, Float
 
@@ -37,17 +37,19 @@ class Unknowns(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """History of the friction contacts, as of the last solved state.
+    """History of the friction contacts and of the material, as of the last solved state.
 
     Attributes:
         log_ratio: Their log ratios.
         slid: Tendon slid over them, mm.
         bound: Their largest log ratios, for the predictor of the next state alone.
+        material: Memory of the material at every node; () where it has none.
     """
 
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
     slid: tuple[Float[Array, "*n t 2"], ...]
     bound: tuple[Float[Array, "*n t 2"], ...]
+    material: Any = ()
 
 
 def notch_heights(chain: Chain) -> Float[Array, " n"]:

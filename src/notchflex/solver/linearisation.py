@@ -130,7 +130,7 @@ def _balance_rows(here: _Linearisation) -> tuple[Float[Array, "n m z"], list[Arr
     elastic = chain.elastic
     if elastic is None:
         elastic = jax.vmap(material_tangent, in_axes=(0, None, 0, 0))(
-            chain.rods, chain.law, chain.memory, here.unknowns.modes
+            chain.rods, chain.law, here.memory.material, at.flexure
         )
         elastic = _never_singular(chain, elastic)
     behind: list[Array] = []

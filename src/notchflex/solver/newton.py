@@ -59,6 +59,7 @@ class NewtonResult(NamedTuple):
         point: The solution, or the last guess.
         slid: Tendon slid over the contacts there, mm.
         bound: Largest log ratios of the contacts there.
+        material: Memory of the material there.
         stroke: Tendon drawn out at the base there, mm.
         residual: Largest scaled residual there.
         iterations: Number of iterations.
@@ -68,6 +69,7 @@ class NewtonResult(NamedTuple):
     point: Iterate
     slid: tuple[Float[Array, "n t 2"], ...]
     bound: tuple[Float[Array, "n t 2"], ...]
+    material: Any
     stroke: Float[Array, " t"]
     residual: Float[Array, ""]
     iterations: Int[Array, ""]
@@ -100,7 +102,7 @@ class NewtonProblem(NamedTuple):
     Attributes:
         chain: The chain.
         command: Tensions and strokes commanded, external loads.
-        memory: History of the contacts, as of the last solved state.
+        memory: History of contacts and material, as of the last solved state.
         last_tension: Base tensions of that state, N.
     """
 
@@ -189,6 +191,7 @@ def _begin(problem: NewtonProblem, start: Iterate) -> _Search:
         point=start,
         slid=problem.memory.slid,
         bound=problem.memory.bound,
+        material=problem.memory.material,
         stroke=jnp.zeros(problem.chain.tendons),
         residual=jnp.array(jnp.inf),
         iterations=jnp.array(-1),
@@ -228,6 +231,7 @@ def _result(
         point=point,
         slid=tuple(span.slid for span in at.spans),
         bound=tuple(span.bound for span in at.spans),
+        material=at.flexure.memory,
         stroke=stroke(chain, point.base_tension, at.base),
         residual=residual,
         iterations=iterations,

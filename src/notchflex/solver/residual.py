@@ -123,7 +123,7 @@ def evaluate(
     Args:
         chain: The chain.
         unknowns: Its unknowns, flexures as leading axis.
-        memory: History of its contacts.
+        memory: History of its contacts and its material.
         base_tension: Tension of every tendon at the base, N.
         applied: External loads on the bodies; None for a chain assembled for tendons alone.
 
@@ -131,7 +131,7 @@ def evaluate(
         The evaluation.
     """
     on_bodies = chain.forces_on_bodies
-    flexure = flexure_states(chain, unknowns.modes, with_pose=on_bodies)
+    flexure = flexure_states(chain, unknowns.modes, memory.material, with_pose=on_bodies)
     anchors = _anchor_poses(chain, flexure.pose)
     spans = tuple(
         _spans(chain, k, _crossings(group, chain, flexure, anchors), unknowns, base_tension)

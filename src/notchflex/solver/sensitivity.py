@@ -60,8 +60,8 @@ def attach_derivatives(
     Returns:
         The same state.
     """
-    if not (chain.friction.remembers and chain.loaded):
-        whole = (way.parts <= 1) | (not chain.friction.remembers)
+    if not (chain.remembers and chain.loaded):
+        whole = (way.parts <= 1) | (not chain.remembers)
         return _answering_part(chain, command, last, solved, way.reached & whole)
     known = way.reached & (way.parts <= _PARTS_FOLLOWED)
     halfway = interpolate_command(chain, command, last, _still(way.part_before))
@@ -95,6 +95,7 @@ def _answering_part(
         log_ratio=point.unknowns.log_ratio,
         slid=tuple(span.slid for span in at.spans),
         bound=tuple(span.bound for span in at.spans),
+        material=at.flexure.memory,
     )
     drawn = stroke(chain, point.base_tension, at.base)
     answer = SolverState(point, memory, drawn, command.applied)

@@ -119,7 +119,7 @@ def _by_modes(chain: Chain, at: Evaluation, group: TendonGroup, modes: Array) ->
 
         return jax.jacfwd(moved)(at_modes)
 
-    return jax.vmap(slopes)(group, chain.rods, chain.memory, anchors, modes)
+    return jax.vmap(slopes)(group, chain.rods, at.flexure.memory, anchors, modes)
 
 
 def tendon_jacobian(

@@ -74,7 +74,7 @@ def test_energy_of_a_linear_notch_is_its_potential() -> None:
         assert held == pytest.approx(potential(curvature), rel=1e-12)
 
 
-@pytest.mark.parametrize("curvature", [-1.6, -0.2, 0.3, 0.7, 1.6])
+@pytest.mark.parametrize("curvature", [-4.0, -1.6, -0.2, 0.0, 0.3, 0.7, 1.6, 2.3])
 def test_a_superelastic_notch_solves_the_law_of_its_ends(curvature: float) -> None:
     def missing(own: float) -> float:
         part = moment(SUPERELASTIC, own, PLAIN) / (10000.0 * 5.8e-4)

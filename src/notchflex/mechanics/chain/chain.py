@@ -11,6 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from notchflex._jax import constant, jax, jnp
 from notchflex._pytree import Pytree, static
+from notchflex.mechanics.chain.fibres import with_fibres
 from notchflex.mechanics.chain.mass import body_lengths, body_masses
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
 from notchflex.mechanics.chain.sites import sites_of
@@ -48,7 +49,6 @@ class Chain(Pytree):
     Attributes:
         rods: The flexures, each from the frame of body j - 1 to that of body j. A body's frame
             lies on the tube axis at its proximal face.
-        memory: Memory of the material at every node of every flexure.
         law: The material.
         friction: The friction between tendons and tube.
         groups: The tendons, by the way they run.
@@ -81,7 +81,6 @@ class Chain(Pytree):
     """
 
     rods: Rod
-    memory: Any
     law: SectionLaw
     friction: FrictionLaw
     groups: tuple[TendonGroup, ...]
@@ -121,6 +120,11 @@ class Chain(Pytree):
     def tendon_order(self) -> Int[np.ndarray, " t"]:
         """Numbers of the tendons, group by group."""
         return np.array([number for group in self.groups for number in group.numbers], int)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether a solved state depends on the one before, by friction or by the material."""
+        return self.friction.remembers or self.law.remembers
 
     @property
     def forces_on_bodies(self) -> bool:
@@ -168,7 +172,6 @@ def assemble(
     tendons = robot.tendon
     chain = Chain(
         rods=rods,
-        memory=(),
         groups=laid.groups,
         contact_pairs=shaped.contact_pairs,
         axial_stiffness=constant([tendon.axial_stiffness for tendon in tendons]),
@@ -250,9 +253,9 @@ class Shaped(NamedTuple):
 
 def shape_of(robot: Robot, level: str, refinement: int) -> Shaped:
     """What of a robot's chain follows from its shape alone."""
-    chord = robot.friction.turns_with_chord
+    chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
     sites = sites_of(robot)
-    return _shaped(robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord)
+    return _shaped(robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres)
 
 
 # A search for constants of the material or of friction assembles one shape hundreds of times.
@@ -265,10 +268,12 @@ def _shaped(
     level: str,
     refinement: int,
     turns_with_chord: bool,
+    by_fibres: bool,
 ) -> Shaped:
     # Notches that are alike are worked out once.
     placed = tuple(zip(notches, sites, strict=True))
-    unlike = {each: _flexure(*each, tube, level, refinement) for each in dict.fromkeys(placed)}
+    different = dict.fromkeys(placed)
+    unlike = {each: _flexure(*each, tube, level, refinement, by_fibres) for each in different}
     own_rods, free_poses = zip(*unlike.values(), strict=True)
     alike = stack(own_rods)
     number = {each: index for index, each in enumerate(unlike)}
@@ -298,12 +303,13 @@ def _shaped(
 
 @lru_cache(maxsize=512)
 def _flexure(
-    notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int
+    notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
 ) -> tuple[Rod, Motion]:
     """A flexure and its pose in the free robot."""
     # Kinds whose ends are rigid need not know of sites.
     whole = rod(notch, tube, refinement) if site is None else rod(notch, tube, refinement, site)
     made = with_level(whole, level)
+    made = with_fibres(made, notch, tube) if by_fibres else made
     return made, free_pose(made)
 
 
@@ -325,11 +331,11 @@ def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:
 
 
 def flexure_states(
-    chain: Chain, modes: Float[Array, "n modes"], *, with_pose: bool
+    chain: Chain, modes: Float[Array, "n modes"], memory: Any, *, with_pose: bool
 ) -> FlexureState:
-    """State of all flexures at once."""
+    """State of all flexures at once, after a memory of the material at every node."""
     state = partial(flexure_state, with_pose=with_pose)
-    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, chain.memory, modes)
+    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, memory, modes)
 
 
 def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:

@@ -64,7 +64,6 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
     return dataclasses.replace(
         chain,
         rods=_rods(chain, changed),
-        memory=jax.tree.map(longer, chain.memory),
         groups=tuple(
             changed(group, present=0.0, visits=0.0, ends=0.0, back=1, body_length=0.0)
             for group in chain.groups

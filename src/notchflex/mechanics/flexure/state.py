@@ -31,6 +31,9 @@ class FlexureState(Pytree):
             None where nobody asked.
         resultants: Internal moments and forces of each interval, in the rod's frame.
         strain: Strain of each interval beyond that of the free tube.
+        memory: Memory of the material at every node, after these strains.
+        slope: Change of the moment about y with the curvature at every node, where the law knows
+            it (`Response.slope`).
         internal: Generalised internal force of each mode, N mm per unit of mode.
         bend: Bending of the whole rod about x and y of its frame, of a plane about y, rad.
         chord_turn: Rotation, in the proximal body's frame, by which the chord from the rod's
@@ -43,6 +46,8 @@ class FlexureState(Pytree):
     twist: Float[Array, "w modes"] | None
     resultants: Float[Array, "intervals w"]
     strain: Float[Array, "intervals w"]
+    memory: Any
+    slope: Float[Array, " nodes"] | None
     internal: Float[Array, " modes"]
     bend: Float[Array, " axes"]
     chord_turn: Float[Array, "d d"] | None
@@ -92,7 +97,7 @@ def flexure_state(
     Args:
         rod: The flexure.
         law: Its material.
-        memory: Memory of the material at every interval.
+        memory: Memory of the material at every node.
         modes: Amplitude of each strain mode.
         with_pose: Whether pose and twist are wanted; where no force acts on a body they do not
             enter the balance.
@@ -105,8 +110,8 @@ def flexure_state(
         own = integrate_rod(rod, modes)
         pose, twist = relative_pose(rod, modes, own), twist_slope(rod, modes, own)
     elastic = rod.basis @ modes
-    respond = jax.vmap(law.respond)
-    resultants = of_rod(rod, respond(in_space(elastic), rod.section, memory).resultants)
+    response = jax.vmap(law.respond)(in_space(elastic), rod.section, memory)
+    resultants = of_rod(rod, response.resultants)
     # A mode that only fills up the arrays is held by a stiffness of 1.
     internal = jnp.einsum("i,ic,icm->m", rod.length, resultants, rod.basis)
     has_chord = with_pose and rod.chord is not None
@@ -119,6 +124,8 @@ def flexure_state(
         twist=twist,
         resultants=resultants,
         strain=elastic,
+        memory=response.memory,
+        slope=response.slope,
         internal=internal + rod.padding_mask * modes,
         # About x and y of the section's frame; the third axis of space is that of torsion.
         bend=rod.length @ rod.reference_strain[:, :axes] + bending @ modes,
@@ -128,11 +135,26 @@ def flexure_state(
 
 
 def material_tangent(
-    rod: Rod, law: SectionLaw, memory: Any, modes: Float[Array, " modes"]
+    rod: Rod, law: SectionLaw, memory: Any, state: FlexureState
 ) -> Float[Array, "modes modes"]:
-    """Change of what the strains do to each mode (`internal`), per unit of mode."""
+    """Change of what the strains do to each mode (`internal`), per unit of mode.
 
-    def answered(strain: Array, section: Any, at_node: Any, columns: Array) -> Array:
+    Args:
+        rod: The flexure.
+        law: Its material.
+        memory: Memory of the material at every node.
+        state: Its state there.
+    """
+
+    def answered(
+        strain: Array, section: Any, at_node: Any, slope: Array | None, columns: Array
+    ) -> Array:
+        if slope is not None:
+            every = in_space(columns.T)
+            elastic = law.elastic(every.T, jax.tree.map(lambda leaf: leaf[..., None], section))
+            weak = np.arange(6) == 1
+            return of_rod(rod, jnp.where(weak, slope * every, elastic)).T
+
         def resultants(varied: Array) -> Array:
             return of_rod(rod, law.respond(in_space(varied), section, at_node).resultants)
 
@@ -140,7 +162,7 @@ def material_tangent(
             lambda column: jax.jvp(resultants, (strain,), (column,))[1], in_axes=1, out_axes=1
         )(columns)
 
-    answers = jax.vmap(answered)(rod.basis @ modes, rod.section, memory, rod.basis)
+    answers = jax.vmap(answered)(state.strain, rod.section, memory, state.slope, rod.basis)
     weighed = rod.length[:, None, None] * rod.basis
     return jnp.einsum("icm,ick->mk", weighed, answers) + jnp.diag(rod.padding_mask)
 

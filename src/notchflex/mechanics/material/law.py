@@ -34,10 +34,13 @@ class Response(NamedTuple):
     Attributes:
         resultants: Moments about x, y, z (N mm) and forces along x, y, z (N).
         memory: The memory after these strains.
+        slope: Change of the moment about y with the curvature about y, where the law knows it:
+            all else is elastic. None to differentiate.
     """
 
     resultants: Float[Array, " 6"]
     memory: Any
+    slope: Float[Array, ""] | None = None
 
 
 class Bending(NamedTuple):
@@ -47,11 +50,15 @@ class Bending(NamedTuple):
         curvature: Curvature of the section itself, beyond that of the free tube, 1/mm.
         moment: Its moment, N mm.
         memory: The memory after it.
+        slope: Change of the moment with s, where the law knows it; None to differentiate.
+        strain: Strain of the neutral axis, for laws of fibres.
     """
 
     curvature: Float[Array, ""]
     moment: Float[Array, ""]
     memory: Any
+    slope: Array | None = None
+    strain: Array | float = 0.0
 
 
 # Of all strains and resultants those of weak-axis bending.
@@ -59,8 +66,8 @@ _WEAK = np.arange(6) == 1
 _POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
 NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
 """Gauss's rule on 0 ... 1."""
-# When the search for the curvature between the ends stops: its last step, as a part, and tries.
-_CURVATURE_ERROR, _MOST_TRIES = 1e-12, 60
+# A bilinear law takes three iterations, one with a plastic branch more.
+_ITERATIONS = 20
 
 
 class SectionLaw(Pytree, ABC):
@@ -75,6 +82,21 @@ class SectionLaw(Pytree, ABC):
     is_linear: ClassVar[bool] = False
     elastic_modulus: Float[Array, ""]
     shear_modulus: Float[Array, ""]
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the moment depends on the past."""
+        return False
+
+    def rest(self, section: FibreSection) -> Any:
+        """Return the memory of a free section, or of many; () where nothing is remembered."""
+        del section
+        return ()
+
+    def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
+        """Energy per length turned to heat between two memories, N mm/mm; for plain arrays."""
+        del before, after
+        return np.zeros(np.shape(section.area))
 
     @abstractmethod
     def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
@@ -98,11 +120,19 @@ class SectionLaw(Pytree, ABC):
 
     def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
         """Resultants of a cross-section under given strains (beyond those of the free tube)."""
-        elastic = elastic_resultants(self.elastic_modulus, self.shear_modulus, section, strain)
-        q = 1.0 if section.ends is None else section.ends.flattening(strain[1])
-        bending = self.bent(strain[1] if section.ends is None else strain[1] / q, section, memory)
-        moment = bending.moment if section.ends is None else bending.moment / q
-        return Response(jnp.where(_WEAK, moment, elastic), bending.memory)
+        elastic = self.elastic(strain, section)
+        ends, curvature = section.ends, strain[1]
+        if ends is None:
+            bending = self.bent(curvature, section, memory)
+            moment, slope = bending.moment, bending.slope
+        else:
+            q = ends.flattening(curvature)
+            bending = self.bent(curvature / q, section, memory)
+            moment, slope = bending.moment / q, bending.slope
+            if slope is not None:
+                by_q = (ends.odd + 2.0 * ends.even * curvature) / q
+                slope = (slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
+        return Response(jnp.where(_WEAK, moment, elastic), bending.memory, slope)
 
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
@@ -112,8 +142,7 @@ class SectionLaw(Pytree, ABC):
         The area under the moment over the curvature, and the elastic rest. Of a law with
         hysteresis it is what fibres, ends and flattening hold; the rest of the area is dissipated.
         """
-        elastic = elastic_resultants(self.elastic_modulus, self.shear_modulus, section, strain)
-        others = 0.5 * jnp.where(_WEAK, 0.0, elastic) @ strain
+        others = 0.5 * jnp.where(_WEAK, 0.0, self.elastic(strain, section)) @ strain
         ends, curvature = section.ends, strain[1]
         if ends is None:
             return others + self.bending_energy(curvature, section, memory)
@@ -140,6 +169,11 @@ class SectionLaw(Pytree, ABC):
             add, jnp.zeros_like(curvature), constant(np.stack([NODES, WEIGHTS], -1))
         )[0]
 
+    def elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Float[Array, " 6"]:
+        """Resultants by the moduli of the free robot."""
+        plain = dataclasses.replace(section, fibres=None)
+        return elastic_resultants(self.elastic_modulus, self.shear_modulus, plain, strain)
+
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
         """Resultants per strain in the free robot, of a section or of many."""
         return elastic_stiffness(self.elastic_modulus, self.shear_modulus, section)
@@ -161,37 +195,37 @@ def _imbalance(law: SectionLaw, section: FibreSection, reduced: Array, curvature
 
 
 def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Float[Array, ""]:
-    """Curvature of a section between its ends: Newton's method, kept within bounds.
+    """Curvature of a section between its ends: Newton's method within bounds that close in.
 
     The last step alone is differentiated, from a point that is held still.
     """
     still = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced))
     ends, aim = still[1].ends, still[2]
 
-    def slope(curvature: Array) -> tuple[Array, Array]:
+    def at(curvature: Array) -> tuple[Array, Array]:
         return jax.jvp(partial(_imbalance, *still), (curvature,), (jnp.ones_like(curvature),))
 
-    def proceed(search: tuple[Array, ...]) -> Array:
-        curvature, _, _, step, tries = search
-        return (jnp.abs(step) > _CURVATURE_ERROR * jnp.abs(curvature)) & (tries < _MOST_TRIES)
-
-    def iterate(search: tuple[Array, ...]) -> tuple[Array, ...]:
-        curvature, least, most, _, tries = search
-        beyond, by = slope(curvature)
-        least, most = (
-            jnp.where(beyond < 0.0, curvature, least),
-            jnp.where(beyond > 0.0, curvature, most),
-        )
-        new = curvature - beyond / by
-        new = jnp.where((new >= least) & (new <= most), new, 0.5 * (least + most))
-        return new, least, most, new - curvature, tries + 1
+    def improve(_: int, search: tuple[Array, ...]) -> tuple[Array, ...]:
+        curvature, least, most, last = search
+        beyond, slope = at(curvature)
+        least = jnp.where(beyond <= 0.0, curvature, least)
+        most = jnp.where(beyond >= 0.0, curvature, most)
+        step = -beyond / slope
+        new = curvature + step
+        good = (new >= least) & (new <= most) & (jnp.abs(step) <= 0.5 * last)
+        new = jnp.where(good, new, 0.5 * (least + most))
+        return new, least, most, jnp.abs(new - curvature)
 
     # A section that carries nothing leaves the whole curvature to the part that follows it.
-    far, none = aim / (1.0 + ends.material_share * ends.weak), jnp.zeros_like(aim)
-    start = aim / (1.0 + ends.weak)
-    begin = start, jnp.minimum(far, none), jnp.maximum(far, none), start, jnp.zeros((), int)
-    found = jax.lax.while_loop(proceed, iterate, begin)[0]
-    return found - _imbalance(law, section, reduced, found) / slope(found)[1]
+    far = aim / (1.0 + ends.material_share * ends.weak)
+    start = (
+        aim / (1.0 + ends.weak),
+        jnp.minimum(far, 0.0),
+        jnp.maximum(far, 0.0),
+        2.0 * jnp.abs(far),
+    )
+    found = jax.lax.fori_loop(0, _ITERATIONS, improve, start)[0]
+    return found - _imbalance(law, section, reduced, found) / at(found)[1]
 
 
 def elastic_resultants(

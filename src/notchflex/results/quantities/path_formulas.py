@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from notchflex._quantity import Quantity
 from notchflex.solver.derived.quantities import believable
+from notchflex.solver.programs.run import SolverRun
 
 if TYPE_CHECKING:  # for the type only: a path evaluates these
     from notchflex.results.path import EquilibriumPath
@@ -47,8 +48,28 @@ def dissipation(path: EquilibriumPath) -> np.ndarray:
     return _accumulated(path, "span_tension", "contact_slid")
 
 
+@Quantity("path", "dissipation of the material", "D_j", "N mm", per=("notch",),
+          after="dissipation",
+          note="Half the width of the hysteresis of every fibre times the change of its "
+          "transformed strain, from step to step. Zero for materials without hysteresis."
+          )  # fmt: skip
+def material_dissipation(path: EquilibriumPath) -> np.ndarray:
+    """Energy that the material of a notch has turned to heat since the start of the path."""
+    chain, after = path.chain, path.run.solved.memory.material
+    if isinstance(after, tuple):  # no memory
+        return np.zeros((len(path), chain.flexures))
+    first = chain.law.rest(chain.rods.section)
+    if isinstance(path.run, SolverRun):  # a file keeps no memory of the state before its path
+        first = path.prepared.state.unpack(path.run.first).memory.material
+    before = np.broadcast_to(first, after.shape)
+    if not path.each_from_rest:
+        before = np.concatenate([before[:1], after[:-1]])
+    loss = np.sum(chain.law.dissipated(chain.rods.section, before, after) * chain.rods.length, -1)
+    return loss if path.each_from_rest else np.cumsum(loss, axis=0)
+
+
 @Quantity("path", "friction front", "m", key="front.m", column="tendon{tendon}_front_m",
-          per=("tendon",), after="dissipation", kind=int)  # fmt: skip
+          per=("tendon",), after="material_dissipation", kind=int)  # fmt: skip
 def front_contact(path: EquilibriumPath) -> np.ndarray:
     """Contact up to which the friction of a tendon has turned from loading to unloading.
 

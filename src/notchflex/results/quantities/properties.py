@@ -121,6 +121,8 @@ class _Quantities:
     """Largest tension ratio over a contact, shape (t, contacts)."""
     dissipation = Array()
     """Dissipation, N mm, shape (t, contacts)."""
+    material_dissipation = Array()
+    """Dissipation of the material, N mm, shape (n)."""
     front_contact = Array()
     """Friction front, shape (t)."""
     front_eta = Array()

@@ -281,7 +281,8 @@ def stored_energy(state: SolvedState) -> Array:
     """Elastic energy held by flexures, lips that press and stretched tendons."""
     chain, base_tension = state.chain, state.solved.point.base_tension
     strain = in_space(state.at.flexure.strain)
-    density = jax.vmap(jax.vmap(chain.law.energy))(strain, chain.rods.section, chain.memory)
+    memory = state.solved.memory.material
+    density = jax.vmap(jax.vmap(chain.law.energy))(strain, chain.rods.section, memory)
     in_gap, beside_body = state.tensions
     in_tendons = in_gap**2 * state.by_tendon("natural_gap")
     in_tendons = in_tendons + beside_body**2 * state.by_tendon("body_length")

@@ -166,10 +166,8 @@ class Native:
         if getattr(jax.config, "jax_disable_jit"):  # noqa: B009
             return None
         vectors, others = arguments[: self._vectors], arguments[self._vectors :]
-        shapes = [one.shape for one in vectors]
-        if by_row is not None:
-            shapes = [shape[rows:] for shape, rows in zip(shapes, by_row, strict=True)]
-        shapes = tuple(shapes)
+        per_row = by_row or (False,) * len(vectors)
+        shapes = tuple([one.shape[rows:] for one, rows in zip(vectors, per_row, strict=True)])
         key = (self, how, by_row, shapes, others)
         try:
             program = Native.made[key]

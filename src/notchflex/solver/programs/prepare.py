@@ -153,8 +153,9 @@ _OF_SHAPE = (
 
 
 def flat(tree: Any) -> np.ndarray:
-    """Return all numbers of a tree as one vector."""
-    return np.concatenate([np.ravel(leaf) for leaf in jax.tree.leaves(tree)])
+    """Return all numbers of a tree, perhaps none, as one vector."""
+    leaves = [np.ravel(leaf) for leaf in jax.tree.leaves(tree)]
+    return np.concatenate([np.zeros(0, int), *leaves])
 
 
 @lru_cache(maxsize=6)

@@ -60,6 +60,8 @@ class PytreeLayout:
         xp = array_module(*leaves)
         arrays = [xp.asarray(leaf) for leaf in leaves]
         flat = [array.reshape(*array.shape[:leading], -1) for array in arrays]
+        if len(flat) == 1 and flat[0].dtype == float:
+            return flat[0]
         return xp.concatenate(flat, axis=-1, dtype=float)
 
     def unpack(self, vector: Any) -> Any:

@@ -1,0 +1,73 @@
+"""Fibres of a section: arms from the neutral axis and areas, by Gauss's rule.
+
+Area, centroid and second moment are those of the section to rounding: the arms are moved and
+scaled by what the rule leaves, about 1e-7 of them. Used when a robot is put together, in NumPy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+from numpy.polynomial.legendre import leggauss
+
+from notchflex._jax import constant
+from notchflex.mechanics.section.angles import half_angle
+
+FIBRES = 40
+_RADII = 5
+
+Points = tuple[Float[np.ndarray, " fibres"], Float[np.ndarray, " fibres"]]
+"""Arms (mm) and areas (mm^2)."""
+
+
+def rectangle_fibres(near: float, spine: float) -> Points:
+    """Fibres of a wall of constant width between two distances from the neutral axis, mm."""
+    points, weights = leggauss(FIBRES)
+    return 0.5 * (spine - near) + 0.5 * (spine + near) * points, weights
+
+
+def sector_fibres(outer: float, inner: float, depth: float) -> Points:
+    """Fibres of an annular sector (`annular_sector`): five radii at eight angles of each half."""
+    numbers = outer, 2.0 * outer - depth, depth
+    half = float(half_angle(*(constant(number) for number in numbers)))
+    angles, of_angles = _between(0.0, half, FIBRES // _RADII)
+    radii, of_radii = _between(inner, outer, _RADII)
+    area = 2.0 * np.outer(of_radii * radii, of_angles)
+    return np.outer(radii, np.cos(angles)).ravel(), area.ravel()
+
+
+def segment_fibres(outer: float, inner: float, depth: float) -> Points:
+    """Fibres of an annular segment (`annular_segment`): strips across, outside and beside the bore.
+
+    The heights of strips are cosines, so that the chords of both circles are smooth over them.
+    """
+    plane = depth - outer
+    top, bottom = (float(np.arccos(np.clip(plane / r, -1.0, 1.0))) for r in (outer, inner))
+    beyond = float(np.arccos(np.clip(inner / outer, plane / outer, 1.0)))
+    ends = [(0.0, beyond)] + ([(np.pi - beyond, top)] if plane < -inner else [])
+    at_bore = FIBRES // 2 if bottom > 0.0 else 0
+    angles, of_angles = zip(
+        *(_between(*pair, (FIBRES - at_bore) // len(ends)) for pair in ends), strict=True
+    )
+    solid, of_solid = np.concatenate(angles), np.concatenate(of_angles)
+    bore, of_bore = _between(0.0, bottom, at_bore) if at_bore else (np.zeros(0), np.zeros(0))
+    height = inner * np.cos(bore)
+    wall = np.sqrt(outer**2 - height**2) - inner * np.sin(bore)
+    area = (
+        2.0 * (outer * np.sin(solid)) ** 2 * of_solid,
+        2.0 * wall * inner * np.sin(bore) * of_bore,
+    )
+    return np.append(outer * np.cos(solid), height), np.concatenate(area)
+
+
+def _between(first: float, last: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    points, weights = leggauss(count)
+    return 0.5 * (first + last) + 0.5 * (last - first) * points, 0.5 * (last - first) * weights
+
+
+def fitted(points: Points, area: float, second_moment: float) -> Points:
+    """Fibres about their centroid, of a given area (mm^2) and second moment (mm^4)."""
+    arm, areas = points
+    areas = areas * (area / np.sum(areas))
+    arm = arm - areas @ arm / area
+    return arm * np.sqrt(second_moment / (areas @ arm**2)), areas

@@ -1,0 +1,96 @@
+"""Nitinol with a plateau, and an unloading plateau where it is known."""
+
+from collections.abc import Iterator
+from dataclasses import KW_ONLY
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from notchflex.robot.kinds import Material
+from notchflex.robot.part import Float, ProblemError, part, quantity
+
+# On a plateau flatter than this part of Young's modulus the sums over fibres have jumps.
+_LEAST_SLOPE = 0.01
+
+
+@part
+class Nitinol(Material):
+    """Elastic, then a plateau with hardening, in every fibre of the section.
+
+    The defaults are usual values for superelastic tubes; they spread from 30 to 57 GPa, 260 to 460
+    MPa and 3 to 9 GPa.
+
+    Args:
+        elastic_modulus: Young's modulus up to the plateau [MPa].
+        plateau_stress: Stress in tension where the plateau begins [MPa].
+        plateau_modulus: Slope of the plateau [MPa], less than Young's modulus.
+        compression_ratio: Plateau stress in compression over that in tension.
+        unloading_stress: Stress in tension where the plateau of unloading meets the elastic line
+            from zero [MPa], less than `plateau_stress`; None unloads along the way it loaded.
+        transformation_strain: Strain in tension where the plateau of loading ends and the slope is
+            Young's modulus again; None has no end.
+        poisson_ratio: Poisson's ratio, for shear and torsion.
+        density: Density [kg/m3].
+        allowed_strain: Strain beyond which a simulation warns.
+
+    Raises:
+        InputError: A value is negative, not finite, of a wrong type or not known.
+
+    Example:
+        >>> Nitinol(42_000.0, 350.0, 6_000.0, unloading_stress=150.0).compression_ratio
+        1.0
+    """
+
+    elastic_modulus: Annotated[
+        Float, quantity("MPa", "Young's modulus up to the plateau", above=0)
+    ] = 42_000.0
+    plateau_stress: Annotated[
+        Float, quantity("MPa", "stress in tension where the plateau begins", above=0)
+    ] = 350.0
+    plateau_modulus: Annotated[Float, quantity("MPa", "slope of the plateau", above=0)] = 6_000.0
+    compression_ratio: Annotated[
+        Float,
+        quantity("", "plateau stress in compression over that in tension", above=0, at_most=10.0),
+    ] = 1.0
+    unloading_stress: Annotated[
+        Float | None,
+        quantity("MPa", "stress in tension where the plateau of unloading ends", above=0),
+    ] = None
+    transformation_strain: Annotated[
+        Float | None, quantity("", "strain where the plateau of loading ends", above=0)
+    ] = None
+    _: KW_ONLY
+    kind: Literal["nitinol"] = "nitinol"
+
+    @property
+    def by_fibres(self) -> bool:
+        """Its sections are summed up fibre by fibre."""
+        return True
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "Nitinol":
+        if found := list(self._out_of_order()):
+            raise ProblemError(found)
+        return self
+
+    def _out_of_order(self) -> Iterator[tuple[str, str]]:
+        least = _LEAST_SLOPE * self.elastic_modulus
+        if not least <= self.plateau_modulus < self.elastic_modulus:
+            yield (
+                "plateau_modulus",
+                f"is {self.plateau_modulus} MPa; it must be less than Young's modulus, "
+                f"{self.elastic_modulus} MPa, and at least a hundredth of it, {least:g} MPa.",
+            )
+        if self.unloading_stress is not None and self.unloading_stress >= self.plateau_stress:
+            yield (
+                "unloading_stress",
+                f"is {self.unloading_stress} MPa; it must be less than the plateau stress, "
+                f"{self.plateau_stress} MPa.",
+            )
+        begin = self.plateau_stress / self.elastic_modulus
+        if self.transformation_strain is not None and self.transformation_strain <= begin:
+            yield (
+                "transformation_strain",
+                f"is {self.transformation_strain}; it must be greater than the strain where the "
+                f"plateau begins, {begin:.4g}.",
+            )

@@ -1,0 +1,213 @@
+"""Nitinol by fibres against independent fine quadratures, closed forms and its own loops."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import notchflex as nf
+from notchflex._jax import jax
+from notchflex.mechanics.chain.fibres import with_fibres
+from notchflex.mechanics.flexure import rod
+from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
+from notchflex.mechanics.section.fibres import Points, sector_fibres, segment_fibres
+
+TUBE = nf.Tube(1.62, 1.40)
+ENDS = NotchEnds(
+    weak=0.6, strong=0.0, axial=0.0, torsion=0.0, odd=0.2, even=0.1, material_share=0.25
+)
+STRAIGHT = dataclasses.replace(ENDS, odd=0.0, even=0.0)
+BILINEAR = nf.Nitinol(42000.0, 350.0, 6000.0, compression_ratio=1.3)
+HYSTERETIC = dataclasses.replace(BILINEAR, unloading_stress=150.0)
+
+respond = jax.jit(lambda law, strain, section, memory: law.respond(strain, section, memory))
+energy = jax.jit(lambda law, strain, section, memory: law.energy(strain, section, memory))
+
+
+def section(cut: str = "on-axis", ends: NotchEnds | None = None) -> FibreSection:
+    notch = nf.ArcNotch(cut, 1.40, 0.8, uncut_length=1.2)
+    made = with_fibres(rod(notch, TUBE), notch, TUBE).section
+    return dataclasses.replace(jax.tree.map(lambda leaf: leaf[0], made), ends=ends)
+
+
+def bending(curvature: float) -> np.ndarray:
+    return np.array([0.0, curvature, 0.0, 0.0, 0.0, 0.0])
+
+
+def moment(law: SectionLaw, curvature: float, own: FibreSection) -> float:
+    return float(respond(law, bending(curvature), own, ()).resultants[1])
+
+
+def fine_fibres(cut: str) -> tuple[np.ndarray, np.ndarray]:
+    """Strips of the section between horizontal lines: arm from the centroid, area."""
+    outer, inner, depth = 0.81, 0.70, 1.40
+    if cut == "on-axis":
+        half = np.arccos((depth - outer) / outer)
+        angle = (np.arange(4000) + 0.5) / 4000 * half
+        radius = inner + (np.arange(200) + 0.5) / 200 * (outer - inner)
+        arm = (radius[:, None] * np.cos(angle)).ravel()
+        cell = half / 4000 * (outer - inner) / 200
+        area = (2.0 * cell * radius[:, None] * np.ones(4000)).ravel()
+    else:
+        plane = depth - outer
+        height = plane + (np.arange(400_000) + 0.5) / 400_000 * (outer - plane)
+        chords = [np.sqrt(np.maximum(r**2 - height**2, 0.0)) for r in (outer, inner)]
+        arm, area = height, 2.0 * (chords[0] - chords[1]) * (outer - plane) / 400_000
+    return arm - area @ arm / area.sum(), area
+
+
+@pytest.mark.parametrize("depth", [0.05, 0.4, 0.81, 1.2, 1.40, 1.55])
+@pytest.mark.parametrize("fibres", [sector_fibres, segment_fibres])
+def test_fibres_make_up_the_section(fibres: Callable[..., Points], depth: float) -> None:
+    make = nf.annular_sector if fibres is sector_fibres else nf.annular_segment
+    own, (arm, area) = make(0.81, 0.70, depth), fibres(0.81, 0.70, depth)
+    assert (area > 0.0).all()
+    assert area.sum() == pytest.approx(float(own.area), rel=1e-4)
+    assert area @ arm / area.sum() == pytest.approx(float(own.centroid), rel=1e-4)
+    second = area @ (arm - float(own.centroid)) ** 2
+    assert second == pytest.approx(float(own.second_moment_weak), rel=1e-3)
+
+
+def stress(strain: np.ndarray) -> np.ndarray:
+    tension, compression = 350.0 / 42000.0, 1.3 * 350.0 / 42000.0
+    plateau = np.maximum(strain - tension, 0.0) - np.maximum(-strain - compression, 0.0)
+    return 42000.0 * (strain - plateau) + 6000.0 * plateau
+
+
+@pytest.mark.parametrize("cut", ["on-axis", "off-axis"])
+def test_moment_is_that_of_a_fine_quadrature(cut: str) -> None:
+    law, own = section_law(BILINEAR), section(cut)
+    arm, area = fine_fibres(cut)
+    for curvature in (-0.8, 0.1, 0.4, 1.0):
+        found = brentq(lambda x, k=curvature: area @ stress(x + k * arm), -0.2, 0.2, xtol=1e-15)
+        expected = float(area @ (stress(found + curvature * arm) * arm))
+        assert moment(law, curvature, own) == pytest.approx(expected, rel=4e-3)
+
+
+def test_between_ends_the_law_of_the_notch_is_solved() -> None:
+    law, own = section_law(BILINEAR), section(ends=ENDS)
+    plain = dataclasses.replace(own, ends=None)
+    rigidity = 42000.0 * float(own.second_moment_weak)
+    for curvature in (-1.0, 0.2, 0.9):
+        q = 1.0 + 0.2 * curvature + 0.1 * curvature**2
+
+        def missing(k: float, q: float = q, at: float = curvature) -> float:
+            return 1.15 * k + 0.45 * moment(law, k, plain) / rigidity - at / q
+
+        own_curvature = brentq(missing, -2.0, 2.0, xtol=1e-15)
+        expected = moment(law, own_curvature, plain) / q
+        assert moment(law, curvature, own) == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize("ends", [None, ENDS], ids=["plain", "ends"])
+@pytest.mark.parametrize("cut", ["on-axis", "off-axis"])
+def test_far_below_the_plateau_it_is_linear(cut: str, ends: NotchEnds | None) -> None:
+    own = section(cut, ends)
+    laws = section_law(nf.Nitinol(42000.0, 1e7)), section_law(nf.Linear(42000.0))
+    for curvature in (-0.7, 0.3):
+        strain = np.array([0.1, curvature, 0.2, 0.01, 0.02, 0.03])
+        fibres, linear = (np.asarray(respond(law, strain, own, ()).resultants) for law in laws)
+        np.testing.assert_allclose(fibres, linear, rtol=1e-12)
+        held = [float(energy(law, strain, own, ())) for law in laws]
+        assert held[0] == pytest.approx(held[1], rel=1e-12)
+
+
+@pytest.mark.parametrize("ends", [None, ENDS], ids=["plain", "ends"])
+def test_its_slope_is_that_of_the_moment(ends: NotchEnds | None) -> None:
+    law, own, step = section_law(BILINEAR), section(ends=ends), 1e-7
+    for curvature in (-0.6123, 0.2042, 0.7071):
+        ahead, behind = (moment(law, curvature + by, own) for by in (step, -step))
+        slope = respond(law, bending(curvature), own, ()).slope
+        assert float(slope) == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6)
+
+
+@pytest.mark.parametrize("end", [None, 0.03])
+@pytest.mark.parametrize("ends", [None, STRAIGHT], ids=["plain", "ends"])
+def test_energy_is_the_area_under_the_moment(ends: NotchEnds | None, end: float | None) -> None:
+    law = section_law(dataclasses.replace(BILINEAR, transformation_strain=end))
+    own, step = section(ends=ends), 1e-6
+    for curvature in (-0.6123, 0.2042, 0.9):
+        ahead, behind = (
+            float(energy(law, bending(curvature + by), own, ())) for by in (step, -step)
+        )
+        slope = (ahead - behind) / (2.0 * step)
+        assert slope == pytest.approx(moment(law, curvature, own), rel=1e-8)
+
+
+def follow(law: SectionLaw, own: FibreSection, curvatures: np.ndarray) -> list[np.ndarray]:
+    """Moments, energies, dissipated energy and memories along a history."""
+    memory, loss, rows, memories = law.rest(own), 0.0, [], []
+    for curvature in curvatures:
+        response = respond(law, bending(curvature), own, memory)
+        after = np.asarray(response.memory)
+        loss += float(law.dissipated(own, np.asarray(memory), after))
+        memory = after
+        held = float(energy(law, bending(curvature), own, memory))
+        rows.append((float(response.resultants[1]), held, loss))
+        memories.append(memory)
+    return [*np.array(rows).T, np.array(memories)]
+
+
+def history(corners: list[float], steps: int = 60) -> np.ndarray:
+    pairs = itertools.pairwise(corners)
+    return np.concatenate([np.linspace(*pair, steps + 1)[1:] for pair in pairs])
+
+
+def test_a_closed_inner_loop_returns_to_its_point() -> None:
+    law, own = section_law(HYSTERETIC), section(ends=ENDS)
+    moments, _, _, memory = follow(law, own, np.array([0.8, 0.4, 0.6, 0.4, 0.8, 1.0, 0.0]))
+    direct = follow(law, own, np.array([0.8, 1.0]))
+    np.testing.assert_allclose(moments[[4, 5]], direct[0], rtol=1e-12)
+    np.testing.assert_allclose(memory[[4, 5]], direct[3], atol=1e-14)
+    assert moments[3] == pytest.approx(moments[1], rel=1e-12)
+    np.testing.assert_array_equal(memory[-1], 0.0)
+
+
+def test_unloading_is_elastic_first_and_below_loading() -> None:
+    law, own = section_law(HYSTERETIC), section()
+    up, down = follow(law, own, np.array([0.4, 0.8, 0.79]))[0], section_law(BILINEAR)
+    rigidity = 42000.0 * float(own.second_moment_weak)
+    assert (up[1] - up[2]) / 0.01 == pytest.approx(rigidity, rel=1e-9)
+    assert up[1] == pytest.approx(moment(down, 0.8, own), rel=1e-12)
+    assert follow(law, own, np.array([0.8, 0.4]))[0][1] < up[0]
+
+
+def test_work_is_stored_or_dissipated() -> None:
+    law, own = section_law(HYSTERETIC), section(ends=STRAIGHT)
+    path = history([0.0, 0.9, 0.3, 0.6, -0.8, 0.2, 0.0], 400)
+    moments, held, loss, _ = follow(law, own, path)
+    places, forces = np.append(0.0, path), np.append(0.0, moments)
+    work = np.cumsum(0.5 * (forces[1:] + forces[:-1]) * np.diff(places))
+    assert np.abs(work - held - loss).max() < 2e-4 * work.max()
+    assert (np.diff(loss) >= -1e-14).all()
+    assert held[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_no_closed_loop_gains_work() -> None:
+    law, own = section_law(HYSTERETIC), section(ends=ENDS)
+    turns = np.random.default_rng(3).uniform(-0.9, 0.9, 12)
+    path = history([0.0, *turns, 0.0], 40)
+    moments = follow(law, own, path)[0]
+    places, forces = np.append(0.0, path), np.append(0.0, moments)
+    for first in range(0, len(places), 7):
+        for last in np.flatnonzero(places[first + 1 :] == places[first]) + first + 1:
+            part = slice(first, last + 1)
+            work = np.trapezoid(forces[part], places[part])
+            assert work > -1e-9
+    assert np.trapezoid(forces, places) > 0.0
+
+
+def test_bad_values_name_what_is_allowed() -> None:
+    for keys, key in (
+        ({"plateau_modulus": 50_000.0}, "plateau_modulus"),
+        ({"plateau_modulus": 1.0}, "plateau_modulus"),
+        ({"unloading_stress": 400.0}, "unloading_stress"),
+        ({"transformation_strain": 0.001}, "transformation_strain"),
+    ):
+        with pytest.raises(nf.InputError, match=key):
+            nf.Nitinol(**keys)

@@ -1,0 +1,143 @@
+"""Robots of Nitinol with hysteresis: the memory of the material in solver, states and batches."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex._jax import jax
+
+NITINOL = nf.Nitinol(10_000.0, 280.0, 3_000.0, unloading_stress=120.0)
+FREE = nf.Frictionless()
+WRIST = dataclasses.replace(nf.load_robot("pacheco2021-a"), material=NITINOL, friction=FREE)
+TENSIONS = [0.8, 1.6, 1.0, 0.5, 0.8, 1.2, 0.8, 0.5, 0.9, 1.6, 0.0]
+
+
+def pulls(tensions: list[float]) -> list[nf.Load]:
+    return [nf.Load(tension=one) for one in tensions]
+
+
+@pytest.fixture(scope="module")
+def path() -> nf.EquilibriumPath:
+    found = nf.simulate(WRIST, pulls(TENSIONS))
+    assert found.converged.all()
+    return found
+
+
+def test_unloading_lags_and_inner_loops_return(path: nf.EquilibriumPath) -> None:
+    angle = path.total_angle
+    assert angle[2] > nf.solve(WRIST, nf.Load(tension=1.0)).total_angle + 0.05
+    # 0.5 -> 1.2 -> 0.5 N is a loop inside the way down from 1.6 N.
+    np.testing.assert_allclose(path.notch_angle[7], path.notch_angle[3], rtol=1e-10)
+    np.testing.assert_allclose(path.notch_angle[9], path.notch_angle[1], rtol=1e-10)
+    np.testing.assert_allclose(path.notch_angle[10], 0.0, atol=1e-10)
+    assert abs(angle[6] - angle[4]) > 1e-4  # up and down differ inside it
+
+
+def test_without_friction_the_work_is_stored_or_lost_in_the_material() -> None:
+    loads = nf.pull(0.0, 1.6, steps=300).release()
+    found = nf.simulate(WRIST, loads)
+    lost = found.material_dissipation.sum(axis=-1)
+    balance = found.tendon_work[:, 0] - found.stored_energy - lost
+    assert np.abs(balance).max() < 1e-4 * found.tendon_work.max()
+    assert (np.diff(found.material_dissipation, axis=0) >= -1e-14).all()
+    assert lost[-1] > 0.1 * found.stored_energy.max()
+    assert not nf.simulate(nf.load_robot("pacheco2021-a"), loads).material_dissipation.any()
+
+
+def test_a_saved_state_continues_as_the_uninterrupted_path(
+    path: nf.EquilibriumPath, tmp_path: Path
+) -> None:
+    first = nf.simulate(WRIST, pulls(TENSIONS[:5]))
+    first.state.save(tmp_path / "state.json")
+    rest = nf.simulate(
+        WRIST, pulls(TENSIONS[5:]), from_state=nf.State.load(tmp_path / "state.json")
+    )
+    np.testing.assert_array_equal(rest.notch_angle, path.notch_angle[5:])
+    np.testing.assert_allclose(
+        first.material_dissipation[-1] + rest.material_dissipation[-1],
+        path.material_dissipation[-1],
+        rtol=1e-12,
+    )
+
+
+def test_a_state_of_tendons_continues_under_a_load_in_the_plane(path: nf.EquilibriumPath) -> None:
+    start = nf.simulate(WRIST, pulls(TENSIONS[:3])).state
+    with_nothing = [nf.Load(tension=0.5, tip_force=(1e-9, 0.0, 0.0))]
+    found = nf.simulate(WRIST, with_nothing, from_state=start)
+    np.testing.assert_allclose(found.notch_angle[0], path.notch_angle[3], atol=1e-6)
+
+
+def test_a_batch_is_its_rows(path: nf.EquilibriumPath) -> None:
+    other = WRIST.with_value("material.unloading_stress", 200.0)
+    rows = nf.simulate_batch([WRIST, other], path.load)["total_angle"]
+    np.testing.assert_allclose(rows[0], path.total_angle, atol=1e-12)
+    alone = nf.simulate(other, pulls(TENSIONS)).total_angle
+    np.testing.assert_allclose(rows[1], alone, atol=1e-12)
+    assert np.abs(rows[0] - rows[1]).max() > 0.01
+
+
+@pytest.mark.parametrize("friction", [FREE, nf.Capstan(0.1)], ids=["frictionless", "capstan"])
+def test_derivatives_pass_through_the_memory(friction: nf.Capstan | nf.Frictionless) -> None:
+    robot = dataclasses.replace(WRIST, friction=friction)
+    values = {
+        "material.elastic_modulus": 10_000.0,
+        "material.plateau_stress": 280.0,
+        "material.unloading_stress": 120.0,
+        "notch[*].height": WRIST.notches[0].height,
+    }
+    loads = pulls([1.37, 0.83, 0.61, 1.03])
+    function = nf.differentiable(robot, loads, list(values), outputs=("total_angle",))
+
+    def angles(name: str, change: float) -> np.ndarray:
+        return np.asarray(function(values | {name: values[name] + change})["total_angle"])
+
+    for name, value in values.items():
+        step = 1e-5 * value
+        difference = (angles(name, step) - angles(name, -step)) / (2.0 * step)
+        change = {key: np.asarray(float(key == name)) for key in values}
+        start = {key: np.asarray(float(one)) for key, one in values.items()}
+        exact = jax.jvp(function, (start,), (change,))[1]["total_angle"]
+        np.testing.assert_allclose(exact, difference, rtol=2e-5, atol=1e-7 / value)
+        by_adjoint = jax.grad(lambda one: function(one)["total_angle"][2])(start)[name]
+        assert float(by_adjoint) == pytest.approx(float(exact[2]), rel=1e-9)
+
+
+def test_no_random_history_gains_work() -> None:
+    tensions = np.random.default_rng(7).uniform(0.0, 2.2, 9)
+    robot = dataclasses.replace(WRIST, friction=nf.Capstan(0.13))
+    corners = [0.0, *tensions, 0.0]
+    steps = np.concatenate([np.linspace(*pair, 41)[1:] for pair in itertools.pairwise(corners)])
+    found = nf.simulate(robot, pulls(steps.tolist()))
+    assert found.converged.all()
+    assert found.tendon_work[-1, 0] - found.stored_energy[-1] > -1e-9
+    lost = found.dissipation[-1][np.isfinite(found.dissipation[-1])].sum()
+    assert found.material_dissipation[-1].sum() > 0.0
+    whole = lost + found.material_dissipation[-1].sum() + found.stored_energy[-1]
+    assert found.tendon_work[-1, 0] == pytest.approx(whole, rel=2e-2)
+
+
+@pytest.mark.parametrize("name", ["liu2022", "gao2017", "two-axis-wrist"])
+def test_every_notch_kind_takes_nitinol(name: str) -> None:
+    robot = nf.load_robot(name)
+    modulus = robot.material.elastic_modulus
+
+    def of(scale: float) -> nf.Robot:
+        """The robot of a material that yields at this part of a hundredth of its modulus."""
+        stress = 0.01 * scale * modulus
+        material = nf.Nitinol(modulus, stress, 0.3 * modulus, unloading_stress=0.5 * stress)
+        return dataclasses.replace(robot, material=material)
+
+    others = [0.0] * (len(robot.tendon) - 1)
+    loads = [nf.Load(tension=[one, *others]) for one in (0.5, 0.2)]
+    linear = dataclasses.replace(robot, material=nf.Linear(modulus))
+    expected = nf.solve(linear, loads[0]).tip_position
+    np.testing.assert_allclose(nf.solve(of(1e4), loads[0]).tip_position, expected, atol=1e-9)
+    path = nf.simulate(of(0.02), loads)
+    assert path.converged.all()
+    assert path.material_dissipation[-1].sum() > 0.0
