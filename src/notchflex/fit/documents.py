@@ -101,7 +101,7 @@ def left_out_document(left_out: LeftOut) -> dict[str, Any]:
                         "unit": edge(name)[1],
                         "error": error * edge(name)[2],
                         "error_of_all": fold.errors_of_all.get(name, math.nan) * edge(name)[2],
-                        "inside_90": fold.share_inside()[name],
+                        "inside_90": fold.share_inside().get(name),
                     }
                     for name, error in fold.errors.items()
                 ],

@@ -154,16 +154,18 @@ def prior_of(unknown: Unknown, found: Calibration) -> tuple[float, float]:
     """Return mean and standard deviation of a constant of one more specimen.
 
     The prior counts as one specimen: the variance is the mean of its own and of the squared
-    distances of the fitted specimens from its mean. Without a prior mean and variance are those of
-    the fitted specimens.
+    distances of the fitted specimens from its mean, each with the variance of its estimate. Without
+    a prior mean and variance are those of the fitted specimens.
 
     Raises:
         InputError: There is no prior, and fewer than two fitted specimens.
     """
-    values = [value for one, value in _values(found) if one.path == unknown.path and one.each]
+    alike = [one.path == unknown.path and one.each for one in found.problem.unknowns]
+    values, variance = found.best.values[alike], np.diag(found.covariance)[alike]
     if unknown.prior is not None:
         mean, size = unknown.prior
-        return mean, float(np.sqrt(np.mean(np.append(np.array(values) - mean, size) ** 2)))
+        squares = (values - mean) ** 2 + np.where(np.isfinite(variance), variance, size**2)
+        return mean, float(np.sqrt(np.mean(np.append(squares, size**2))))
     if len(values) < 2:
         raise InputError.MISSING_VALUE(
             f"nothing is known of `{unknown.name}` before it is measured; give a prior, or fit "

@@ -211,7 +211,10 @@ class Calibration:
         Infinite if nothing measured depends on a constant, or the noise is unknown.
         """
         if not self.is_likelihood:
-            return self.by_pulls.covariance
+            # What only priors determine does not scatter between pulls.
+            inverse = inverse_of(self.reached.curvature)
+            scatter = self.problem.scatter_of_priors(self.residuals)
+            return self.by_pulls.covariance + (inverse * np.nan_to_num(scatter)) @ inverse
         wider = self.by_pulls.wider
         return self.covariance_by_rows * np.outer(wider, wider)
 

@@ -58,39 +58,24 @@ class Problem:
             return None
         if self.noise is None:
             self.noise = first_noise(self.samples, residuals)
-        if not self.objective.is_likelihood:
-            return self._with_readings(residuals, values)
         cost = self.objective.cost(residuals, self.noise.deviation)
         for number, unknown in enumerate(self.unknowns):
             if unknown.prior is not None:  # as a measurement of the constant itself
                 mean, deviation = unknown.prior
+                weight = self.objective.weight_of_one(residuals, self.noise.deviation)
                 off = (float(values[number]) - mean) / deviation
-                cost = cost._replace(value=cost.value + 0.5 * off**2)
-                cost.gradient[number] += off / deviation
-                cost.curvature[number, number] += 1.0 / deviation**2
+                cost = cost._replace(value=cost.value + 0.5 * weight * off**2)
+                cost.gradient[number] += weight * off / deviation
+                cost.curvature[number, number] += weight / deviation**2
         return cost
 
-    def _with_readings(self, residuals: Residuals, values: Vector) -> Cost:
-        """A sum of norms, to which every prior is one more reading of the robots it belongs to."""
+    def scatter_of_priors(self, residuals: Residuals) -> Float[np.ndarray, " k"]:
+        """Return the variance of the gradient of the objective that the priors stand for."""
         assert self.noise is not None
-        labels = list(dict.fromkeys(one.label for one in self.samples.every))
-        known = np.isfinite(self.noise.deviation)
-        more: list[tuple[float, int, int, float]] = []
-        for number, unknown in enumerate(self.unknowns):
-            if unknown.prior is None:
-                continue
-            mean, deviation = unknown.prior
-            owners = {labels.index(one.label) for one in unknown.sets}
-            for robot in owners:
-                mine = known & (residuals.robot == robot)
-                noise = float(np.sqrt(np.mean(self.noise.deviation[mine] ** 2) / len(owners)))
-                off = (float(values[number]) - mean) / deviation
-                more.append((noise * off, robot, number, noise / deviation))
-        if not more:
-            return self.objective.cost(residuals, self.noise.deviation)
-        cost = self.objective.cost(residuals.with_readings(more), self.noise.deviation)
-        count = len(residuals)
-        return cost._replace(residuals=residuals, contributions=cost.contributions[:count])
+        weight = self.objective.weight_of_one(residuals, self.noise.deviation)
+        return np.array(
+            [0.0 if one.prior is None else (weight / one.prior[1]) ** 2 for one in self.unknowns]
+        )
 
     def minimum(self, start: Vector) -> Minimum:
         """Return the minimum that a search from a start ends at."""

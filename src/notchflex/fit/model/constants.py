@@ -240,8 +240,9 @@ def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: b
         upper = math.inf
     else:
         rule, number, read = _parsed(path)
-        here = [number_at(robots[one.label], one.path) for one in sets]
-        start = math.fsum(here) / len(sets)
+        every = [(robots[label], one) for label, one, *_ in sets]
+        here = [number_at(robot, one) for robot, ones in every for one in part_by_part(robot, ones)]
+        start = math.fsum(here) / len(here)
         robot = next(iter(robots.values()))
         unit, lower, upper = described_at(robot, number)
         first, last = _range(number, unit, start)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -55,25 +54,6 @@ class Residuals:
     def of(self, sample: int, quantity: str) -> np.ndarray:
         """Whether each number belongs to a quantity of some measurements, (R,)."""
         return (self.sample == sample) & (self.quantity == OBSERVED.index(quantity))
-
-    def with_readings(self, more: Sequence[tuple[float, int, int, float]]) -> Residuals:
-        """Return the same with residuals of robots that depend on one constant each.
-
-        Args:
-            more: Residual, number of the robot, number of the constant, derivative by it.
-        """
-        value, robot, number, slope = (np.array(one) for one in zip(*more, strict=True))
-        slopes = np.zeros((len(value), self.slopes.shape[1]))
-        slopes[np.arange(len(value)), number] = slope
-        like = np.array([int(np.argmax(self.robot == one)) for one in robot])
-        added = {"values": value, "slopes": slopes}
-        columns = {one.name: np.asarray(getattr(self, one.name)) for one in fields(self)}
-        return Residuals(
-            **{
-                name: np.concatenate([column, added.get(name, column[like])])
-                for name, column in columns.items()
-            }
-        )
 
     def root_mean_squares(self) -> dict[str, float]:
         """Root mean square by quantity (rad, mm, N)."""
