@@ -22,6 +22,7 @@ NAMES = [
     "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",
     "closing", "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError",
     "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
+    "uncertain", "Bands", "Band",
     "Differentiable", "differentiable", "TipResponse", "tip_response",
     "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus", "Kink",
     "ConvergenceError", "ErrorCode", "Failure", "Settings",

@@ -184,11 +184,42 @@ def dimensions() -> None:
         save(dimensioned_figure(robot), IMAGES / f"dimensions_{name}.svg")
 
 
+def bands() -> None:
+    """What tolerances do to wrist A, and how the band narrows with the tolerance of the depth."""
+    wrist = nf.load_robot("pacheco2021-a")
+    figure = new_figure(8.6, 3.4)
+    left, right = figure.subplots(1, 2, sharey=True)
+    loads = nf.pull(0.0, 2.5, steps=51)
+    found = nf.uncertain(wrist, loads.release())
+    angle = found["total_angle"]
+    tension = found.path.tension[:, 0]
+    for part, colour, name in (
+        (slice(51), BLUE, "loading"),
+        (slice(51, 102), VERMILLION, "unloading"),
+    ):
+        low, high = np.degrees(angle.low[part]), np.degrees(angle.high[part])
+        left.fill_between(tension[part], low, high, color=colour, alpha=0.25, lw=0)
+        left.plot(tension[part], np.degrees(found.path.total_angle[part]), color=colour, label=name)
+    left.legend(title="all tolerances, 5 to 95 %")
+    left.set_ylabel("total bending angle [deg]")
+    for depth, colour in ((0.010, BLUE), (0.005, GREEN), (0.002, ORANGE)):
+        angle = nf.uncertain(wrist, loads, {"notch.depth": depth})["total_angle"]
+        low, high = np.degrees(angle.low), np.degrees(angle.high)
+        label = f"{1e3 * depth:g} µm (SD)"
+        right.fill_between(
+            loads.tension[:, 0], low, high, color=colour, alpha=0.6, lw=0, label=label
+        )
+    for axes in (left, right):
+        axes.set_xlabel("tendon tension $T$ [N]")
+    right.legend(title="depth alone")
+    save(figure, IMAGES / "bands.svg")
+
+
 def main() -> None:
     """Draw all of them."""
     dimensions()
     with house_style():
-        for draw in (chain, memory, closing, cuts):
+        for draw in (chain, memory, closing, cuts, bands):
             draw()
         free_body(IMAGES)
 

@@ -36,8 +36,10 @@ def _top(schema: dict[str, Any]) -> str:
         if "$ref" in value or "discriminator" in value:
             written = f"`[{key}]`"
         else:
-            written = f"`[[{key}]]`" if several else f'`{key} = "..."`'
-        rows.append((written, "one or more" if several else "one", MEANING[key]))
+            single = f"`[{key}]`" if value.get("type") == "object" else f'`{key} = "..."`'
+            written = f"`[[{key}]]`" if several else single
+        number = "one or more" if several else "one" if key in schema["required"] else "none or one"
+        rows.append((written, number, MEANING[key]))
     return _table(("written", "how many", "meaning"), rows)
 
 
@@ -48,6 +50,7 @@ MEANING = {
     "tendon": "the tendons",
     "material": "the material of the tube",
     "friction": "the friction between tendon and tube",
+    "tolerance": "how far values may lie from these, by name: see below",
 }
 
 

@@ -75,6 +75,8 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "Band",
+            "Bands",
             "Batch",
             "Closing",
             "ClosingStatus",
@@ -93,6 +95,7 @@ _HOME = {
             "solve_each",
             "tip_from_angles",
             "tip_response",
+            "uncertain",
         ),
         "notchflex.analysis",
     ),

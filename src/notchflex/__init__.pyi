@@ -1,4 +1,6 @@
 from notchflex._plot import plot as plot
+from notchflex.analysis import Band as Band
+from notchflex.analysis import Bands as Bands
 from notchflex.analysis import Batch as Batch
 from notchflex.analysis import Closing as Closing
 from notchflex.analysis import ClosingStatus as ClosingStatus
@@ -17,6 +19,7 @@ from notchflex.analysis import solve_batch as solve_batch
 from notchflex.analysis import solve_each as solve_each
 from notchflex.analysis import tip_from_angles as tip_from_angles
 from notchflex.analysis import tip_response as tip_response
+from notchflex.analysis import uncertain as uncertain
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
 from notchflex.errors import ConvergenceError as ConvergenceError

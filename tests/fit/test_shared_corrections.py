@@ -99,6 +99,7 @@ def test_the_tension_that_acts_is_the_factor_times_the_reading_less_the_offset()
         ("factor:notch.precurvature_deg", "MISSING_VALUE", "precurvature_deg"),
         (("offset:notch.depth", "notch[2].depth"), "CONFLICT", "notch[2].depth"),
         ("sensor.force_fctor", "UNKNOWN_NAME", "sensor"),
+        ("notch.depth", "UNSUPPORTED", "unlike values"),
     ],
 )
 def test_what_makes_no_constant_is_refused_in_words(fit, code, name):

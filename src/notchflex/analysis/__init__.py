@@ -15,9 +15,12 @@ from notchflex.analysis.kinematics import (
 )
 from notchflex.analysis.outputs import Batch
 from notchflex.analysis.solve import simulate, solve, solve_each
+from notchflex.analysis.uncertainty.bands import Band, Bands, band_names, uncertain
 
 __all__ = [
     "AxisPlaces",
+    "Band",
+    "Bands",
     "Batch",
     "Closing",
     "ClosingStatus",
@@ -27,6 +30,7 @@ __all__ = [
     "TipResponse",
     "axis_places",
     "axis_points",
+    "band_names",
     "bodies_from_angles",
     "closing",
     "differentiable",
@@ -39,4 +43,5 @@ __all__ = [
     "solve_each",
     "tip_from_angles",
     "tip_response",
+    "uncertain",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,19 +12,29 @@ from notchflex.cli.outputs import Outputs
 from notchflex.results.files.writing import MOVING, replacing
 
 if TYPE_CHECKING:
+    from notchflex.analysis import Bands
     from notchflex.results import EquilibriumPath
 
 
-def write(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str) -> None:
-    """Write what was asked for: JSON and picture of all paths, other files of the first."""
+def write(
+    paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str, bands: Bands | None = None
+) -> None:
+    """Write what was asked for: JSON and picture of all paths, other files of the first.
+
+    Bands of tolerances go to JSON, CSV and the picture.
+    """
     from notchflex.results.files.csv import write_path_csv
     from notchflex.results.files.dataframe import write_parquet
     from notchflex.results.files.dataset import write_netcdf
 
     path = next(iter(paths.values()))
-    outputs.write_json(lambda: _document(paths))
-    writers = (("csv", write_path_csv), ("nc", write_netcdf), ("parquet", write_parquet))
-    for name, writer in writers:
+    outputs.write_json(lambda: _document(paths, bands))
+    writers = {"csv": write_path_csv, "nc": write_netcdf, "parquet": write_parquet}
+    if bands:
+        from notchflex.analysis.uncertainty.documents import band_columns
+
+        writers["csv"] = partial(write_path_csv, more=band_columns(bands))
+    for name, writer in writers.items():
         if target := outputs.targets.get(name):
             writer(target, path)
     target = outputs.targets.get("plot", "")
@@ -33,7 +44,7 @@ def write(paths: Mapping[str, EquilibriumPath], outputs: Outputs, title: str) ->
 
             save_animation(path, target, title=title, progress=counted)
     else:
-        outputs.save_picture(lambda: _picture(paths, title))
+        outputs.save_picture(lambda: _picture(paths, title, bands))
     if target := outputs.targets.get("save_state"):
         with replacing(target) as temporary:
             path.state.save(temporary)
@@ -44,19 +55,24 @@ def is_animation(target: str) -> bool:
     return Path(target).suffix.lower() in MOVING
 
 
-def _document(paths: Mapping[str, EquilibriumPath]) -> dict[str, Any]:
+def _document(paths: Mapping[str, EquilibriumPath], bands: Bands | None) -> dict[str, Any]:
     from notchflex.results.files.io import whole_document
 
     (_, first), *others = paths.items()
     beside = {label: whole_document(other) for label, other in others}
-    return whole_document(first) | ({"beside": beside} if beside else {})
+    document = whole_document(first) | ({"beside": beside} if beside else {})
+    if bands:
+        from notchflex.analysis.uncertainty.documents import band_document
+
+        document["bands"] = band_document(bands)
+    return document
 
 
-def _picture(paths: Mapping[str, EquilibriumPath], title: str) -> Any:
+def _picture(paths: Mapping[str, EquilibriumPath], title: str, bands: Bands | None) -> Any:
     from notchflex.plotting import beside_picture, path_picture
 
     first, *others = paths.values()
     if not others:
-        return path_picture(first, title=title)
+        return path_picture(first, title=title, bands=bands)
     names = [title, *(other.robot.name for other in others)]
     return beside_picture(paths, title="; ".join(dict.fromkeys(names)))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from notchflex.plotting.bands import shaded
 from notchflex.plotting.curves import (
     LOADING,
     NOTCH_LABEL,
@@ -36,6 +38,7 @@ from notchflex.robot import Robot
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from notchflex.analysis.uncertainty.bands import Band
     from notchflex.results import EquilibriumPath
 
 MOST_PROFILES = 2
@@ -61,7 +64,9 @@ def path_figure(path: EquilibriumPath, *, title: str | None = None) -> Figure:
     return path_picture(path, title=title).figure()
 
 
-def path_picture(path: EquilibriumPath, *, title: str | None = None) -> Picture:
+def path_picture(
+    path: EquilibriumPath, *, title: str | None = None, bands: Mapping[str, Band] | None = None
+) -> Picture:
     """Describe the picture of a solved path, for paper and for a browser.
 
     The robot to scale at up to five loads: in its plane of bending, or in space if it bends in
@@ -74,6 +79,7 @@ def path_picture(path: EquilibriumPath, *, title: str | None = None) -> Picture:
     Args:
         path: Solved path.
         title: Heading; the name of the robot if None.
+        bands: Bands of tolerances by quantity, shaded behind angles and strains.
     """
     ways = steps_by_branch(path)
     steps = {"": representative_steps(path)}
@@ -81,7 +87,7 @@ def path_picture(path: EquilibriumPath, *, title: str | None = None) -> Picture:
         steps = {way: representative_steps(path, among=ways[way]) for way in (LOADING, UNLOADING)}
     view = plane_of(path)
     shapes = [shape_panel(path, some, view, title=name) for name, some in steps.items()]
-    panels = _curves(path, ways)
+    panels = _curves(path, ways, bands)
     # The shapes one above the other in the first column, the curves column by column beside them.
     rows = 3 if len(panels) > _TWO_ROWS else 2
     cells = stack(shapes, height=2 * rows // len(shapes))
@@ -92,12 +98,17 @@ def path_picture(path: EquilibriumPath, *, title: str | None = None) -> Picture:
     return Picture(heading, 2.6 + 4.0 * columns, 0.8 + 2.9 * rows, cells)
 
 
-def _curves(path: EquilibriumPath, ways: dict[str, list[int]]) -> list[Panel]:
+def _curves(
+    path: EquilibriumPath, ways: dict[str, list[int]], bands: Mapping[str, Band] | None
+) -> list[Panel]:
     if len(path) == 1:
         return []
-    panels = [total_panel(path), notches_panel(path)]
+    panels = [
+        shaded(total_panel(path), path, bands, "total_angle"),
+        shaded(notches_panel(path), path, bands, "notch_angle"),
+    ]
     panels += [stroke_panel(path, tendon) for tendon in driven_by_stroke(path)[:MOST_PROFILES]]
-    panels.append(strain_panel(path))
+    panels.append(shaded(strain_panel(path), path, bands, "peak_strain"))
     if len(ways) > 1 and pulled_tendons(path):
         panels += [profile_panel(path, tendon) for tendon in pulled_tendons(path)[:MOST_PROFILES]]
         if reverses_step_by_step(path):

@@ -23,9 +23,9 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
     """Describe the picture of a result, whatever its kind.
 
     Args:
-        result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, a `Comparison`, a
-            `Calibration`, a `FrictionRig`, or a dict of label to path for several beside each
-            other.
+        result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a
+            `Comparison`, a `Calibration`, a `FrictionRig`, or a dict of label to path for several
+            beside each other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -48,7 +48,7 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
 
 def _picture(result: Any) -> Picture:
-    from notchflex.analysis import Batch
+    from notchflex.analysis import Bands, Batch
     from notchflex.comparison import Comparison
     from notchflex.results import Equilibrium, EquilibriumPath
     from notchflex.robot import Robot
@@ -58,13 +58,11 @@ def _picture(result: Any) -> Picture:
         EquilibriumPath: path_picture,
         Equilibrium: lambda state: state_picture(state.path, state.step),
         Batch: batch_picture,
+        Bands: lambda bands: path_picture(bands.path, bands=bands),
         Comparison: comparison_picture,
     }
-    if (
-        isinstance(result, Mapping)
-        and not isinstance(result, Batch)
-        and all(isinstance(one, EquilibriumPath) for one in result.values())
-    ):
+    is_dict = isinstance(result, Mapping) and not isinstance(result, tuple(kinds))
+    if is_dict and all(isinstance(one, EquilibriumPath) for one in result.values()):
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
     if not isinstance(result, tuple(kinds)):
         from notchflex.fit import Calibration, FrictionRig  # takes a second
@@ -75,6 +73,7 @@ def _picture(result: Any) -> Picture:
         if isinstance(result, kind):
             return describe(result)
     raise InputError.WRONG_TYPE(
-        "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, a "
-        f"Comparison, a Calibration, a FrictionRig or a dict of paths; got {type(result).__name__}."
+        "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, "
+        "Bands, a Comparison, a Calibration, a FrictionRig or a dict of paths; got "
+        f"{type(result).__name__}."
     )

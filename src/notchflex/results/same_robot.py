@@ -8,8 +8,9 @@ from typing import Any
 from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
-# What a robot is called and when a strain is warned of has no effect on its states.
-_NO_EFFECT = ("name", "material.allowed_strain")
+# What a robot is called, when a strain is warned of and how exact its values are has no effect on
+# its states.
+_NO_EFFECT = ("name", "material.allowed_strain", "tolerance.")
 _MOST = 3
 
 
@@ -67,7 +68,7 @@ def _values(robot: Robot) -> dict[str, Any]:
         values |= {
             f"{name}.{key}": value for name, one in parts.items() for key, value in one.items()
         }
-    return {name: value for name, value in values.items() if name not in _NO_EFFECT}
+    return {name: value for name, value in values.items() if not name.startswith(_NO_EFFECT)}
 
 
 def _general(name: str) -> str:

@@ -13,6 +13,7 @@ from notchflex.robot.kinds import Friction, Material, Notch, one_of
 from notchflex.robot.openings import openings_along
 from notchflex.robot.part import ProblemError, part
 from notchflex.robot.tendon import Tendon
+from notchflex.robot.tolerance import Tolerances
 from notchflex.robot.tube import Tube
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ class Robot:
         tendon: The tendons.
         material: The material of the tube.
         friction: The friction between tendon and tube.
+        tolerance: How far values may lie from these, by name, such as `{"notch.depth": 0.01}`;
+            see `notchflex.uncertain`.
 
     Raises:
         InputError: A value is not allowed; the message names it as `--set` does.
@@ -64,6 +67,9 @@ class Robot:
     tendon: Annotated[tuple[Tendon, ...], Field(min_length=1)]
     material: AnyMaterial
     friction: AnyFriction
+    tolerance: Annotated[
+        Tolerances, Field(description="how far values may lie from these, by name")
+    ] = ()
 
     @model_validator(mode="after")
     def _parts_fit(self) -> "Robot":
@@ -106,6 +112,10 @@ class Robot:
             elif not found:
                 for key, text in self._tendon_problems(tendon):
                     yield (f"tendon[{i}].{key}", text)
+        if self.tolerance and not found:
+            from notchflex.robot.value_names import tolerance_problems  # it makes robots
+
+            yield from tolerance_problems(self)
 
     def _tendon_problems(self, tendon: Tendon) -> Iterator[tuple[str, str]]:
         """Check a tendon against the notches that it crosses, and the body that it ends in."""
@@ -191,7 +201,8 @@ class Robot:
         """Return a copy with other parts, such as `material=Linear(7510.0)`.
 
         Args:
-            parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`.
+            parts: New values for any of `name`, `tube`, `notch`, `tendon`, `material`, `friction`
+                and `tolerance`.
 
         Raises:
             InputError: A value is not allowed, or there is no such part.
@@ -234,6 +245,7 @@ class Robot:
 
 def to_table(robot: Robot) -> dict[str, Any]:
     """Return a robot as the plain table that its file holds: dicts, lists, numbers and text."""
+    tolerances = {one.value: one.written for one in robot.tolerance}
     return {
         "name": robot.name,
         "tube": _part_table(robot.tube),
@@ -241,6 +253,7 @@ def to_table(robot: Robot) -> dict[str, Any]:
         "tendon": [_part_table(tendon) for tendon in robot.tendon],
         "material": _part_table(robot.material),
         "friction": _part_table(robot.friction),
+        **({"tolerance": tolerances} if tolerances else {}),
     }
 
 

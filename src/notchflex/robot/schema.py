@@ -46,7 +46,7 @@ def _tidy(model: dict[str, Any]) -> None:
     for value in properties.values():
         value.pop("title", None)
         default = value.get("default")
-        if default is None or (isinstance(default, float) and math.isinf(default)):
+        if default in (None, []) or (isinstance(default, float) and math.isinf(default)):
             value.pop("default", None)  # TOML has no null: such a key is left out
         choices = [one for one in value.get("anyOf", ()) if one != {"type": "null"}]
         if len(choices) == 1:

@@ -3,7 +3,7 @@
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, cast
 
 from notchflex.errors import InputError
@@ -11,6 +11,7 @@ from notchflex.robot.error_messages import fields_of, nearest, unknown_key
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.robot import Robot, from_table, remember_source, source_of, to_table
 from notchflex.robot.tendon import Tendon
+from notchflex.robot.tolerance import amount
 from notchflex.robot.tube import Tube
 
 _SECTIONS: dict[str, type] = {
@@ -22,6 +23,9 @@ _SECTIONS: dict[str, type] = {
 }
 _PATH = re.compile(r"(?P<section>\w+)(?:\[(?P<index>\*|\d+)\])?(?:\.(?P<key>\w+))?")
 _EXAMPLES = "write it like material.elastic_modulus, notch[2].depth or notch[*].depth"
+
+# Begins the name of a tolerance, such as `tolerance.notch.depth`.
+_TOLERANCE = "tolerance."
 
 # More digits than the number of any notch has.
 _DIGITS = 9
@@ -72,9 +76,13 @@ def set_values(
     pairs: Iterable[tuple[str, object]] = (
         cast("Mapping[str, object]", values).items() if isinstance(values, Mapping) else values
     )
-    targets = [(_parse(path), value) for path, value in pairs]
+    pairs = list(pairs)
+    tolerances = {path: value for path, value in pairs if path.strip().startswith(_TOLERANCE)}
+    targets = [(_parse(path), value) for path, value in pairs if path not in tolerances]
     targets.sort(key=lambda item: (item[0].key != "kind", item[0].number is not None))
     table = to_table(robot)
+    for path, value in tolerances.items():
+        table.setdefault("tolerance", {})[path.strip().removeprefix(_TOLERANCE)] = value
     dropped: list[str] = []
     seen: set[tuple[str, int | None, str]] = set()
     for target, value in targets:
@@ -87,6 +95,8 @@ def set_values(
             dropped += _set_kind(table, target, value)
         else:
             _set_key(table, target, value)
+    for path in dropped:
+        table.get("tolerance", {}).pop(path, None)
     return Changed(remember_source(from_table(table), source_of(robot)), tuple(dropped))
 
 
@@ -149,35 +159,33 @@ def number_at(robot: Robot, path: str) -> float:
     return value
 
 
-def part_by_part(robot: Robot, path: str) -> tuple[str, ...]:
-    """The names of the numbers that a name such as `notch.depth` stands for.
+def numbers_at(robot: Robot, path: str) -> dict[str, float]:
+    """Every number that a path means, each by its own name.
 
     Args:
         robot: The robot.
-        path: A name, as for `Robot.with_value`.
-
-    Returns:
-        The name itself where it stands for one value; else a name for each notch or tendon that
-        has such a number.
+        path: As for `Robot.with_value`; `notch.depth` means that of every notch that has a depth.
 
     Raises:
-        InputError: There is no such number.
+        InputError: As for `number_at`.
 
     Example:
-        >>> from notchflex import load_robot
-        >>> part_by_part(load_robot("pacheco2021-a"), "notch.depth")
-        ('notch.depth',)
-        >>> part_by_part(load_robot("pacheco2021-c"), "notch.depth")[-1]
-        'notch[4].depth'
+        >>> from notchflex.robot import load_robot
+        >>> numbers_at(load_robot("pacheco2021-c"), "notch.depth")["notch[2].depth"]
+        1.39
     """
     target = _parse(path)
-    parts = {"notch": robot.notches, "tendon": robot.tendon}.get(target.section)
-    if parts is None or target.number is not None:
-        return (path,)
-    values = {n: getattr(one, target.key, None) for n, one in enumerate(parts, start=1)}
-    if len(set(values.values())) <= 1:
-        return (path,)
-    return tuple(f"{target.section}[{n}].{target.key}" for n, v in values.items() if v is not None)
+    counts = {"notch": robot.number_of_notches, "tendon": robot.number_of_tendons}
+    if target.section not in counts or target.number is not None:
+        return {path: number_at(robot, path)}
+    found: dict[str, float] = {}
+    for number in range(1, counts[target.section] + 1):
+        name = f"{target.section}[{number}].{target.key}"
+        try:
+            found[name] = number_at(robot, name)
+        except InputError:  # a notch of another kind
+            continue
+    return found or {path: number_at(robot, path)}
 
 
 def described_at(robot: Robot, path: str) -> Described:
@@ -211,6 +219,28 @@ def described_at(robot: Robot, path: str) -> Described:
     raise InputError.UNKNOWN_NAME(
         f"`{path}` is not the name of a number of this robot; {_EXAMPLES}."
     )
+
+
+def tolerance_problems(robot: Robot) -> Iterator[tuple[str, str]]:
+    """Find tolerances of what the robot does not have, or in a wrong unit."""
+    for one in robot.tolerance:
+        try:
+            numbers = numbers_at(robot, one.value)
+        except InputError as error:
+            yield f"tolerance.{one.value}", f"is about no number of this robot: {error}"
+            continue
+        unit = described_at(robot, one.value).unit
+        if one.per_notch and not one.value.startswith("notch."):
+            yield f"tolerance.{one.value}", "has `per_notch`, which is for values of all notches."
+        smallest = min(abs(number) for number in numbers.values())
+        for key in ("sd", "plus", "minus") if unit in ("mm", "MPa") and smallest else ():
+            size = getattr(one, key)
+            if size is not None and amount(size, smallest) >= smallest:
+                yield (
+                    f"tolerance.{one.value}",
+                    f"has {key} = {size}, as much as the value itself, {smallest:g} {unit}; "
+                    f"give it in {unit}, or in percent as text.",
+                )
 
 
 def parse_value(text: str) -> object:

@@ -15,6 +15,7 @@ from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.error_messages import fields_of
 from notchflex.robot.reading import robot_from_text
 from notchflex.robot.robot import Robot, source_of, to_table
+from notchflex.robot.tolerance import read_tolerances
 from notchflex.robot.value_names import defaults_of
 
 _HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
@@ -120,6 +121,9 @@ def _fresh(robot: Robot, notes: _Notes) -> str:
         if key == "name":
             lines += [f"name = {tomlkit.item(value).as_string()}"]
             continue
+        if key == "tolerance":
+            lines += ["", f"[{key}]", *_tolerance_lines(value)]
+            continue
         parts = getattr(robot, key)
         first = 1
         for one in parts if isinstance(parts, tuple) else (parts,):
@@ -128,6 +132,19 @@ def _fresh(robot: Robot, notes: _Notes) -> str:
             lines += ["", header, *_fresh_part(one, _notes_of(notes, key, first, count))]
             first += count
     return "\n".join(lines) + "\n"
+
+
+def _tolerance_lines(table: Mapping[str, Any]) -> list[str]:
+    """Write tolerances, a name a line; TOML wants quotes around one with brackets."""
+    items = [(name if "[" not in name else f'"{name}"', one) for name, one in table.items()]
+    inline = [(name, _inline(one) if isinstance(one, dict) else one) for name, one in items]
+    return [f"{name} = {tomlkit.item(one).as_string()}" for name, one in inline]
+
+
+def _inline(table: dict[str, Any]) -> Any:
+    made = tomlkit.inline_table()
+    made.update(table)
+    return made
 
 
 def _fresh_part(part: Any, notes: _Notes) -> list[str]:
@@ -156,7 +173,12 @@ class _Block:
 
     def text(self, values: dict[str, Any], notes: _Notes) -> str:
         """Return the piece with other values, and what is to be said of them."""
-        body = tomlkit.parse("".join(self.body))
+        text = "".join(self.body)
+        if self.name == "tolerance":
+            if read_tolerances(tomllib.loads(text)) != read_tolerances(values):
+                text = "\n".join([*_tolerance_lines(values), ""])
+            return "".join(self.lead) + self.header + text
+        body = tomlkit.parse(text)
         _update(body, values, self.name, notes)
         return "".join(self.lead) + self.header + tomlkit.dumps(body)
 
@@ -174,11 +196,17 @@ def _rewritten(robot: Robot, template: str, notes: _Notes) -> str:
                 done.add(block.name)
                 mine = [one for one in blocks if one.name == block.name]
                 wanted += _matched(mine, old[block.name], new[block.name])
-        elif block.name:
+        elif block.name in new:
             wanted.append((block, new[block.name]))
+        elif block.name:  # a robot without the tolerances of its file
+            continue
         else:  # the head of the file: the name, and whatever is not under a header of its own
             headed = {one.name for one in blocks}
-            wanted.append((block, {k: v for k, v in new.items() if k not in headed}))
+            wanted.append(
+                (block, {k: v for k, v in new.items() if k not in (*headed, "tolerance")})
+            )
+    if "tolerance" in new and all(block.name != "tolerance" for block in blocks):
+        wanted.append((_Block("tolerance", ["\n"], "[tolerance]\n"), new["tolerance"]))
     texts: list[str] = []
     first = {"notch": 1, "tendon": 1}
     for block, table in wanted:

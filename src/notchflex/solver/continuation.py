@@ -63,6 +63,30 @@ class LoadStepResult(NamedTuple):
 _SUBSTEP_TOLERANCE, _SUBSTEP_RESIDUAL = 1e3, 1e-10
 # Fraction of a load step at which the external loads are complete, where they come first.
 _EXTERNAL_COMPLETE = 0.5
+# A notch that softens as it closes has limit points, where a constant tension snaps it to another
+# shape. Substeps that fail below this part of the load step are followed with a viscosity, between
+# these parts of the stiffness at rest, until the notches stand still.
+_SNAPS_BELOW, _VISCOSITY, _LEAST_VISCOSITY, _MOST_VISCOSITY = 0.05, 0.1, 0.02, 30.0
+# How many times more iterations a load with snaps may take.
+_MORE_ITERATIONS = 4
+
+
+class _Search(NamedTuple):
+    """State of the loop over substeps.
+
+    Attributes:
+        result: The result so far.
+        part: Length of the next substep, as a part of the load step.
+        tries: Number of substeps tried.
+        viscosity: Of the next substep; 0 outside a snap.
+        moving: Where it starts: the last solved state, or a shape on the way of a snap.
+    """
+
+    result: LoadStepResult
+    part: Float[Array, ""]
+    tries: Int[Array, ""]
+    viscosity: Float[Array, ""]
+    moving: SolverState
 
 
 def at_rest(chain: Chain) -> SolverState:
@@ -111,32 +135,48 @@ def solve_load_step(
         The result.
     """
     external_first = _external_first(chain, last)
+    can_snap = chain.rods.section.ends is not None
+    most = settings.max_all_iterations * (_MORE_ITERATIONS if can_snap else 1)
 
-    def proceed(state: tuple[LoadStepResult, Array, Array]) -> Bool[Array, ""]:
-        result, part, tries = state
-        more = (part >= settings.smallest_load_step) & (tries < settings.max_load_steps)
-        return ~result.converged & more & (result.iterations < settings.max_all_iterations)
+    def proceed(state: _Search) -> Bool[Array, ""]:
+        result, part = state.result, state.part
+        more = (part >= settings.smallest_load_step) & (state.tries < settings.max_load_steps)
+        return ~result.converged & more & (result.iterations < most)
 
-    def substep(state: tuple[LoadStepResult, Array, Array]) -> tuple[LoadStepResult, Array, Array]:
-        result, part, tries = state
+    def substep(state: _Search) -> _Search:
+        result, part, viscosity = state.result, state.part, state.viscosity
         first = external_first & (result.reached < _EXTERNAL_COMPLETE)
         stop = jnp.where(first, _EXTERNAL_COMPLETE, 1.0)
         aim = jnp.minimum(result.reached + part, stop)
         towards = interpolate_command(chain, command, last, aim)
-        new = _solve_substep(chain, towards, result.solved, settings, aim)
+        start = state.moving if can_snap else result.solved
+        new = _solve_substep(chain, towards, start, settings, aim, viscosity if can_snap else None)
         memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound, new.material)
-        keep = partial(jax.tree.map, lambda old, new_leaf: jnp.where(new.converged, new_leaf, old))
+        at_aim = SolverState(new.point, memory, new.stroke, towards.applied)
+        still = viscosity == 0.0
+        solved = new.converged & still
+        keep = partial(jax.tree.map, lambda old, new_leaf: jnp.where(solved, new_leaf, old))
         result = LoadStepResult(
-            solved=keep(result.solved, SolverState(new.point, memory, new.stroke, towards.applied)),
+            solved=keep(result.solved, at_aim),
             residual=new.residual,
             iterations=result.iterations + new.iterations,
-            converged=new.converged & (aim >= 1.0),
-            reached=jnp.where(new.converged, aim, result.reached),
+            converged=solved & (aim >= 1.0),
+            reached=jnp.where(solved, aim, result.reached),
             parts=result.parts + new.converged,
             between=keep(result.between, result.solved),
-            part_before=jnp.where(new.converged, result.reached, result.part_before),
+            part_before=jnp.where(solved, state.result.reached, result.part_before),
         )
-        return result, jnp.where(new.converged, 2.0 * part, 0.5 * part), tries + 1
+        shorter = jnp.where(still, 0.5 * part, part)
+        part = jnp.where(solved, 2.0 * part, shorter)
+        tries = state.tries + 1
+        if not can_snap:
+            return _Search(result, part, tries, viscosity, result.solved)
+        viscosity = _next_viscosity(viscosity, new.converged, part)
+        move = partial(jax.tree.map, lambda old, new_leaf: jnp.where(new.converged, new_leaf, old))
+        moving = move(state.moving, at_aim)
+        given_up = ~still & ~new.converged & (viscosity == 0.0)
+        restart = partial(jax.tree.map, lambda old, new_leaf: jnp.where(given_up, new_leaf, old))
+        return _Search(result, part, tries, viscosity, restart(moving, result.solved))
 
     start = LoadStepResult(
         solved=last,
@@ -148,20 +188,47 @@ def solve_load_step(
         between=last,
         part_before=jnp.zeros(()),
     )
-    return jax.lax.while_loop(proceed, substep, (start, jnp.ones(()), jnp.zeros((), int)))[0]
+    begin = _Search(start, jnp.ones(()), jnp.zeros((), int), jnp.zeros(()), last)
+    return jax.lax.while_loop(proceed, substep, begin).result
+
+
+def _next_viscosity(
+    viscosity: Float[Array, ""], converged: Bool[Array, ""], part: Float[Array, ""]
+) -> Float[Array, ""]:
+    """Return the viscosity of the next substep, as a part of the stiffness at rest.
+
+    It starts where short substeps fail, falls while the notch moves on until it is off, and rises
+    where it does not suffice.
+    """
+    less = jnp.where(viscosity < _LEAST_VISCOSITY, 0.0, 0.4 * viscosity)
+    more = jnp.where(viscosity < _MOST_VISCOSITY, 3.0 * viscosity, 0.0)
+    moving = jnp.where(converged, less, more)
+    starts = ~converged & (part < _SNAPS_BELOW)
+    return jnp.where(viscosity > 0.0, moving, jnp.where(starts, _VISCOSITY, 0.0))
 
 
 def _solve_substep(
-    chain: Chain, command: Command, solved: SolverState, settings: Settings, aim: Array
+    chain: Chain,
+    command: Command,
+    solved: SolverState,
+    settings: Settings,
+    aim: Array,
+    viscosity: Float[Array, ""] | None,
 ) -> NewtonResult:
-    """Solve for a command near a solved state, from the predicted log ratios."""
+    """Solve for a command near a solved state, from the predicted log ratios.
+
+    Modes are dragged by a viscosity, if one is given.
+    """
     last_tension = solved.point.base_tension
     base_tension = command.either(last_tension, command.target)
     log_ratio = predict_log_ratios(chain, last_tension, base_tension, solved.memory)
     start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
     enough = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
     enough = jnp.where(aim < 1.0, enough, 0.0)
-    problem = NewtonProblem(chain, command, solved.memory, last_tension)
+    memory = solved.memory
+    if viscosity is not None:
+        memory = memory._replace(drag=(viscosity, solved.point.unknowns.modes))
+    problem = NewtonProblem(chain, command, memory, last_tension)
     return newton(problem, start, settings, enough)
 
 

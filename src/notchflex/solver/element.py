@@ -44,12 +44,15 @@ class Memory(NamedTuple):
         slid: Tendon slid over them, mm.
         bound: Their largest log ratios, for the predictor of the next state alone.
         material: Memory of the material at every node; () where it has none.
+        drag: While a notch snaps: viscosity as a part of the stiffness at rest, and the modes of
+            the state before, which it drags on; None otherwise.
     """
 
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
     slid: tuple[Float[Array, "*n t 2"], ...]
     bound: tuple[Float[Array, "*n t 2"], ...]
     material: Any = ()
+    drag: tuple[Float[Array, ""], Float[Array, "*n modes"]] | None = None
 
 
 def notch_heights(chain: Chain) -> Float[Array, " n"]:

@@ -133,6 +133,8 @@ def _balance_rows(here: _Linearisation) -> tuple[Float[Array, "n m z"], list[Arr
             chain.rods, chain.law, here.memory.material, at.flexure
         )
         elastic = _never_singular(chain, elastic)
+        if here.memory.drag is not None:
+            elastic = elastic + here.memory.drag[0] * jax.vmap(jnp.diag)(chain.stiffness)
     behind: list[Array] = []
     if at.wrenches is None:
         balance = unit.spread(unit.of_modes(elastic))

@@ -13,6 +13,7 @@ from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.flexure import in_space
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
 from notchflex.solver.block_elimination import Iterate, linear_step
 from notchflex.solver.element import Memory
@@ -235,8 +236,19 @@ def _result(
         stroke=stroke(chain, point.base_tension, at.base),
         residual=residual,
         iterations=iterations,
-        converged=within & tension_is_bounded(chain, command, point.base_tension),
+        converged=within
+        & tension_is_bounded(chain, command, point.base_tension)
+        & _is_possible(chain, at),
     )
+
+
+def _is_possible(chain: Chain, at: Evaluation) -> Bool[Array, ""]:
+    """Whether no notch is opened so far that its law of flattening has no meaning."""
+    ends = chain.rods.section.ends
+    if ends is None:
+        return jnp.array(True)
+    curvature = in_space(at.flexure.strain)[..., 1]
+    return ~jnp.any((curvature < 0.0) & (ends.slope_factor(curvature) < 0.0))
 
 
 def _next_step(

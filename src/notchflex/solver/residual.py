@@ -153,6 +153,9 @@ def evaluate(
         rotation, external, at_base = external_wrenches(flexure.pose, applied)
         wrenches = _wrenches(chain, flexure.pose, unknowns, spans, contacts, external)
     balance = _balance(chain, unknowns, flexure, spans, contacts, wrenches)
+    if memory.drag is not None:
+        viscosity, before = memory.drag
+        balance = balance + viscosity * chain.stiffness * (unknowns.modes - before)
     contact_force = tuple(
         signorini(chain, group.has_contact, force, response.gap)
         for group, force, response in zip(

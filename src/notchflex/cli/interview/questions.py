@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Container, Iterable
 from itertools import groupby
 from typing import Any, TypeVar
 
@@ -12,13 +13,14 @@ from notchflex.cli.interview.ask import Interview, Question
 from notchflex.cli.interview.readings import choice, reading, readings, whole
 from notchflex.cli.interview.wordings import OPTIONS, WORDINGS
 from notchflex.errors import InputError
-from notchflex.robot import Robot, Superelastic, Tendon, Tube
+from notchflex.robot import Nitinol, Robot, Superelastic, Tendon, Tube
 from notchflex.robot.error_messages import fields_of, kind_of
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.robot import MOST_NOTCHES
 
 ALLOWED_STRAIN = "0.08"
 NITINOL_DENSITY = 6450.0  # kg/m3
+_NITINOL = (Nitinol, Superelastic)
 
 T = TypeVar("T")
 
@@ -61,7 +63,7 @@ def interviewed(interview: Interview, name: str) -> Robot:
 def _ask_kind(interview: Interview, option: str, base: type[T], text: str = "") -> type[T]:
     """Ask for a kind of notch, material or friction; the usual one stands first."""
     kinds = kinds_of(base)
-    usual = next(kind for _, kind in WORDINGS if kind in kinds)
+    usual = _usual(interview, kinds)
     names = tuple(dict.fromkeys((usual, *kinds)))
     question = f"{text}{' or '.join(names)}"
     return kinds[interview.ask(Question(option, question, lambda said: choice(said, names), usual))]
@@ -72,7 +74,18 @@ def _usual_or_asked(interview: Interview, option: str, base: type[T], text: str)
     if interview.person or interview.answers.get(option) is not None:
         return _ask_kind(interview, option, base, text)
     kinds = kinds_of(base)
-    return kinds[next(kind for _, kind in WORDINGS if kind in kinds)]
+    return kinds[_usual(interview, kinds)]
+
+
+def _usual(interview: Interview, kinds: Container[str]) -> str:
+    """Return the first kind that has wordings, or one of whose own options was given."""
+    worded = {kind: keys for (_, kind), keys in WORDINGS.items() if kind in kinds}
+    counts = Counter(wording.option for keys in worded.values() for wording in keys.values())
+    for kind, keys in worded.items():
+        own = (one.option for one in keys.values() if counts[one.option] == 1)
+        if any(interview.answers.get(option) is not None for option in own):
+            return kind
+    return next(iter(worded))
 
 
 def _ask_part(interview: Interview, section: str, kind: type[T]) -> T:
@@ -84,7 +97,7 @@ def _ask_part(interview: Interview, section: str, kind: type[T]) -> T:
     values: dict[str, Any] = {}
     if worded:
         values = interview.set_values(section, but=(*keys, "allowed_strain"))
-        if kind is Superelastic:
+        if issubclass(kind, _NITINOL):
             values = {"density": NITINOL_DENSITY, **values}
     values |= {key: _ask(interview, section, kind, key) for key in keys}
     return kind(**values)
@@ -159,7 +172,7 @@ def _ask_tendons(
 
 def _ask_strain(interview: Interview, material: Material) -> float | None:
     """Ask for the strain to warn of."""
-    superelastic = isinstance(material, Superelastic)
+    superelastic = isinstance(material, _NITINOL)
     wording = WORDINGS["material", ""]["allowed_strain"]
     hint = "Where the material yields: yield strength over elastic modulus."
     return interview.ask(

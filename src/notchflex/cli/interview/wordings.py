@@ -87,6 +87,27 @@ WORDINGS: dict[tuple[str, str], dict[str, Wording]] = {
             comment="assumed: on the side of the cuts",
         ),
     },
+    ("material", "nitinol"): {
+        "elastic_modulus": Wording(
+            "--elastic-modulus",
+            "Elastic modulus [MPa]",
+            default="42000",
+            hint="30000 to 57000 are usual for superelastic tubes.",
+            comment="estimate: usual for superelastic nitinol, 30 to 57 GPa",
+        ),
+        "plateau_stress": Wording(
+            "--plateau-stress",
+            "Stress where the plateau begins [MPa]",
+            default="350",
+            comment="estimate: usual for superelastic nitinol, 260 to 460 MPa",
+        ),
+        "plateau_modulus": Wording(
+            "--plateau-modulus",
+            "Slope of the plateau [MPa]",
+            default="6000",
+            comment="estimate: usual for superelastic nitinol, 3 to 9 GPa",
+        ),
+    },
     ("material", "superelastic"): {
         "elastic_modulus": _MODULUS._replace(default="10000"),
         "superelastic_modulus": Wording(
@@ -115,8 +136,8 @@ WORDINGS: dict[tuple[str, str], dict[str, Wording]] = {
         "coefficient": Wording(
             "--friction",
             "Friction coefficient between tendon and tube",
-            default="0.13",
-            comment="estimate: Pacheco 2021, Table 3, nitinol tendon on nitinol tube",
+            default="0.18",
+            comment="estimate: nitinol tendon on nitinol tube, 0.13 to 0.19",
         ),
     },
 }

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from notchflex.cli import terminal
 from notchflex.cli.tables.path_columns import (
+    NO_NUMBER,
     ColumnGroup,
     PathColumn,
     named_groups,
@@ -16,14 +17,19 @@ from notchflex.cli.tables.path_columns import (
     usual_groups,
 )
 from notchflex.cli.tables.path_rows import rows_note, shown_rows
+from notchflex.cli.tables.tolerance_lines import tolerance_lines
 from notchflex.loads.summary import external_words
 from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from notchflex.analysis import Bands
     from notchflex.loads.external import ExternalLoad
     from notchflex.results import EquilibriumPath
+
+ANGLE_AND_TIP = ("total_angle", "tip_position")
+"""Quantities whose bands are shown where none are named."""
 
 MOST_LOADS = 3
 """More different loads than this are only counted."""
@@ -83,6 +89,55 @@ def print_beside(
             _print_block(console, first, rows, block)
 
 
+def print_bands(
+    bands: Bands, title: str, *, columns: Sequence[str] = (), every_row: bool = False
+) -> None:
+    """Print the low end, the middle and the high end of quantities, step by step.
+
+    Args:
+        bands: The bands, and their path.
+        title: What stands above the table.
+        columns: Quantities to show, by their names; angle and tip where none are named.
+        every_row: Whether all steps of a long path are shown.
+    """
+    path = bands.path
+    rows, stride = shown_rows(path, every_row=every_row)
+    room = terminal.width()
+    console = terminal.output(room)
+    console.print(title, style="bold", soft_wrap=True)
+    for sentence in load_sentences(path.load.external):
+        console.print(sentence, soft_wrap=True)
+    commanded = named_groups(path, rows, ("commanded_tension", "commanded_stroke"))
+    for group in commanded:
+        group.columns[:] = [one for one in group.columns if {*one.cells} != {NO_NUMBER}]
+    groups = [group for group in commanded if group.columns]
+    ends = [bands.end(end) for end in ("low", "median", "high")]
+    for name in columns or ANGLE_AND_TIP:
+        several = [named_groups(end, rows, [name])[0] for end in ends if name in bands]
+        parts = [
+            _labelled(group, label, below=True).columns
+            for group, label in zip(several, ("5 %", "50 %", "95 %"), strict=False)
+        ]
+        (plain,) = named_groups(path, rows, [name])
+        triples = [triple for triple in zip(*parts, strict=True) if any(map(_varies, triple))]
+        banded = [column for triple in triples for column in triple]
+        groups.append(replace(plain, columns=banded) if name in bands else plain)
+    for block in _blocks(step_column(rows), groups, room):
+        _print_block(console, path, rows, block)
+    _print_notes(console, groups, [], room)
+    for line in (
+        f"5 %, 50 %, 95 %: percentiles of {bands.draws} draws within the tolerances.",
+        *tolerance_lines(bands),
+        *filter(None, [rows_note(len(path), len(rows), stride)]),
+    ):
+        console.print(line, soft_wrap=True)
+
+
+def _varies(column: PathColumn) -> bool:
+    """Whether a column holds another number than zero."""
+    return any(cell.strip("-0.* ") not in ("", NO_NUMBER) for cell in column.cells)
+
+
 def load_sentences(external: Sequence[ExternalLoad]) -> list[str]:
     """Return lines with the external loads, and their steps if not at all of them."""
     different = list(dict.fromkeys(external))
@@ -107,8 +162,12 @@ def _steps(steps: list[int]) -> str:
     return f", {len(steps)} of the steps"
 
 
-def _labelled(group: ColumnGroup, label: str) -> ColumnGroup:
-    """Put the label of one of several paths above its columns."""
+def _labelled(group: ColumnGroup, label: str, *, below: bool = False) -> ColumnGroup:
+    """Put the label of one of several paths above its columns, or below their heads."""
+    if below:
+        return replace(
+            group, columns=[replace(one, head=f"{one.head}\n{label}") for one in group.columns]
+        )
     several = len(group.columns) > 1
     columns = [
         replace(column, head=f"{label}\n{column.head}" if several else label)

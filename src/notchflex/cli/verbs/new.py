@@ -70,9 +70,13 @@ class Answers:
         str | None, _option(TENDONS, "Side on which each tendon runs [deg]; 0 is x.")
     ] = None
     material: Annotated[
-        str | None, _option(MATERIAL, "`superelastic`, `linear`, or another kind of material.")
+        str | None, _option(MATERIAL, "`nitinol`, `superelastic`, `linear`, or another kind.")
     ] = None
     elastic_modulus: Annotated[str | None, _option(MATERIAL, "Elastic modulus [MPa].")] = None
+    plateau_stress: Annotated[
+        str | None, _option(MATERIAL, "Stress where the plateau of nitinol begins [MPa].")
+    ] = None
+    plateau_modulus: Annotated[str | None, _option(MATERIAL, "Slope of that plateau [MPa].")] = None
     superelastic_modulus: Annotated[
         str | None, _option(MATERIAL, "Modulus of the superelastic branch [MPa].")
     ] = None

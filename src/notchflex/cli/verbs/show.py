@@ -44,14 +44,18 @@ def show(
         import numpy as np
 
         terminal.use_compile_cache()
-        from notchflex.analysis import tip_from_angles
+        from notchflex.analysis import closing, tip_from_angles
         from notchflex.analysis.notch_table import notch_table
+        from notchflex.analysis.uncertainty.closing_bands import closing_bands, closing_document
         from notchflex.results.files.json import document_head
 
         notches = notch_table(chosen)
+        wanted = outputs.prints_tables or json is not None
+        bands = closing_bands(chosen, closing(chosen)) if wanted else None
         straight = np.zeros((1, chosen.number_of_notches))
         length = float(tip_from_angles(chosen, straight)[0][0, 2])
-    outputs.write_json(lambda: {**document_head(chosen), "notches": notches})
+    more = {} if bands is None else {"tolerances": closing_document(bands)}
+    outputs.write_json(lambda: {**document_head(chosen), "notches": notches, **more})
     if plot is not None:
         from notchflex.plotting.drawings.dimensioned import save_dimensioned
 
@@ -60,3 +64,7 @@ def show(
         from notchflex.cli.tables.notch_tables import print_robot
 
         print_robot(chosen, changed_title(chosen, settings), length, notches)
+        if bands is not None:
+            from notchflex.cli.tables.tolerance_lines import closing_lines
+
+            terminal.output().print("\n" + "\n".join(closing_lines(chosen, bands)))

@@ -78,6 +78,18 @@ def simulate(
         Parameter(help="0 to 3: more strain modes in every notch, to check the accuracy."),
     ] = 0,
     settings: Settings = (),
+    uncertain: Annotated[
+        bool,
+        flag(
+            "Carry the tolerances of the robot (its [tolerance] table, else assumed ones) through "
+            "all steps: table, picture, CSV and JSON have the 5th, 50th and 95th percentile."
+        ),
+    ] = False,
+    draws: Annotated[
+        int,
+        converted(whole(2, 100_000), "N"),
+        Parameter(help="How many robots `--uncertain` draws within the tolerances."),
+    ] = 256,
     from_state: Annotated[
         str | None,
         Parameter(
@@ -153,6 +165,11 @@ def simulate(
     robots = beside_robots(chosen, robot, beside)
     if external and not tension and not stroke:
         tension = (TendonCommand("--tension", 1, [math.nan]),)  # all hang slack, in one step
+    if uncertain and (beside or from_state is not None):
+        other = "--beside" if beside else "--from-state"
+        raise InputError.CONFLICT(
+            f"--uncertain draws robots that start from rest; leave out {other}, or --uncertain."
+        )
     tensions, strokes = load_columns(tension, stroke, chosen.number_of_tendons)
     outputs = Outputs(
         [*robot_files(robot), *beside_files(beside)],
@@ -176,9 +193,30 @@ def simulate(
         start = None if from_state is None else _start(from_state)
         turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
         load = external.on(LoadPath(tensions, strokes, turn))
-        paths = _solve(robots, load, start, refinement, counted)
-    simulate_files.write(paths, outputs, title)
-    if outputs.prints_tables:
+        bands = None
+        if uncertain:
+            from notchflex import analysis
+
+            bands = analysis.uncertain(
+                chosen,
+                load,
+                outputs=analysis.band_names(shown),
+                draws=draws,
+                refinement=refinement,
+                progress=counted,
+            )
+            paths = {chosen.name: bands.path}
+        else:
+            paths = _solve(robots, load, start, refinement, counted)
+    simulate_files.write(paths, outputs, title, bands)
+    if bands is not None:
+        for sentence in bands.warnings():
+            terminal.warn(sentence)
+    if outputs.prints_tables and bands is not None:
+        from notchflex.cli.tables.path_table import print_bands
+
+        print_bands(bands, title, columns=shown, every_row=every_row)
+    elif outputs.prints_tables:
         from notchflex.cli.tables.path_table import print_beside, print_path
 
         print_path(next(iter(paths.values())), title, columns=shown, every_row=every_row)

@@ -11,7 +11,7 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
-from notchflex.robot.value_names import described_at, number_at, part_by_part
+from notchflex.robot.value_names import described_at, number_at, numbers_at
 
 _EACH_NOTCH = "[each]"
 _EACH_ROBOT = "each"
@@ -221,9 +221,8 @@ def _numbers(label: str, robot: Robot, path: str) -> tuple[Number, ...]:
     rule, number, read = _parsed(path)
     if path in _SENSOR or not rule:
         return (Number(label, number),)
-    key, other = (one.rpartition(".")[2] for one in (number, read))
-    parts = [one.rpartition(".")[0] for one in part_by_part(robot, read)]
-    values = [(f"{part}.{key}", number_at(robot, f"{part}.{other}")) for part in parts]
+    key, end = number.rpartition(".")[2], len(read.rpartition(".")[2])
+    values = [(one[:-end] + key, value) for one, value in _apart(robot, read).items()]
     if rule == _OFFSET:
         return tuple(Number(label, one, value, 1.0) for one, value in values)
     if not any(value for _, value in values):
@@ -233,6 +232,12 @@ def _numbers(label: str, robot: Robot, path: str) -> tuple[Number, ...]:
     return tuple(Number(label, one, 0.0, value) for one, value in values)
 
 
+def _apart(robot: Robot, path: str) -> dict[str, float]:
+    """The numbers that a name means, part by part where they are unlike."""
+    found = numbers_at(robot, path)
+    return found if len(set(found.values())) > 1 else {path: next(iter(found.values()))}
+
+
 def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: bool) -> Unknown:
     sets = tuple(one for label, robot in robots.items() for one in _numbers(label, robot, path))
     if path in _SENSOR:
@@ -240,8 +245,14 @@ def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: b
         upper = math.inf
     else:
         rule, number, read = _parsed(path)
-        every = [(robots[label], one) for label, one, *_ in sets]
-        here = [number_at(robot, one) for robot, ones in every for one in part_by_part(robot, ones)]
+        # Without a rule robots have one value each, alike in all their parts.
+        here = [
+            value
+            for label, one, *_ in sets
+            for value in (
+                numbers_at(robots[label], one).values() if rule else [number_at(robots[label], one)]
+            )
+        ]
         start = math.fsum(here) / len(here)
         robot = next(iter(robots.values()))
         unit, lower, upper = described_at(robot, number)

@@ -284,7 +284,9 @@ def _shaped(
     rods = dataclasses.replace(rods, start_offset=rods.start_offset + lead)
     free = jax.tree.map(lambda *leaves: np.stack(leaves)[which], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
-    ground = RoutingContext(notches, rods, free, body_length, turns_with_chord=turns_with_chord)
+    ground = RoutingContext(
+        notches, tube.outer_radius, rods, free, body_length, turns_with_chord=turns_with_chord
+    )
     directions = {notch.direction_deg: np.empty(0) for notch in notches}
     for side in directions:
         directions[side] = np.asarray(rotation_about(constant(_UP * np.radians(side))))

@@ -22,8 +22,9 @@ from notchflex.mechanics.flexure.notch_rod import (
     legendre_modes,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import rod
+from notchflex.mechanics.flexure.registry import Site, rod
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.roots import rooted_strip_rod, sharp_strip
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.robot import StripNotch, Tube
@@ -35,7 +36,17 @@ _LYING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
 @rod.register
-def _(notch: StripNotch, tube: Tube, refinement: int = 0) -> Rod:
+def _(notch: StripNotch, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
+    if site is not None:
+        return rooted_strip_rod(
+            sharp_strip(notch, tube),
+            tube,
+            notch.height + notch.rise,
+            refinement,
+            direction_deg=notch.direction_deg,
+            linear_kinematics=notch.deflection == "small",
+            poisson_ratio=site.poisson_ratio,
+        )
     return strip_rod(notch, tube, 5 + refinement, 10 + 3 * refinement, refinement)
 
 

@@ -20,8 +20,9 @@ from notchflex.mechanics.flexure.notch_rod import (
     shifted,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import rod
+from notchflex.mechanics.flexure.registry import Site, rod
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.roots import rooted_strip_rod, round_strip
 from notchflex.mechanics.flexure.u_link_geometry import Course, Link
 from notchflex.mechanics.flexure.wrench_modes import wrench_modes
 from notchflex.mechanics.material import FibreSection
@@ -35,7 +36,16 @@ POISSON_RATIO = 0.33
 
 
 @rod.register
-def _(notch: ULink, tube: Tube, refinement: int = 0) -> Rod:
+def _(notch: ULink, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
+    if site is not None:
+        return rooted_strip_rod(
+            round_strip(notch, tube),
+            tube,
+            notch.height,
+            refinement,
+            direction_deg=notch.direction_deg,
+            poisson_ratio=site.poisson_ratio,
+        )
     more = (3 + 3 * refinement, 1 + 2 * refinement, (6 + 3 * refinement, 6 + 3 * refinement))
     return u_link_rod(notch, tube, *more)
 

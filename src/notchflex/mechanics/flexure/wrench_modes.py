@@ -93,4 +93,9 @@ def _compliance(section: FibreSection, poisson_ratio: float) -> Float[np.ndarray
         section.area / ratio,
         section.area,
     ]
-    return 1.0 / np.stack([np.asarray(one) for one in stiffness], axis=-1)
+    compliance = 1.0 / np.stack([np.asarray(one) for one in stiffness], axis=-1)
+    if (ends := section.ends) is None:
+        return compliance
+    none = np.zeros_like(ends.weak)
+    added = (ends.strong, ends.weak, ends.torsion, none, ends.sway, ends.axial)
+    return compliance * (1.0 + np.stack(added, axis=-1))

@@ -24,6 +24,7 @@ class NotchEnds(Pytree):
             axis (positive closes), mm.
         even: Its even part, mm^2.
         material_share: Share of `weak` that follows the material; the rest stays elastic.
+        sway: In shear sideways.
     """
 
     weak: Float[Array, "*shape"]
@@ -33,15 +34,20 @@ class NotchEnds(Pytree):
     odd: Float[Array, "*shape"]
     even: Float[Array, "*shape"]
     material_share: Float[Array, "*shape"]
+    sway: Float[Array, "*shape"] | float = 0.0
 
     @classmethod
     def rigid(cls, like: Float[Array, "*shape"]) -> NotchEnds:
         """Return ends that add nothing, in the shape of an array."""
-        return cls(*(np.zeros(np.shape(like)) for _ in range(7)))  # pyright: ignore
+        return cls(*(np.zeros(np.shape(like)) for _ in range(8)))  # pyright: ignore
 
     def flattening(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
         """By how much the distances of the fibres shrink at a curvature: q."""
         return 1.0 + curvature * (self.odd + curvature * self.even)
+
+    def slope_factor(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
+        """Tangent of an elastic notch over its stiffness at rest, times q^3; 0 at limit points."""
+        return 1.0 - curvature * (self.odd + 3.0 * curvature * self.even)
 
 
 class Fibres(Pytree):

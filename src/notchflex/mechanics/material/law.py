@@ -258,6 +258,8 @@ def elastic_resultants(
     free_twist = twist if ends is None else twist / (1.0 + ends.torsion)
     shear = shear_modulus * section.area
     across = shear * (along_y - section.shear_centre * twist)
+    if ends is not None:
+        across = across / (1.0 + ends.sway)
     resultants = [
         elastic_modulus * section.second_moment_strong * about_x,
         elastic_modulus * section.second_moment_weak * about_y,

@@ -40,7 +40,11 @@ class Passage(NamedTuple):
 
 
 def passage(
-    notches: Sequence[Notch], body_length: Float[Array, " bodies"], direction_deg: float
+    notches: Sequence[Notch],
+    body_length: Float[Array, " bodies"],
+    direction_deg: float,
+    outer_radius: float = 0.0,
+    radius: float | None = None,
 ) -> Passage:
     """Follow a line along the wall.
 
@@ -48,6 +52,9 @@ def passage(
         notches: Every notch, base to tip.
         body_length: Length of the rigid pieces on the tube axis, base first, mm.
         direction_deg: Side of the tube.
+        outer_radius: Outer radius of the tube, mm, for a line inside the wall.
+        radius: Distance of the line from the tube axis, mm; None for one on the outer surface, in
+            the middle of the openings.
     """
     count = len(notches)
     visits, on_side, left, enters = (np.zeros(count) for _ in range(4))
@@ -55,9 +62,12 @@ def passage(
     leaves = np.array(body_length, float)
     last = 0
     for body, opening in openings_along(notches, direction_deg):
-        visits[body - 1], enters[body - 1] = 1.0, opening.enters
+        inside = 0.0
+        if radius is not None:
+            inside = opening.inside(direction_deg, outer_radius, radius)
+        visits[body - 1], enters[body - 1] = 1.0, opening.enters + inside * opening.enters_rise
         on_side[body - 1] = opening.faces(direction_deg)
-        leaves[last] += opening.leaves
+        leaves[last] += opening.leaves + inside * opening.leaves_rise
         back[body - 1], left[body - 1] = body - last, leaves[last]
         last = body
     return Passage(visits, on_side, back, left, enters, leaves[1:], leaves[0])
@@ -67,7 +77,13 @@ def passages(
     notches: Sequence[Notch],
     body_length: Float[Array, " bodies"],
     directions_deg: Sequence[float],
+    outer_radius: float = 0.0,
+    radii: Sequence[float] | None = None,
 ) -> Passage:
     """Follow several lines; they are the last axis."""
-    lines = [passage(notches, body_length, direction) for direction in directions_deg]
+    distances = [None] * len(directions_deg) if radii is None else radii
+    lines = [
+        passage(notches, body_length, direction, outer_radius, radius)
+        for direction, radius in zip(directions_deg, distances, strict=True)
+    ]
     return Passage(*(np.stack(values, axis=-1) for values in zip(*lines, strict=True)))

@@ -27,6 +27,7 @@ class RoutingContext(NamedTuple):
 
     Attributes:
         notches: Every notch, base to tip.
+        outer_radius: Outer radius of the tube, mm.
         rods: All flexures of the chain.
         free: Relative poses of all flexures in the free robot.
         body_length: Length of the rigid pieces on the tube axis, base first, mm.
@@ -34,6 +35,7 @@ class RoutingContext(NamedTuple):
     """
 
     notches: Sequence[Notch]
+    outer_radius: float
     rods: Rod
     free: Motion
     body_length: Float[Array, " bodies"]
@@ -61,7 +63,11 @@ def route(tendons: Sequence[Tendon], ground: RoutingContext) -> RoutedTendons:
         InputError: A tendon ends in a body that has no wall on its side.
     """
     line = passages(
-        ground.notches, ground.body_length, [tendon.direction_deg for tendon in tendons]
+        ground.notches,
+        ground.body_length,
+        [tendon.direction_deg for tendon in tendons],
+        ground.outer_radius,
+        [tendon.radius for tendon in tendons],
     )
     groups: list[TendonGroup] = []
     for path in ("wall-arc", *_PULLS):

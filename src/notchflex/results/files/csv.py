@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -35,13 +35,20 @@ def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
     return columns
 
 
-def write_path_csv(target: str | FilePath, path: EquilibriumPath) -> None:
+def write_path_csv(
+    target: str | FilePath, path: EquilibriumPath, more: Mapping[str, Sequence[Any]] | None = None
+) -> None:
     """Write a path as CSV to a file, whole or not at all, or to standard output for `-`.
+
+    Args:
+        target: Path, or `-` for standard output.
+        path: The path.
+        more: Further columns behind those of the path, a value per step.
 
     Raises:
         InputError: The file cannot be written.
     """
-    columns = path_columns(path)
+    columns = {**path_columns(path), **(more or {})}
     write_csv(target, list(columns), zip(*columns.values(), strict=True))
 
 

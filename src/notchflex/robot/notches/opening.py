@@ -16,6 +16,9 @@ class Opening(NamedTuple):
             edge here [mm]; the nominal face is `Notch.spacing` beyond the body's origin, and
             `Tube.base_length` for the base.
         enters: How far beyond its origin the body behind the notch has its edge here [mm].
+        leaves_rise: How much farther the first of these edges lies for each mm that it lies inside
+            the outer surface, across the tube: the edge of a triangular notch leans.
+        enters_rise: The same of the second edge.
 
     Example:
         >>> Opening(90.0, 0.0, 0.0).admits(60.0), Opening(90.0, 0.0, 0.0).admits(-60.0)
@@ -25,12 +28,26 @@ class Opening(NamedTuple):
     side_deg: float | None
     leaves: float
     enters: float
+    leaves_rise: float = 0.0
+    enters_rise: float = 0.0
 
     def admits(self, direction_deg: float) -> bool:
         """Tell whether a tendon on this side of the tube [deg] comes through."""
         if self.side_deg is None:
             return True
         return math.cos(math.radians(direction_deg - self.side_deg)) > 0.0
+
+    def inside(self, direction_deg: float, outer_radius: float, radius: float) -> float:
+        """Return how far inside the outer surface a line lies, across the tube [mm].
+
+        Args:
+            direction_deg: Side of the tube on which the line runs [deg].
+            outer_radius: Outer radius of the tube [mm].
+            radius: Distance of the line from the tube axis [mm].
+        """
+        if self.side_deg is None:
+            return outer_radius - radius
+        return outer_radius - radius * math.cos(math.radians(direction_deg - self.side_deg))
 
     def faces(self, direction_deg: float) -> bool:
         """Tell whether this side of the tube [deg] is the middle of the opening."""

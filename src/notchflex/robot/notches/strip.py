@@ -25,6 +25,10 @@ class StripNotch(Notch):
     The pair looks the same after half a turn about the middle of the strip, so that a cable on the
     other side bends it back as easily.
 
+    With elastic ends the strip is that of the drawing: as long as the cuts overlap, as wide as the
+    wall, with the walls that it turns into.  Its lower face then lies `height` above the proximal
+    face, and a tendon leaves the bodies at the leaning edges of the notches.
+
     Args:
         height: Opening of a notch along the tube at the outer surface [mm]; Liu's H.
         strip_thickness: Thickness of the strip along the tube [mm]; Liu's h.
@@ -34,6 +38,9 @@ class StripNotch(Notch):
         wall_width: Width of both walls of the strip together [mm]; None is D - d.  With the
             thickness h its second moment of area is wall_width h^3 / 12.
         deflection: "large" (elastica) or "small" (linear beam, Liu's model for comparison).
+        ends: "rigid" (the paper's beam, clamped in rigid bodies) or "elastic" (the strip of the
+            drawing and the walls beside it, checked against finite elements); `strip_length` is
+            for rigid ends alone.
         uncut_length: Uncut length behind the pair, toward the tip [mm].
         direction_deg: Side toward which it bends [deg]: that of the pulled cable.
         precurvature_deg: 0; a strip is straight when nothing pulls.
@@ -69,9 +76,21 @@ class StripNotch(Notch):
     ] = "large"
     _: KW_ONLY
     kind: Literal["strip"] = "strip"
+    ends: Annotated[
+        Literal["rigid", "elastic"],
+        Field(
+            description='"rigid" (the beam of strip_length, clamped in rigid bodies) or "elastic" '
+            "(the strip where the cuts overlap, and the walls beside it, from the drawing)"
+        ),
+    ] = "rigid"
     uncut_length: Annotated[
         Float, quantity("mm", "uncut length behind the pair, toward the tip", at_least=0)
     ] = 0.0
+
+    @property
+    def has_elastic_ends(self) -> bool:
+        """Whether its stiffness depends on the walls beside it."""
+        return self.ends == "elastic"
 
     def strip_length_in(self, tube: Tube) -> float:
         """Return the length of the strip, by default that between cables in mid-wall [mm]."""
@@ -142,12 +161,22 @@ class StripNotch(Notch):
         of the tube.
         """
         del following
-        return self.strip_thickness + self.uncut_length
+        return self.strip_thickness - self.rise + self.uncut_length
+
+    @property
+    def rise(self) -> float:
+        """Height of the body's origin above the strip's lower face [mm].
+
+        The paper's beam has no thickness where it is clamped.
+        """
+        return 0.5 * self.strip_thickness if self.has_elastic_ends else 0.0
 
     def openings(self, before: Notch | None, after: Notch | None) -> tuple[Opening, ...]:
         """Return the notch below the strip and, on the other side, the one above it."""
         del before, after
+        up, rise = self.height, self.rise
+        lean = self.height / self.depth if self.has_elastic_ends else 0.0
         return (
-            Opening(self.direction_deg, 0.0, 0.0),
-            Opening(self.direction_deg + 180.0, self.height, self.height),
+            Opening(self.direction_deg, 0.0, -rise, leaves_rise=lean),
+            Opening(self.direction_deg + 180.0, up + 2.0 * rise, up + rise, enters_rise=-lean),
         )

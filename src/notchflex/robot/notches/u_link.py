@@ -34,6 +34,8 @@ class ULink(Notch):
         proximal_slot: Side from which the slot on the base side of the (first) strip is cut:
             "toward" is the side toward which the link bends, "away" the opposite one.  In a
             repeated row the sides alternate.
+        ends: "rigid" (the paper's strip with two curved ends) or "elastic" (the strip and the walls
+            that it turns into, checked against finite elements).
         uncut_length: Uncut length beyond the last slot of the row, toward the tip [mm]; links that
             another one follows do without.
         direction_deg: Side toward which a positive angle bends the link [deg].
@@ -67,9 +69,21 @@ class ULink(Notch):
     ]
     _: KW_ONLY
     kind: Literal["u-link"] = "u-link"
+    ends: Annotated[
+        Literal["rigid", "elastic"],
+        Field(
+            description='"rigid" (the strip with two curved ends of the paper) or "elastic" (the '
+            "strip and the walls that it turns into, from the drawing)"
+        ),
+    ] = "rigid"
     uncut_length: Annotated[
         Float, quantity("mm", "uncut length beyond the last slot of the row", at_least=0)
     ] = 0.0
+
+    @property
+    def has_elastic_ends(self) -> bool:
+        """Whether its stiffness depends on the walls beside it."""
+        return self.ends == "elastic"
 
     @property
     def slots(self) -> int:

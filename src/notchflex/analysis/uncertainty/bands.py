@@ -1,0 +1,246 @@
+"""Bands of a prediction: tolerances of a robot carried through a path of loads by one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from notchflex._quantity import REGISTERED
+from notchflex._summary import Displayed, Summary, course
+from notchflex.analysis.batch import simulate_batch
+from notchflex.analysis.outputs import OUTPUTS, check_outputs
+from notchflex.analysis.solve import simulate
+from notchflex.analysis.uncertainty.assumed import tolerances_of
+from notchflex.analysis.uncertainty.draws import draw_robots
+from notchflex.errors import InputError
+from notchflex.loads import Load, LoadPath
+from notchflex.loads.validation import check_integer, check_is_robot
+from notchflex.results.path import EquilibriumPath
+from notchflex.results.quantities.registry import QUANTITIES, holds
+from notchflex.robot import Robot
+from notchflex.robot.tolerance import Tolerance
+from notchflex.solver.newton import Settings
+
+LEVELS = (0.05, 0.50, 0.95)
+"""The parts of all draws that lie below the low end, the middle and the high end of a band."""
+
+DRAWS = 256
+
+USUAL = ("total_angle", "tip_position", "notch_angle", "peak_strain", "tension", "stroke")
+
+
+@dataclass(frozen=True)
+class Band:
+    """The 5th, 50th and 95th percentile of a quantity, in the shape that a path has it.
+
+    Attributes:
+        low: 5 % of the draws lie below.
+        median: Half of the draws lie below.
+        high: 95 % of the draws lie below.
+    """
+
+    low: Float[np.ndarray, "s ..."]
+    median: Float[np.ndarray, "s ..."]
+    high: Float[np.ndarray, "s ..."]
+
+
+@dataclass(frozen=True, repr=False)
+class Bands(Displayed, Mapping[str, Band]):
+    """Bands by name of the quantity, in the units of `EquilibriumPath` (mm, N, rad).
+
+    Attributes:
+        path: The robot of the drawing under the same loads, S steps.
+        tolerances: What deviated.
+        assumed: Names of the values whose tolerance the robot does not give.
+        samples: The quantities of every draw, (draws, S, ...); NaN where it did not converge.
+        drawn: The numbers of the drawn robots by name, (draws,).
+        converged: How many draws converged, step by step.
+        redrawn: How many draws made no valid robot and were drawn again.
+        seed: Of the draws.
+    """
+
+    path: EquilibriumPath
+    tolerances: tuple[Tolerance, ...]
+    assumed: tuple[str, ...]
+    samples: Mapping[str, Float[np.ndarray, "draws s ..."]]
+    drawn: Mapping[str, Float[np.ndarray, " draws"]]
+    converged: Int[np.ndarray, " s"]
+    redrawn: int
+    seed: int
+
+    def __getitem__(self, name: str) -> Band:
+        """The band of a quantity."""
+        return self._found[name]
+
+    @cached_property
+    def _found(self) -> dict[str, Band]:
+        return {name: band(samples) for name, samples in self.samples.items()}
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of the quantities."""
+        return iter(self.samples)
+
+    def __len__(self) -> int:
+        """How many quantities there are."""
+        return len(self.samples)
+
+    @property
+    def draws(self) -> int:
+        """How many robots were drawn."""
+        return len(next(iter(self.samples.values())))
+
+    def end(self, name: str) -> EquilibriumPath:
+        """Return one end of the bands as tables and files read a path.
+
+        Args:
+            name: "low", "median" or "high".
+
+        Returns:
+            What has the quantities of a path: those with a band at that end, others as they are.
+        """
+        return cast("EquilibriumPath", _End(self, name))
+
+    def warnings(self) -> list[str]:
+        """Return a sentence for each thing that makes the bands less than they seem."""
+        found: list[str] = []
+        failed = np.flatnonzero(self.converged < self.draws)
+        if len(failed):
+            least = int(self.converged.min())
+            found.append(
+                f"{self.draws - least} of {self.draws} draws did not converge, the first at step "
+                f"{failed[0] + 1}: from there on the bands leave them out, and may be too narrow."
+            )
+        if self.redrawn:
+            found.append(
+                f"{self.redrawn} of {self.draws} draws made no valid robot and were drawn again: "
+                "the tolerances reach beyond what the tube allows."
+            )
+        return found
+
+    def _summary(self) -> Summary:
+        rows: list[tuple[str, str]] = []
+        for name in ("total_angle", "notch_angle", "tension"):
+            quantity = QUANTITIES[name]
+            if name in self and self.samples[name].ndim == 2:
+                one = self[name]
+                low, high = (course(end * quantity.scale) for end in (one.low, one.high))
+                rows.append((quantity.title, f"{low} {quantity.unit}; {high} {quantity.unit}"))
+        rows.append(("bands of", ", ".join(self)))
+        rows.append(("assumed", ", ".join(self.assumed) or "nothing"))
+        title = f"Bands of {self.draws} draws over {len(self.path)} steps, 5 to 95 %"
+        return Summary(title, rows, '["total_angle"].low, .median, .high; nf.plot(it) draws them')
+
+
+class _End:
+    """One end of bands, in place of a path."""
+
+    def __init__(self, bands: Bands, end: str) -> None:
+        self._bands, self._end = bands, end
+        self.converged = bands.converged > 0
+        self.closed = np.zeros_like(bands.path.closed)  # which differs from draw to draw
+
+    def __getattr__(self, name: str) -> Any:
+        bands = self._bands
+        return getattr(bands[name], self._end) if name in bands else getattr(bands.path, name)
+
+
+def band(samples: Float[np.ndarray, "draws ..."]) -> Band:
+    """Return the percentiles of samples along the first axis; NaN are left out."""
+    with np.errstate(invalid="ignore"):
+        empty = np.isnan(samples).all(axis=0)
+        low, median, high = np.nanquantile(np.where(empty, 0.0, samples), LEVELS, axis=0)
+    return Band(*(np.where(empty, np.nan, one) for one in (low, median, high)))
+
+
+def uncertain(
+    robot: Robot,
+    loads: Load | LoadPath | Iterable[Load],
+    tolerances: Mapping[str, Any] | None = None,
+    *,
+    outputs: Sequence[str] | None = None,
+    draws: int = DRAWS,
+    seed: int = 0,
+    settings: Settings | None = None,
+    refinement: int = 0,
+    cores: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Bands:
+    """Follow loads with robots drawn within tolerances: how far the real robot may lie off.
+
+    Every draw follows all loads with its own friction history.
+
+    Args:
+        robot: The robot of the drawing.
+        loads: As for `simulate`.
+        tolerances: What deviates and how far, as in the `[tolerance]` table of a robot file, such
+            as `{"notch.depth": 0.01, "material.elastic_modulus": "5 %"}`, and nothing else. None
+            takes the table of the robot, and assumes the rest.
+        outputs: Names of quantities of `EquilibriumPath`; None for angles, tip, strains, tensions
+            and strokes. Only numbers have bands.
+        draws: How many robots are drawn, as a Latin hypercube; 2 or more.
+        seed: The same seed makes the same robots.
+        settings: Tolerance and limits of the solver.
+        refinement: More strain modes, as for `simulate`.
+        cores: As for `simulate_batch`.
+        progress: Called with the draws done and all of them.
+
+    Returns:
+        The bands, by name of the quantity.
+
+    Raises:
+        InputError: Invalid loads or tolerances, no such output, or no valid robot within the
+            tolerances.
+
+    Example:
+        >>> from notchflex import load_robot, pull
+        >>> bands = uncertain(load_robot("pacheco2021-a"), pull(0.0, 1.0, steps=3))
+        >>> angle = bands["total_angle"]
+        >>> bool(angle.low[2] < bands.path.total_angle[2] < angle.high[2])
+        True
+    """
+    check_is_robot(robot)
+    if check_integer(draws, "draws") < 2:
+        raise InputError.OUT_OF_RANGE(f"draws must be 2 or more; got {draws}")
+    if tolerances is None:
+        chosen, assumed = tolerances_of(robot)
+    else:
+        chosen, assumed = robot.replace(tolerance=tolerances).tolerance, ()
+    path = simulate(robot, loads, settings=settings, refinement=refinement)
+    asked = check_outputs(USUAL if outputs is None else outputs)
+    names = [name for name in asked if _has_band(name) and holds(path, QUANTITIES[name])]
+    drawn = draw_robots(robot, chosen, draws, check_integer(seed, "seed"))
+    found = simulate_batch(
+        drawn.robots,
+        path.load,
+        outputs=(*names, "converged"),
+        settings=settings,
+        refinement=refinement,
+        cores=cores,
+        progress=progress,
+    )
+    good = found["converged"]
+    turn = path.base_to_world
+    samples: dict[str, np.ndarray] = {}
+    for name in names:
+        values = found[name] if turn is None else REGISTERED[name].turned(found[name], turn)
+        there = good.reshape(good.shape + (1,) * (values.ndim - 2))
+        samples[name] = np.where(there, values, np.nan)
+    return Bands(
+        path, chosen, assumed, samples, drawn.values, good.sum(axis=0), drawn.redrawn, seed
+    )
+
+
+def band_names(more: Iterable[str]) -> list[str]:
+    """Return the names of the usual bands and of further quantities that can have one."""
+    return [*dict.fromkeys([*USUAL, *(name for name in more if _has_band(name))])]
+
+
+def _has_band(name: str) -> bool:
+    """Whether a quantity is a number, or some, that a batch returns."""
+    quantity = REGISTERED[name]
+    return name in OUTPUTS and quantity.kind is float and "row" not in quantity.per

@@ -1,0 +1,157 @@
+"""How far tolerances move the closing of notches, and what 10 µm of depth do."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from notchflex.analysis.batch import solve_batch
+from notchflex.analysis.closing_loads.closing import Closing
+from notchflex.analysis.uncertainty.bands import Band, Bands, band, uncertain
+from notchflex.errors import InputError
+from notchflex.loads import LoadPath
+from notchflex.results.quantities.registry import DEGREES
+from notchflex.robot import Robot
+from notchflex.robot.value_names import numbers_at
+
+DEPTH = 0.010
+"""The change of depth whose effect is told, mm."""
+
+_DRAWS, _STEPS, _BEYOND = 128, 32, 1.6
+_NEVER = 1e12
+
+
+class ClosingBands(NamedTuple):
+    """What `notchflex show` says of tolerances.
+
+    Attributes:
+        bands: The bands that the others were taken from.
+        notches: Numbers of the notches, from 1, that the tendon closes that closes one first.
+        tension: Tension that closes each of them, N, (n,); infinite beyond 1.6 times the tension
+            that closes all of the robot of the drawing.
+        angle: Angle at which it closes, rad, (n,).
+        load: Half the tension that closes the first notch, N.
+        tendon: That tendon, from 1.
+        total_angle: Total angle at that load, rad.
+        by_depth: Change of the total angle at that load if all notches are cut 10 µm deeper, rad;
+            NaN for notches without a depth.
+    """
+
+    bands: Bands
+    notches: Int[np.ndarray, " n"]
+    tension: Band
+    angle: Band
+    load: float
+    tendon: int
+    total_angle: Band
+    by_depth: float
+
+
+def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
+    """Carry the tolerances of a robot to the closing of its notches.
+
+    Args:
+        robot: The robot, n notches.
+        table: What `closing` returned of it.
+
+    Returns:
+        The bands; None where no notch closes.
+    """
+    if not np.isfinite(table.tension).any():
+        return None
+    first = int(np.nanargmin(table.tension))
+    tendon = int(table.tendon[first])
+    own = np.flatnonzero(np.isfinite(table.tension) & (table.tendon == tendon))
+    load = 0.5 * float(table.tension[first])
+    loads = np.linspace(0.0, _BEYOND * table.tension[own].max(), _STEPS)
+    loads = np.sort(np.append(loads, load))
+    names = ("total_angle", "notch_angle", "gap", "contact_force")
+    found = uncertain(robot, _pull(robot, tendon, loads), outputs=names, draws=_DRAWS)
+    gaps, forces = (found.samples[name][:, :, own] for name in ("gap", "contact_force"))
+    stiffness = np.asarray(found.path.chain.contact_stiffness)[own]
+    angles = found.samples["notch_angle"][:, :, own]
+    tension, angle = _closing(loads, gaps, forces > gaps * stiffness, angles)
+    total = band(found.samples["total_angle"][:, np.searchsorted(loads, load)])
+    by_depth = _by_depth(robot, _pull(robot, tendon, np.array([load])))
+    closing = _with_never(tension), band(angle)
+    return ClosingBands(found, own + 1, *closing, load, tendon, total, by_depth)
+
+
+def _with_never(tension: Float[np.ndarray, "d n"]) -> Band:
+    """Return the band of tensions of which some are infinite."""
+    one = band(np.minimum(tension, _NEVER))
+    ends = (one.low, one.median, one.high)
+    return Band(*(np.where(end < _NEVER, end, np.inf) for end in ends))
+
+
+def closing_document(found: ClosingBands) -> dict[str, Any]:
+    """Return what `notchflex show --json` says of tolerances, at the edge units."""
+    return {
+        "draws": found.bands.draws,
+        "tolerances": {one.value: one.written for one in found.bands.tolerances},
+        "assumed": list(found.bands.assumed),
+        "tendon": found.tendon,
+        "notches": found.notches,
+        "closing_tension_N": _ends(found.tension),
+        "closing_angle_deg": _ends(found.angle, DEGREES),
+        "load_N": found.load,
+        "total_angle_deg": _ends(found.total_angle, DEGREES),
+        "total_angle_deg_by_10um_depth": found.by_depth * DEGREES,
+    }
+
+
+def _ends(one: Band, scale: float = 1.0) -> dict[str, Any]:
+    ends = {"low": one.low, "median": one.median, "high": one.high}
+    return {name: np.where(np.isfinite(end), end * scale, np.nan) for name, end in ends.items()}
+
+
+def _pull(robot: Robot, tendon: int, loads: Float[np.ndarray, " s"]) -> LoadPath:
+    """Pull one tendon (from 1), the others slack."""
+    tensions = np.zeros((len(loads), robot.number_of_tendons))
+    tensions[:, tendon - 1] = loads
+    return LoadPath(tension=tensions, stroke=np.full_like(tensions, np.nan))
+
+
+def _closing(
+    loads: Float[np.ndarray, " s"],
+    gaps: Float[np.ndarray, "d s n"],
+    closed: Bool[np.ndarray, "d s n"],
+    angles: Float[np.ndarray, "d s n"],
+) -> tuple[Float[np.ndarray, "d n"], Float[np.ndarray, "d n"]]:
+    """Tension and angle at which each notch of each draw closes.
+
+    The gap falls almost evenly until it is closed and stands still then, so the last two open
+    steps are continued.
+    """
+    step = np.argmax(closed, axis=1)[:, None]
+    near, far = (
+        np.take_along_axis(gaps, np.maximum(step - back, 0), axis=1)[:, 0] for back in (1, 2)
+    )
+    step = step[:, 0]
+    before, after = loads[np.maximum(step - 1, 0)], loads[step]
+    earlier = loads[np.maximum(step - 2, 0)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        onward = before + near * (before - earlier) / (far - near)
+    tension = np.where(step > 1, np.clip(onward, before, after), 0.5 * (before + after))
+    angle = np.take_along_axis(angles, step[:, None], axis=1)[:, 0]
+    there = closed.any(axis=1)
+    failed = np.isnan(gaps).any(axis=1)
+    never = np.where(failed, np.nan, np.inf)
+    return np.where(there, tension, never), np.where(there, angle, np.nan)
+
+
+def _by_depth(robot: Robot, load: LoadPath) -> float:
+    """Return the change of the total angle for each 10 µm of depth, by a central difference."""
+    exact = robot.replace(tolerance=None)
+    try:
+        depths = numbers_at(robot, "notch.depth")
+        both = [
+            exact.with_values({name: depth + sign * DEPTH for name, depth in depths.items()})
+            for sign in (1.0, -1.0)
+        ]
+    except InputError:  # no depth, or a spine thinner than that
+        return float("nan")
+    deeper, shallower = solve_batch(both, load, outputs=("total_angle",))["total_angle"]
+    return 0.5 * float(deeper - shallower)

@@ -1,0 +1,251 @@
+"""Bands: tolerances carried through the solver, against derivatives and closed forms."""
+
+import numpy as np
+import pytest
+from scipy.special import ndtri
+
+import notchflex as nf
+from notchflex.analysis.uncertainty.assumed import tolerances_of
+from notchflex.analysis.uncertainty.closing_bands import closing_bands
+from notchflex.plotting import picture
+from notchflex.plotting.sheet import Area
+from notchflex.robot import from_table, to_table
+from notchflex.robot.kinds import Material, kinds_of
+from notchflex.robot.tolerance import amount
+from notchflex.robot.value_names import number_at
+
+# Of a normal distribution, 5 % lie below minus this many standard deviations.
+Z = -float(ndtri(0.05))
+
+
+@pytest.fixture(scope="module")
+def linear(wrist: nf.Robot) -> nf.Robot:
+    """Wrist A with a linear material."""
+    return wrist.replace(material=nf.Linear(10_000.0))
+
+
+def test_small_tolerances_add_as_squares(linear: nf.Robot, margin):
+    """Against the root of the sum of squares, by differences of single solves."""
+    sizes = {
+        "notch.depth": 5e-4,
+        "notch.height": 2e-3,
+        "tube.inner_diameter": 1e-3,
+        "material.elastic_modulus": 40.0,
+        "friction.coefficient": 1e-3,
+    }
+    load = nf.Load(tension=1.0)
+
+    def angle(**changed: float) -> float:
+        return float(nf.solve(linear.with_values(changed), load).total_angle)
+
+    squares = 0.0
+    for name, sd in sizes.items():
+        value = number_at(linear, name)
+        squares += (0.5 * (angle(**{name: value + sd}) - angle(**{name: value - sd}))) ** 2
+    bands = nf.uncertain(linear, load, sizes, outputs=("total_angle",), draws=2048)
+    one = bands["total_angle"]
+    half = 0.5 * (one.high[0] - one.low[0])
+    margin.within("half width", half / (Z * np.sqrt(squares)) - 1.0, 0.03, "of it")
+    middle = one.median[0] - angle()
+    margin.within("median", middle / half, 0.05, "of the half width")
+    spread = np.std(bands.samples["total_angle"][:, 0])
+    margin.within("standard deviation", spread / np.sqrt(squares) - 1.0, 0.005, "of it")
+    assert bands.assumed == ()
+    assert bands.warnings() == []
+
+
+def test_depth_alone_is_the_section_at_its_percentiles(linear: nf.Robot, margin):
+    """One notch under a small tension: the angle is F (r + y) h / (E I(g))."""
+    notch = nf.ArcNotch("on-axis", depth=1.40, height=0.8, uncut_length=1.2)
+    robot = linear.replace(notch=(notch,), friction=nf.Frictionless(), tendon=(nf.Tendon(0.70),))
+    tension, sd = 1e-4, 0.01
+    bands = nf.uncertain(
+        robot, nf.Load(tension=tension), {"notch.depth": sd}, outputs=("notch_angle",), draws=1000
+    )
+    one = bands["notch_angle"]
+    for end, shift in ((one.low, -Z), (one.median, 0.0), (one.high, Z)):
+        left = nf.annular_sector(0.81, 0.70, 1.40 + shift * sd)
+        arm = 0.70 + float(left.centroid)
+        wanted = tension * arm * 0.8 / (10_000.0 * float(left.second_moment_weak))
+        margin.within("angle", float(end[0, 0]) / wanted - 1.0, 0.002, "of it")
+
+
+def test_uniform_tolerances_stay_between_their_limits(linear: nf.Robot):
+    sizes = {"notch.depth": {"plus": 0.01, "minus": 0.02}, "tube.inner_diameter": {"sd": 0.01}}
+    sizes["material.elastic_modulus"] = {"sd": "10 %", "plus": "5 %", "minus": "5 %"}
+    bands = nf.uncertain(linear, nf.Load(tension=0.1), sizes, draws=200)
+    depth = bands.drawn["notch.depth"]
+    assert 1.38 <= depth.min() < 1.3802
+    assert 1.4098 < depth.max() <= 1.41
+    assert np.median(depth) == pytest.approx(1.395, abs=2e-4)
+    modulus = bands.drawn["material.elastic_modulus"]
+    assert 9_500.0 <= modulus.min() < 9_520.0
+    assert 10_480.0 < modulus.max() <= 10_500.0
+    assert np.std(bands.drawn["tube.inner_diameter"]) == pytest.approx(0.01, rel=0.02)
+
+
+def test_every_draw_has_its_own_history(wrist: nf.Robot, margin):
+    load = nf.pull(0.0, 2.0, steps=5).release()
+    bands = nf.uncertain(wrist, load, {"notch.depth": 0.01, "friction.coefficient": 0.02}, draws=9)
+    assert bands.converged.tolist() == [9] * len(load)
+    for draw in (0, 5):
+        values = {name: float(numbers[draw]) for name, numbers in bands.drawn.items()}
+        alone = nf.simulate(wrist.with_values(values), load)
+        for name in ("total_angle", "stroke", "peak_strain"):
+            margin.within(name, bands.samples[name][draw] - getattr(alone, name), 1e-11)
+    one = bands["total_angle"]
+    assert one.low[2] < bands.path.total_angle[2] < one.high[2]
+    assert one.median[7] > one.median[2]  # unloading at the same tension
+
+
+def test_notches_of_their_own_average_out(linear: nf.Robot):
+    load = nf.Load(tension=0.5)
+    common = nf.uncertain(linear, load, {"notch.depth": 0.01}, draws=400)
+    own = nf.uncertain(linear, load, {"notch.depth": {"sd": 0.01, "per_notch": True}}, draws=400)
+    assert list(own.drawn) == [f"notch[{number}].depth" for number in range(1, 6)]
+    wide, narrow = (np.std(one.samples["total_angle"]) for one in (common, own))
+    assert wide / narrow == pytest.approx(np.sqrt(5.0), rel=0.08)
+
+
+def test_one_notch_replaces_what_holds_for_all(wrist: nf.Robot):
+    sizes = {"notch[3].depth": 0.0, "notch.depth": 0.01}
+    bands = nf.uncertain(nf.load_robot("pacheco2021-c"), nf.Load(tension=0.3), sizes, draws=20)
+    assert np.ptp(bands.drawn["notch[3].depth"]) == 0.0
+    # Unlike depths get the same deviation.
+    change = bands.drawn["notch[2].depth"] - bands.drawn["notch[1].depth"]
+    np.testing.assert_allclose(change, 0.03, atol=1e-12)
+
+
+def test_the_same_seed_draws_the_same_robots(wrist: nf.Robot):
+    load = nf.Load(tension=1.0)
+    first, again, other = (nf.uncertain(wrist, load, draws=16, seed=seed) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(first.samples["tip_position"], again.samples["tip_position"])
+    assert (first.samples["tip_position"] != other.samples["tip_position"]).any()
+
+
+def test_draws_that_fail_are_counted_and_told(wrist: nf.Robot):
+    """A stroke that closes every notch of some draws, and then cannot go further."""
+    bands = nf.uncertain(
+        wrist, nf.stroke_path(0.0, 3.68, steps=4), {"notch.height": 0.02}, draws=40
+    )
+    assert bands.path.converged.all()
+    assert bands.converged[:-1].tolist() == [40, 40, 40]
+    assert 0 < bands.converged[-1] < 40
+    (sentence,) = bands.warnings()
+    assert f"{40 - bands.converged[-1]} of 40 draws did not converge" in sentence
+    failed = np.isnan(bands.samples["total_angle"][:, -1])
+    assert failed.sum() == 40 - bands.converged[-1]
+    assert np.isfinite(bands["total_angle"].high).all()
+
+
+def test_draws_without_a_valid_robot_are_drawn_again_and_told(wrist: nf.Robot):
+    deep = wrist.with_value("notch.depth", 1.58)
+    bands = nf.uncertain(deep, nf.Load(tension=1e-3), {"notch.depth": 0.03}, draws=64)
+    assert bands.redrawn > 0
+    assert bands.drawn["notch.depth"].max() < 1.62
+    assert len(bands.drawn["notch.depth"]) == 64
+    assert f"{bands.redrawn} of 64 draws made no valid robot" in bands.warnings()[0]
+
+
+def test_a_turned_base_turns_the_band_of_the_tip(wrist: nf.Robot, margin):
+    turned = nf.Load(tension=1.0, base_rotation=(0.0, np.pi / 2, 0.0))
+    sizes = {"notch.depth": 0.01}
+    tip = nf.uncertain(wrist, nf.Load(tension=1.0), sizes, draws=8).samples["tip_position"]
+    world = nf.uncertain(wrist, turned, sizes, draws=8).samples["tip_position"]
+    assert np.ptp(world[..., 0]) > 0.01
+    margin.within("tip", world[..., 0] - tip[..., 2], 1e-12, "mm")
+
+
+def test_the_file_replaces_what_is_assumed(wrist: nf.Robot):
+    chosen, assumed = tolerances_of(wrist)
+    assert assumed == (
+        "notch.depth",
+        "notch.height",
+        "tube.inner_diameter",
+        "material.elastic_modulus",
+        "material.superelastic_modulus",
+        "friction.coefficient",
+    )
+    assert chosen[0].sd == 0.010
+    assert chosen[2].sd == 0.012
+    own = wrist.replace(tolerance={"notch.depth": 0.0})
+    chosen, rest = tolerances_of(own)
+    assert rest == assumed[1:]
+    assert chosen[0].sd == 0.0
+    large = nf.load_robot("liu2022")
+    sizes = {one.value: one.sd for one in tolerances_of(large)[0]}
+    assert sizes["notch.depth"] == pytest.approx(0.005 * large.tube.outer_diameter, rel=0.01)
+
+
+@pytest.mark.skipif("nitinol" not in kinds_of(Material), reason="no such kind of material")
+def test_nitinol_has_the_ranges_of_published_tubes(wrist: nf.Robot):
+    table = to_table(wrist)
+    table["material"] = {"kind": "nitinol", "elastic_modulus": 42e3, "plateau_stress": 350.0}
+    table["friction"] = {"kind": "capstan", "coefficient": 0.18}
+    robot = from_table(table)
+    limits = {
+        one.value: [
+            number_at(robot, one.value) + sign * amount(size, number_at(robot, one.value))
+            for sign, size in ((-1.0, one.minus), (1.0, one.plus))
+        ]
+        for one in tolerances_of(robot)[0]
+        if one.sd is None
+    }
+    assert limits["material.elastic_modulus"] == pytest.approx([30e3, 57e3], rel=2e-3)
+    assert limits["material.plateau_stress"] == pytest.approx([260.0, 460.0], rel=2e-3)
+    assert limits["material.plateau_modulus"] == pytest.approx([3e3, 9e3], rel=2e-3)
+    assert limits["friction.coefficient"] == pytest.approx([0.13, 0.19], rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        ({"draws": 1}, "OUT_OF_RANGE"),
+        ({"outputs": ("angle",)}, "UNKNOWN_NAME"),
+        ({"tolerances": {"notch.dept": 0.1}}, "INVALID_ROBOT"),
+        ({"tolerances": {"tube.inner_diameter": {"plus": 0.4, "minus": -0.3}}}, "INVALID_ROBOT"),
+    ],
+)
+def test_what_makes_no_bands(wrist: nf.Robot, options: dict, code: str):
+    with pytest.raises(nf.InputError) as error:
+        nf.uncertain(wrist, nf.Load(tension=1.0), **options)
+    assert error.value.code.name == code
+
+
+def test_closing_moves_with_the_tolerances(wrist: nf.Robot, margin):
+    """Against the closing of robots that are solved one by one."""
+    table = nf.closing(wrist)
+    found = closing_bands(wrist.replace(tolerance={"notch.depth": 0.005}), table)
+    assert found is not None
+    bands = found.bands
+    tensions, angles = [], []
+    for draw in range(bands.draws):
+        values = {name: float(numbers[draw]) for name, numbers in bands.drawn.items()}
+        one = nf.closing(wrist.with_values(values))
+        tensions.append(one.tension)
+        angles.append(one.angle)
+    for name, each, own in (("tension", tensions, found.tension), ("angle", angles, found.angle)):
+        assert np.isfinite(each).mean() > 0.99  # of some draws `closing` does not find one
+        low, median, high = np.nanquantile(each, (0.05, 0.5, 0.95), axis=0)
+        width = high - low
+        margin.within(f"median {name}", np.max(np.abs(own.median - median) / width), 0.02, "width")
+        margin.within(f"width of {name}", (own.high - own.low) / width - 1.0, 0.03, "of it")
+    deeper, shallower = (
+        nf.solve(wrist.with_value("notch.depth", depth), nf.Load(tension=found.load)).total_angle
+        for depth in (1.41, 1.39)
+    )
+    margin.within("by depth", found.by_depth - 0.5 * (deeper - shallower), 1e-9, "rad")
+    assert closing_bands(nf.load_robot("liu2022"), nf.closing(nf.load_robot("liu2022"))) is None
+
+
+def test_a_picture_shades_the_bands_of_both_branches(wrist: nf.Robot):
+    bands = nf.uncertain(wrist, nf.pull(0.0, 1.0, steps=4).release(), draws=8)
+    total = picture(bands).cells[2].panel
+    areas = [item for item in total.items if isinstance(item, Area)]
+    assert len(areas) == 2
+    corners = areas[0].polygons[0]
+    top = np.degrees(bands["total_angle"].high[3])
+    assert corners[:, 1].max() == pytest.approx(top, rel=1e-12)
+    text = repr(bands)
+    assert text.startswith("Bands of 8 draws over 8 steps")
+    assert "notch.depth" in text

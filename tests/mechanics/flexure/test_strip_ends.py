@@ -1,0 +1,206 @@
+"""Strips and U-links with elastic ends against finite elements of cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex._jax import jax, jnp
+from notchflex.mechanics.flexure import Site, flexure_state, relative_pose, rod
+from notchflex.mechanics.flexure.roots import strip_validity
+from notchflex.mechanics.material import section_law
+from reference_data import named_rows
+
+STRIPS, LINKS = named_rows("fem_strip_cells.csv"), named_rows("fem_u_link_cells.csv")
+AXES = ("uy", "ux", "uz", "ry", "rx", "rz")  # of the tables, in the order of the notch's frame
+PLANE = ("rx", "uy", "uz")
+# Full meshes of the papers' dimensions; mm/N, rad/(N mm).
+LIU = {"rx": 0.00588327, "uy": 0.005093919, "uz": 0.01923623}
+LIU_PULLED = {"rotation": 0.02353681, "gap": 0.1133988}  # by 1 N of cable, rad and mm
+GAO = {"rx": 2.741072e-3, "uy": 2.909225e-4, "uz": 2.625105e-3, "uy_uz": -3.480495e-4}
+GAO_SIDEWAYS = {"ux": 2.243258e-3, "ry": 3.827097e-4, "rz": 9.271828e-5}
+
+
+def liu(height=3.5, thickness=1.5, depth=6.9, **keys):
+    return nf.StripNotch(height, thickness, depth, ends="elastic", uncut_length=5.0, **keys)
+
+
+def part(row):
+    tube = nf.Tube(2.0 * row["outer"], 2.0 * row["inner"])
+    if "depth" in row:
+        return liu(row["height"], row["thickness"], row["depth"]), tube
+    slot, length = row["slot_radius"], row["length"]
+    return nf.ULink(slot, row["thickness"], length, "toward", ends="elastic"), tube
+
+
+def compliance(notch, tube, modulus=1.0, nu=0.33):
+    """Compliance (6, 6) at the middle of the strip, mm/N, rad/(N mm), displacements first."""
+    side = nf.mechanics.ends.Side("between", 1.0)
+    shape = rod(notch, tube, 0, Site(side, side, nu))
+    law = section_law(nf.Linear(modulus, poisson_ratio=nu))
+
+    def forces(modes):
+        return flexure_state(shape, law, (), modes, with_pose=True).internal
+
+    rest = jnp.zeros(shape.modes)
+    twist = np.asarray(flexure_state(shape, law, (), rest, with_pose=True).twist)
+    own = twist @ np.linalg.solve(np.asarray(jax.jacobian(forces)(rest)), twist.T)
+    offset = np.asarray(relative_pose(shape, rest).translation)
+    offset = offset - [0.0, 0.0, notch.height + 0.5 * notch.strip_thickness]
+    carry = np.eye(6)
+    carry[3:, :3] = np.cross(np.eye(3), offset)
+    own = carry @ own @ carry.T
+    return np.roll(np.roll(own, 3, axis=0), 3, axis=1)
+
+
+def entry(found, name):
+    first, second = name.split("_") if "_" in name else (name, name)
+    return found[AXES.index(first), AXES.index(second)]
+
+
+def errors(rows, inside):
+    """Errors in % of the entries of cells: rx, uy, uz, coupling; then ux, ry, rz."""
+    made: list[list[float]] = []
+    for row in rows:
+        notch, tube = part(row)
+        if inside and strip_validity(notch, tube):
+            continue
+        found = compliance(notch, tube, nu=row["nu"])
+        of = {name: row[f"EC_{name}_{name}"] for name in (*PLANE, "ux", "ry", "rz")}
+        size = np.sqrt(of["uy"] * of["uz"])
+        errors = {name: entry(found, name) / value - 1.0 for name, value in of.items()}
+        coupling = (entry(found, "uy_uz") - row["EC_uy_uz"]) / size
+        sideways = [errors[name] for name in ("ux", "ry", "rz")]
+        made.append([*(errors[name] for name in PLANE), coupling, *sideways])
+    return 100.0 * np.array(made)
+
+
+def test_the_cells_repeat_the_full_meshes(margin):
+    """Our cells against the finer full meshes; of Liu's bodies the cell holds less."""
+    for name, value in LIU.items():
+        error = STRIPS[0][f"EC_{name}_{name}"] / (1000.406 * value) - 1.0
+        margin.within(f"strip, {name}", 100.0 * error, 1.5, "%")
+    for name, value in (GAO | GAO_SIDEWAYS).items():
+        key = f"EC_{name}" if "_" in name else f"EC_{name}_{name}"
+        margin.within(f"link, {name}", 100.0 * (LINKS[0][key] / (22000.0 * value) - 1.0), 0.6, "%")
+
+
+def test_liu_and_gao_at_small_loads(margin):
+    found = compliance(liu(), nf.Tube(10.0, 6.0), 1000.406, 0.4)
+    for name, value in LIU.items():
+        margin.within(f"strip, {name}", 100.0 * (entry(found, name) / value - 1.0), 2.0, "%")
+    link = nf.ULink(0.275, 0.70, 2.0, "toward", ends="elastic")
+    found = compliance(link, nf.Tube(5.99, 4.0), 22000.0)
+    for name, value in GAO.items():
+        margin.within(f"link, {name}", 100.0 * (entry(found, name) / value - 1.0), 2.0, "%")
+    for name, value in GAO_SIDEWAYS.items():
+        margin.within(f"link, {name}", 100.0 * (entry(found, name) / value - 1.0), 10.0, "%")
+
+
+def pulled_strip():
+    ready = nf.load_robot("liu2022").with_values({"friction.coefficient": 0.0})
+    return nf.Robot(
+        name="one strip",
+        tube=nf.Tube(10.0, 6.0, base_length=5.0),
+        notch=(liu(),),
+        tendon=(nf.Tendon(radius=4.0, direction_deg=0.0, end_body=1, path="straight"),),
+        material=nf.Linear(1000.406, poisson_ratio=0.4),
+        friction=ready.friction,
+    )
+
+
+def test_liu_pulled_to_12_degrees(margin):
+    rows = named_rows("fem_liu_strip.csv")
+    path = nf.simulate(pulled_strip(), [nf.Load(tension=[row["F_N"]]) for row in rows])
+    angle = np.degrees(path.quantity("notch_angle")[:, 0])
+    shortening = path.quantity("stroke")[:, 0]
+    wanted = np.array([(row["rot_fem_deg"], row["gap_shortening_mm"]) for row in rows]).T
+    margin.within("angle", 100.0 * (angle / wanted[0] - 1.0), 2.0, "%")
+    margin.within("shortening of the gap", 100.0 * (shortening / wanted[1] - 1.0), 2.0, "%")
+    small = nf.simulate(pulled_strip(), [nf.Load(tension=[1e-3])])
+    slope = small.quantity("notch_angle")[0, 0] / 1e-3, small.quantity("stroke")[0, 0] / 1e-3
+    for value, (name, wanted) in zip(slope, LIU_PULLED.items(), strict=True):
+        margin.within(f"{name} per N", 100.0 * (value / wanted - 1.0), 2.0, "%")
+
+
+@pytest.mark.parametrize("use", ["fit", "judge"])
+def test_cells_inside_validity(use, margin):
+    """The rule against the cells it was fitted to, and against those that only judge it."""
+    found = np.concatenate(
+        [errors([row for row in rows if row["use"] == use], True) for rows in (STRIPS, LINKS)]
+    )
+    rms, largest = np.sqrt(np.mean(found**2, axis=0)), np.abs(found).max(axis=0)
+    allowed = {"rx": (3.2, 6), "uy": (5.5, 10), "uz": (5.5, 9.5), "coupling": (3.5, 7.5)}
+    allowed |= {"ux": (12, 25), "ry": (10, 24), "rz": (20, 45)}
+    for (name, (most_rms, most)), one, worst in zip(allowed.items(), rms, largest, strict=True):
+        margin.within(f"{use}: {name}, rms of {len(found)}", one, most_rms, "%")
+        margin.within(f"{use}: {name}, max", worst, most, "%")
+
+
+def test_cells_outside_validity(margin):
+    """What the sentence on thin walls says."""
+    rows = [row for row in STRIPS + LINKS if row["inner"] / row["outer"] > 0.77]
+    assert len(rows) == 4
+    assert all("inner / outer diameter" in strip_validity(*part(row))[0] for row in rows)
+    found = np.abs(np.concatenate([errors([row], False) for row in rows])).max(axis=0)
+    margin.within("bending", found[0], 5.1, "%")
+    margin.within("shear across", found[1:3], 18.0, "%")
+    assert found[2] > 10.0
+
+
+def test_validity_names_each_range():
+    tube = nf.Tube(10.0, 6.0)
+    assert strip_validity(liu(), tube) == []
+    assert strip_validity(nf.StripNotch(3.5, 1.5, 6.9), tube) == []
+    row = nf.StripNotch(3.5, 1.5, 6.9, ends="elastic")
+    (text,) = strip_validity(row, tube)
+    assert text.startswith("uncut length / height is 0, below 0.7")
+    link = nf.ULink(0.275, 0.7, 0.6, "toward", ends="elastic")
+    assert len(strip_validity(link, nf.Tube(5.99, 4.0))) == 2
+
+
+@pytest.mark.parametrize("direction", [0.0, 35.0, 180.0])
+def test_the_frame_turns_with_the_notch(direction):
+    """The compliance along the strip turns with it, and halves of a row mirror each other."""
+    tube, turn = nf.Tube(10.0, 6.0), np.radians(direction)
+    plain = compliance(liu(), tube)
+    turned = compliance(liu(direction_deg=direction), tube)
+    side = np.array([np.cos(turn), np.sin(turn), 0.0])
+    np.testing.assert_allclose(side @ turned[:3, :3] @ side, plain[0, 0], rtol=1e-12)
+    one, other = (
+        compliance(nf.ULink(0.275, 0.7, 2.0, hand, ends="elastic"), nf.Tube(5.99, 4.0))
+        for hand in ("away", "toward")
+    )
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
+    np.testing.assert_allclose(one, mirror @ other @ mirror, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "tensions"), [("liu2022", (6.0, 0.0)), ("gao2017", (8.0,))])
+def test_robots_with_friction_and_loads(name, tensions):
+    robot = nf.load_robot(name).with_values({"notch[*].ends": "elastic"})
+    sideways = (-0.02, 0.03, 0.0)
+    up = [
+        nf.Load(tension=[part * t for t in tensions], tip_force=sideways)
+        for part in (0.5, 1.0, 0.7)
+    ]
+    path = nf.simulate(robot, up)
+    assert path.converged.all(), path.reason
+    assert path.total_angle[1] > path.total_angle[0] > 0.0
+    assert np.all(path.quantity("dissipation") >= 0.0)
+    # The base carries what acts at the tip.
+    force = -path.quantity("base_force")  # that of the base on the robot, turned round
+    np.testing.assert_allclose(force[:, :2], np.tile(sideways[:2], (3, 1)), atol=1e-6)
+
+
+def test_rigid_ends_stay_as_they_were():
+    """The paper's rods do not know of elastic ends: no part of the walls is added."""
+    for notch, tube in (
+        (nf.StripNotch(3.5, 1.5, 6.9), nf.Tube(10.0, 6.0)),
+        (nf.ULink(0.275, 0.7, 2.0, "away"), nf.Tube(5.99, 4.0)),
+    ):
+        assert not notch.has_elastic_ends
+        assert rod(notch, tube).section.ends is None
+    below, above = nf.StripNotch(3.5, 1.5, 6.9).openings(None, None)
+    assert (below.leaves, below.enters, above.leaves, above.enters) == (0.0, 0.0, 3.5, 3.5)
+    assert below.leaves_rise == above.enters_rise == 0.0
