@@ -101,7 +101,7 @@ def _check_sensor(constants: Sequence[ParameterSpec]) -> None:
     for name, *_ in constants:
         path = name.rpartition(":")[2]
         if path.startswith("sensor.") and path not in SENSOR:
-            raise InputError.UNKNOWN_NAME(f"--fit {name}: give {', '.join(SENSOR)}.")
+            raise InputError.UNKNOWN_NAME(f"--fit {name}: give one of {', '.join(SENSOR)}.")
 
 
 def _fitted_files(sources: DataSources, folder: str | None) -> dict[str, str]:
