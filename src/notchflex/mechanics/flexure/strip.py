@@ -22,9 +22,9 @@ from notchflex.mechanics.flexure.notch_rod import (
     legendre_modes,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import Site, rod
+from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.roots import rooted_strip_rod, sharp_strip
+from notchflex.mechanics.flexure.roots import rooted_strip_rod, sharp_strip, strip_validity
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.robot import StripNotch, Tube
@@ -97,3 +97,9 @@ def strip_rod(
         linear_kinematics=notch.deflection == "small",
         has_chord=True,
     )
+
+
+@unchecked.register
+def _(notch: StripNotch, tube: Tube, site: Site) -> list[str]:
+    del site
+    return strip_validity(notch, tube)

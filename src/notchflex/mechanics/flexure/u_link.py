@@ -20,9 +20,9 @@ from notchflex.mechanics.flexure.notch_rod import (
     shifted,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import Site, rod
+from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.roots import rooted_strip_rod, round_strip
+from notchflex.mechanics.flexure.roots import rooted_strip_rod, round_strip, strip_validity
 from notchflex.mechanics.flexure.u_link_geometry import Course, Link
 from notchflex.mechanics.flexure.wrench_modes import wrench_modes
 from notchflex.mechanics.material import FibreSection
@@ -133,3 +133,9 @@ def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> Fi
     walls = two_walls(outer - inner, course.thickness, middle)
     torsion = clamped_torsion_constant(walls, middle, link.length, poisson_ratio)
     return about_neutral_axis(walls, torsion)
+
+
+@unchecked.register
+def _(notch: ULink, tube: Tube, site: Site) -> list[str]:
+    del site
+    return strip_validity(notch, tube)

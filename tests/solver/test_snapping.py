@@ -1,0 +1,76 @@
+"""Notches that soften as they close: limit points under tension, passed by stroke."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.results.warnings import path_warnings
+
+
+def wrist(friction: float = 0.18, **material: float) -> nf.Robot:
+    """The wrist that `notchflex new` writes for the dimensions of wrist A."""
+    notch = nf.ArcNotch("on-axis", depth=1.4, height=0.8, uncut_length=1.2, repeat=5, ends="shell")
+    return nf.Robot(
+        name="wrist",
+        tube=nf.Tube(1.62, 1.40, base_length=1.2),
+        notch=(notch,),
+        tendon=(nf.Tendon(0.70, path="straight"),),
+        material=nf.Nitinol(**material),
+        friction=nf.Capstan(friction),
+    )
+
+
+@pytest.fixture(scope="module")
+def cycle() -> nf.EquilibriumPath:
+    return nf.simulate(wrist(), nf.pull(0.0, 3.0, steps=25).release())
+
+
+def test_it_closes_and_opens(cycle):
+    assert cycle.converged.all()
+    closed = cycle.contact_force > 0.0
+    assert closed[24, :4].all()
+    assert not closed[-1].any()
+    assert np.abs(cycle.notch_angle[-1]).max() < 1e-9
+    # Each notch closes at a higher tension than it opens.
+    loading, release = closed[:25], closed[25:]
+    for notch in range(4):
+        shuts = cycle.tension[:25, 0][loading[:, notch]].min()
+        opens = cycle.tension[25:, 0][release[:, notch]].min()
+        assert opens < shuts
+
+
+def test_it_is_said(cycle):
+    shut, opened = (text for text in path_warnings(cycle) if "snaps" in text)
+    assert shut.startswith("notch 1")
+    assert "snaps open" in opened
+    assert "prescribe the stroke" in shut
+
+
+def test_no_work_is_gained(cycle):
+    work = np.trapezoid(cycle.tension[:, 0], cycle.stroke[:, 0])
+    assert work > 0.0
+
+
+def test_a_stroke_passes_the_limit_point(cycle):
+    most = float(cycle.stroke[:, 0].max())
+    path = nf.simulate(wrist(), nf.stroke_path(0.0, most, steps=121))
+    assert path.converged.all()
+    # No angle is left out.
+    assert np.degrees(np.diff(path.notch_angle, axis=0)).max() < 6.0
+    assert not [text for text in path_warnings(path) if "snaps" in text]
+
+
+def test_random_wrists_return_to_rest():
+    random = np.random.default_rng(3)
+    for _ in range(12):
+        robot = wrist(
+            random.uniform(0.0, 0.3),
+            plateau_stress=random.uniform(200.0, 500.0),
+            plateau_modulus=random.uniform(2000.0, 9000.0),
+        )
+        loads = nf.pull(0.0, random.uniform(1.0, 5.0), steps=int(random.integers(3, 40))).release()
+        path = nf.simulate(robot, loads)
+        assert path.converged.all(), path.reason
+        assert np.abs(path.notch_angle[-1]).max() < 1e-9
