@@ -41,6 +41,20 @@ def test_an_offset_of_all_depths_is_found_and_written(tmp_path):
     assert text.count("fitted by notchflex to bench.csv: `offset:notch.depth` = 0.012 mm") == 4
 
 
+def test_each_robot_or_notch_has_an_offset_of_its_own_with_a_prior():
+    fit = Constant("each:offset:notch.depth", prior=(0.0, 0.01))
+    first, second = unknowns({"B": BENT, "C": WRIST}, fit)
+    assert (first.name, second.name) == ("B:offset:notch.depth", "C:offset:notch.depth")
+    assert first.prior == second.prior == (0.0, 0.01)
+    assert [one.path for one in first.sets] == ["notch.depth"]  # alike: one value
+    assert [one.base for one in second.sets] == [1.36, 1.39, 1.42, 1.45]
+    every = unknowns({"B": BENT, "C": WRIST}, "C:offset:notch[each].depth")
+    assert [(one.name, one.sets[0].base) for one in every][1] == (
+        "C:offset:notch[2].depth",
+        1.39,
+    )
+
+
 def test_a_factor_and_a_ratio_move_unlike_values_together():
     (factor,) = unknowns({"B": BENT}, "factor:notch.precurvature_deg")
     assert (factor.start, factor.unit, len(factor.sets)) == (1.0, "", 5)

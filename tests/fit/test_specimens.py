@@ -119,6 +119,10 @@ def test_what_is_not_known_before_is_asked_for(whole):
         update_specimen(whole, WRIST, one, "notch.depth")
     with refused("CONFLICT", "in common"):
         update_specimen(whole, WRIST, one, Constant(MODULUS, prior=(1e4, 1e3)))
+    with refused("WRONG_TYPE", "Robot"):
+        update_specimen(whole, "pacheco2021-a", one)
+    with refused("WRONG_TYPE", "taken"):
+        update_specimen(whole, WRIST, {"notch_angle": [0.1]})
     with refused("OUT_OF_RANGE", "largest load"):
         leave_out(whole, by="robot", photograph=1.5)
     with refused("CONFLICT", "each:sensor.force_factor"):

@@ -9,7 +9,7 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.estimation.fit import fitted
+from notchflex.fit.estimation.fit import by_label, fitted
 from notchflex.fit.estimation.objective import LeastSquares
 from notchflex.fit.estimation.problem import Problem
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
@@ -81,7 +81,12 @@ def update_specimen(
         >>> update_specimen(found, wrist, photograph, own).gain < 0.5
         True
     """
-    label, names = robot.name, (constants,) if isinstance(constants, str | Constant) else constants
+    ((label, robot),) = by_label(robot).items()
+    if not isinstance(measured, Measurements):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError.WRONG_TYPE(
+            "a photograph is Measurements of one row or more; `measurements.taken([row])` takes one"
+        )
+    names = (constants,) if isinstance(constants, str | Constant) else constants
     given = [one if isinstance(one, Constant) else Constant(one) for one in names]
     own = [
         replace(one, prior=prior_of(one, found))
