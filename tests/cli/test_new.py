@@ -71,8 +71,8 @@ def test_file_says_what_was_not_measured(monkeypatch, tmp_path):
     lines = (tmp_path / "w.toml").read_text(encoding="utf-8").splitlines()
     values = {line.partition(" = ")[0]: line for line in lines}
     for key in (
-        "superelastic_modulus", "transition_strain", "plastic_strain", "plastic_modulus",
-        "plastic_exponent", "poisson_ratio", "density", "allowed_strain", "coefficient",
+        "plateau_stress", "plateau_modulus", "compression_ratio", "poisson_ratio", "density",
+        "allowed_strain", "coefficient",
     ):  # fmt: skip
         assert "estimate: " in values[key], key
     for key in ("base_length", "precurvature_deg", "radius", "axial_stiffness", "wrap"):

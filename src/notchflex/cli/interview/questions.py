@@ -107,7 +107,8 @@ def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
     """Ask for the number of notches of a kind, and for their keys: one value, or one for each."""
     kind = _usual_or_asked(interview, "--kind", Notch, "Kind of notch, ")
     worded = WORDINGS.get(("notch", kind_of(kind)))
-    keys = list(worded or (key for key in fields_of(kind) if key not in ("kind", "repeat")))
+    unasked = ("kind", "repeat", "ends")
+    keys = list(worded or (key for key in fields_of(kind) if key not in unasked))
     same = {"cut": _ask(interview, "notch", kind, "cut")} if "cut" in keys else {}
     count: int = interview.ask(
         Question(
@@ -116,8 +117,9 @@ def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
             lambda text: whole(text, at_least=1, at_most=MOST_NOTCHES),
         )
     )
-    # From the drawing, unless told otherwise.
-    further = {"ends": "shell"} if "ends" in fields_of(kind) and "ends" not in keys else {}
+    # From the drawing, unless told otherwise: the papers' kind of ends stands first.
+    ends = fields_of(kind).get("ends")
+    further = {} if ends is None else {"ends": typing.get_args(ends.annotation)[-1]}
     further |= interview.set_values("notch", but=tuple(keys))
     columns: dict[str, list[Any]] = {
         key: [value] * count for key, value in (same | further).items()

@@ -27,6 +27,10 @@ SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
 """Heads for what every notch has, so that there is room for what is its own."""
 
 
+# Values that a table leaves out where all notches have them.
+_USUAL = (None, "rigid", "outer")
+
+
 def print_robot(robot: Robot, title: str, length: float, notches: list[dict[str, Any]]) -> None:
     """Print what `notchflex show` shows."""
     console = terminal.output()
@@ -68,7 +72,7 @@ def description_tables(robot: Robot) -> list[Table]:
         kinds.setdefault(kind, {}).setdefault(tuple(values.values()), []).append(number)
     tables: list[Table] = []
     for kind, alike in kinds.items():
-        used = [any(value is not None for value in column) for column in zip(*alike, strict=True)]
+        used = [any(value not in _USUAL for value in column) for column in zip(*alike, strict=True)]
         rows = [
             [run_of(numbers), *map(_value, compress(values, used))]
             for values, numbers in alike.items()
