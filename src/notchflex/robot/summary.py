@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from notchflex._summary import Summary, short
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
 
 MOST = 4
 """Different values of one key that are listed; of more, their range."""
+
+# A longer row goes on below.
+_WIDTH = 145
 
 _HINT = ".plot() draws it; .with_value(...) returns a changed copy"
 
@@ -28,7 +32,12 @@ def robot_summary(robot: Robot) -> Summary:
     for name in ("material", "friction"):
         part = getattr(robot, name)
         rows.append((name, ", ".join(one for one in (part.kind, _words([part])) if one)))
-    return Summary(f"Robot {robot.name}", rows, _HINT)
+    lines = [
+        (name if number == 0 else "", line)
+        for name, words in rows
+        for number, line in enumerate(wrap(words, _WIDTH) or [""])
+    ]
+    return Summary(f"Robot {robot.name}", lines, _HINT)
 
 
 def _words(parts: Sequence[Any]) -> str:
