@@ -297,6 +297,17 @@ def test_capstan_and_linear_take_further_keys(monkeypatch):
     assert (robot.friction.constant_loss, robot.material.density) == (0.05, 6450.0)
 
 
+def test_a_curve_is_given_by_values_joined_by_commas(monkeypatch, tmp_path, capsys):
+    pipe(monkeypatch)
+    curve = ["--material", "stress-strain", "--set", "material.stress=400, 500"]
+    assert run(command("w", *curve, "--set", "material.strain=0.01, 0.05")) == 0
+    material = load_robot(tmp_path / "w.toml").material
+    assert (material.strain, material.stress) == ((0.01, 0.05), (400.0, 500.0))
+    assert run(command("v", *curve, "--set", "material.strain=0.01, x")) == 2
+    assert "got 'x'; give a number" in capsys.readouterr().err
+    assert not (tmp_path / "v.toml").exists()
+
+
 @pytest.mark.parametrize("option", ["--kind", "--friction-kind", "--material"])
 def test_an_unknown_kind_is_refused_before_anything_else(monkeypatch, capsys, option):
     pipe(monkeypatch)
