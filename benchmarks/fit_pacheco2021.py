@@ -7,7 +7,9 @@ docs/papers/pacheco2021.md):
 
 Prints where every start of eq. 17 ends, with the time and the solved rows beside the paper's 2,800
 trial points; constants and errors of each wrist left out; the two linear models of the paper, whose
-friction goes to its limit; and least squares with 95 % intervals.
+friction goes to its limit; least squares with 95 % intervals; and eq. 17 with the law of the tube
+(elastic ends, Nitinol by fibres), one set, with a factor for wrist A and one for each, each wrist
+left out, and after one photograph of it. `--only tube` makes that alone.
 """
 
 from __future__ import annotations
@@ -21,12 +23,14 @@ import numpy as np
 
 import notchflex as nf
 from notchflex.fit import (
+    PHOTOGRAPH,
     Calibration,
     Constant,
     LeastSquares,
     SumOfRobotErrors,
     calibrate,
     diagnose,
+    errors_of_parts,
     leave_out,
     read_measurements,
 )
@@ -39,6 +43,36 @@ FOUR = (
     Constant("material.transition_strain", 0.01, 0.05),
     FRICTION,
 )
+EDGES = "total_edge_angle"
+TUBE = (
+    Constant("material.elastic_modulus", 15e3, 60e3),
+    Constant("material.plateau_stress", 100.0, 600.0),
+    Constant("material.plateau_modulus", 1e3, 15e3),
+    FRICTION,
+)
+FACTORS = Constant("each:sensor.force_factor", prior=(1.0, 0.05))
+DEPTHS = tuple(
+    Constant(name, prior=(0.0, 0.01))
+    for name in ("A:offset:notch.depth", "B:offset:notch.depth", "C:offset:notch[each].depth")
+)
+AS_DRAWN = {
+    "notch.depth_at": "outer",
+    "material.elastic_modulus": 45e3,
+    "material.plateau_stress": 390.0,
+}
+LINEAR = {"material.kind": "linear", "material.elastic_modulus": 15e3}
+# Values of the robots, constants of a fit with the law of the tube, and the objective to reach.
+TUBE_FITS = {
+    "linear material": (LINEAR, (Constant("material.elastic_modulus", 5e3, 60e3), FRICTION), 24.0),
+    "no precurvature": ({"notch.precurvature_deg": 0.0}, TUBE, 15.9),
+    "rigid ends": ({"notch.ends": "rigid"}, TUBE, 9.4),
+    "as drawn, depths": (AS_DRAWN, (*TUBE, *DEPTHS), 8.22),
+    "one set": ({}, TUBE, 11.8),
+    "a factor for A": ({}, (*TUBE, Constant("A:sensor.force_factor", 0.8, 1.25)), 7.9),
+    "a factor a wrist": ({}, (*TUBE, FACTORS), 7.85),
+}
+# Errors of the total of a wrist left out, deg: blind, and after one photograph.
+LEFT_OUT_TARGETS = {"A": (7.5, 4.1), "B": (3.4, 1.3), "C": (3.6, 2.3)}
 
 
 def main() -> None:
@@ -47,16 +81,23 @@ def main() -> None:
     arguments.add_argument("folder", type=Path)
     arguments.add_argument("--starts", type=int, default=20)
     arguments.add_argument("--json", type=Path)
+    arguments.add_argument("--only", choices=["tube"])
     given = arguments.parse_args()
-    robots, data = specimens(given.folder)
-    told = {
-        "eq17": eq17(robots, data, given.starts),
+    told = {} if given.only else papers_law(given.folder, given.starts)
+    told["tube"] = law_of_the_tube(given.folder)
+    if given.json:
+        given.json.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+
+
+def papers_law(folder: Path, starts: int):
+    """What the paper fits, and tests of it."""
+    robots, data = specimens(folder)
+    return {
+        "eq17": eq17(robots, data, starts),
         "left_out": left_out(robots, data),
         "linear": linear(robots, data),
         "least_squares": least_squares(robots, data),
     }
-    if given.json:
-        given.json.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
 
 
 def specimens(folder: Path):
@@ -137,8 +178,52 @@ def least_squares(robots, data):
     return told
 
 
+def law_of_the_tube(folder: Path, starts: int = 4):
+    """Elastic ends, mid-wall depth and Nitinol by fibres: eq. 17 on edge angles of all wrists."""
+    robots = {name: nf.load_robot(f"pacheco2021-{name.lower()}-true") for name in "ABC"}
+    data = {
+        name: read_measurements(
+            folder / f"pacheco2021_wrist_{name}_measured.csv", robot, measured="edge"
+        )
+        for name, robot in robots.items()
+    }
+    told = {}
+    for label, (values, fit, target) in TUBE_FITS.items():
+        these = {name: robot.with_values(values) for name, robot in robots.items()}
+        found = calibrate(these, data, fit, objective=SumOfRobotErrors(), starts=starts)
+        totals = [one.error for one in errors_of_parts(found) if one.quantity == EDGES]
+        print(f"{label}: eq. 17 {found.cost:.4f} deg (target {target}) at {_text(found)}")
+        print("  totals A, B, C: " + ", ".join(f"{one:.2f}" for one in totals))
+        told[label] = {"values": found.values, "cost": found.cost, "totals_deg": totals}
+    print("rms error of every notch beside repeats, with a factor for each wrist:")
+    for one in errors_of_parts(found):
+        print(f"  {one.robot} {one.title}: {one.error:.2f} ({one.repeats:.2f}) {one.unit}")
+    for fold in leave_out(found, by="robot", photograph=PHOTOGRAPH, starts=3).folds:
+        blind, updated = (
+            float(np.degrees(one[EDGES])) for one in (fold.errors, fold.errors_updated)
+        )
+        targets = LEFT_OUT_TARGETS[fold.label]
+        inside = fold.share_inside()[EDGES]
+        print(
+            f"without {fold.label}: total {blind:.2f} deg blind (target {targets[0]}), "
+            f"{updated:.2f} after one photograph ({targets[1]}), which narrows it to "
+            f"{fold.specimen.gain:.2f}; {100.0 * inside:.0f} % in the blind 90 % band"
+        )
+        told[f"without {fold.label}"] = {
+            "values": fold.found.values,
+            "before": fold.before,
+            "photograph": fold.specimen.values,
+            "gain": fold.specimen.gain,
+            "inside_90": inside,
+            "blind_deg": blind,
+            "updated_deg": updated,
+        }
+    return told
+
+
 def _text(found: Calibration) -> str:
-    every = (f"{name.split('.')[1]} {value:.6g}" for name, value in found.values.items())
+    names = (name.replace("material.", "").replace("sensor.", "") for name in found.names)
+    every = (f"{name} {value:.6g}" for name, value in zip(names, found.best.values, strict=True))
     return ", ".join(every)
 
 

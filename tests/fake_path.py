@@ -98,6 +98,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "contact_bound": np.full(contacts, 0.03),
         "contact_turning": np.full(contacts, np.radians(3.0)),
         "edge_angle": angle,
+        "material_dissipation": np.zeros((count, n)),
         "chord_angle": np.full((count, n), np.nan),
         "total_chord_angle": np.full(count, np.nan),
         "front_contact": np.concatenate([np.ones(steps), np.arange(1, steps + 1)])[:, None],

@@ -17,8 +17,8 @@ FOLDER = Path(nf.__file__).parent
 # fmt: off
 NAMES = [
     "load_robot", "save_robot", "list_robots", "json_schema", "Robot", "Tube", "ArcNotch", "Tendon",
-    "Linear", "Superelastic", "Nitinol", "Frictionless", "Capstan", "Load", "LoadPath", "pull",
-    "solve",
+    "Linear", "Superelastic", "Nitinol", "StressStrain", "Frictionless", "Capstan", "Load",
+    "LoadPath", "pull", "solve",
     "simulate", "Equilibrium", "EquilibriumPath", "State", "tip_from_angles", "equal_stroke",
     "closing", "annular_sector", "annular_segment", "Section", "InputError", "RobotFileError",
     "plot", "stroke_path", "solve_each", "Batch", "solve_batch", "simulate_batch",
@@ -33,7 +33,7 @@ NAMES = [
     "Measurements", "read_measurements", "write_measurements",
     "Calibration", "Constant", "LeastSquares", "SumOfDistances", "SumOfRobotErrors", "leave_out",
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
-    "write_fitted", "calibrate", "compare", "Comparison",
+    "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
 ]
 # fmt: on
 

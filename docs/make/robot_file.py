@@ -98,6 +98,8 @@ def _allowed(value: dict[str, Any]) -> str:
         return " or ".join(f'`"{one}"`' for one in value["enum"])
     if "anyOf" in value:
         return " or ".join(filter(None, map(_allowed, value["anyOf"])))
+    if value.get("type") == "array":
+        return f"{value['minItems']} to {value['maxItems']} of: {_allowed(value['items'])}"
     word = {"integer": "whole number", "number": "number", "string": "text"}[value["type"]]
     lower = [("from", "minimum"), ("above", "exclusiveMinimum")]
     upper = [("to", "maximum"), ("and below", "exclusiveMaximum")]

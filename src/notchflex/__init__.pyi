@@ -33,6 +33,7 @@ from notchflex.fit import FrictionReadings as FrictionReadings
 from notchflex.fit import FrictionRig as FrictionRig
 from notchflex.fit import LeastSquares as LeastSquares
 from notchflex.fit import Measurements as Measurements
+from notchflex.fit import Specimen as Specimen
 from notchflex.fit import SumOfDistances as SumOfDistances
 from notchflex.fit import SumOfRobotErrors as SumOfRobotErrors
 from notchflex.fit import calibrate as calibrate
@@ -44,6 +45,7 @@ from notchflex.fit import read_friction_rig as read_friction_rig
 from notchflex.fit import read_measurements as read_measurements
 from notchflex.fit import sample_posterior as sample_posterior
 from notchflex.fit import simulate_measurements as simulate_measurements
+from notchflex.fit import update_specimen as update_specimen
 from notchflex.fit import write_fitted as write_fitted
 from notchflex.fit import write_measurements as write_measurements
 from notchflex.loads import BodyForce as BodyForce
@@ -70,6 +72,7 @@ from notchflex.robot import Frictionless as Frictionless
 from notchflex.robot import Linear as Linear
 from notchflex.robot import Nitinol as Nitinol
 from notchflex.robot import Robot as Robot
+from notchflex.robot import StressStrain as StressStrain
 from notchflex.robot import StripNotch as StripNotch
 from notchflex.robot import Superelastic as Superelastic
 from notchflex.robot import Tendon as Tendon

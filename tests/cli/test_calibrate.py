@@ -92,6 +92,40 @@ def test_a_loop_without_any_hint_gives_the_constants_that_made_it(calibrate, tmp
     assert found.values[NAMES[0]] == pytest.approx(document["constants"][0]["value"], rel=1e-6)
 
 
+def test_a_robot_left_out_before_and_after_a_photograph(calibrate, tmp_path):
+    # Linear, so that 12 % of force are 12 % of angle.
+    nf.save_robot(nf.load_robot(ROBOT).with_value("material.kind", "linear"), tmp_path / "w.toml")
+    wrist = nf.load_robot(tmp_path / "w.toml")
+    load = nf.LoadPath(np.repeat([[0.6], [1.0], [1.4], [1.8]], 2, axis=0), np.full((8, 1), np.nan))
+    for number, (name, factor) in enumerate({"A": 1.06, "B": 0.94, "C": 1.0}.items()):
+        acting = nf.LoadPath(factor * load.tension, load.stroke)
+        seen = nf.simulate_measurements(
+            wrist, acting, deviation={"notch_angle": 0.005}, seed=number, pull=tuple("12" * 4)
+        )
+        shown = replace(seen, load=load, measured_tension=load.tension)
+        nf.write_measurements(shown, tmp_path / f"{name}.csv")
+    code, out, _ = calibrate(
+        *(f"{name}=w.toml={name}.csv" for name in "ABC"),
+        *("--fit", "material.elastic_modulus,each:sensor.force_factor", "--starts", "1"),
+        *("--prior", "each:sensor.force_factor=1+-0.05", "--measured", "edge"),
+        *("--leave-out", "robot", "--photograph", "--json", "fit.json"),
+    )
+    assert code == 0
+    assert "Constants of a robot left out" in out
+    assert max(map(len, out.split("\n"))) <= 80
+    folds = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))["left_out"]["folds"]
+    assert [fold["left_out"] for fold in folds] == ["A", "B", "C"]
+    for fold in folds[:2]:
+        (blind,), (updated,) = fold["errors"], fold["photograph"]["errors"]
+        assert blind["quantity"] == updated["quantity"] == "edge_angle"
+        assert updated["error"] < 0.6 * blind["error"]
+        assert f"{updated['error']:.3g}" in out
+        ((mean, size),) = fold["before"].values()
+        assert mean == 1.0
+        assert size > 0.04
+        assert fold["photograph"]["gain"] < 0.8
+
+
 def test_a_search_that_does_not_settle_is_told(calibrate, data, monkeypatch):
     found = fitted()
     best = found.best._replace(converged=False, reason="not settled after 100 steps")
@@ -212,6 +246,9 @@ PAIR = f"{ROBOT}=a.csv"
         ("NOT_A_NUMBER", [PAIR, *FIT, "--next", "x"]),
         ("UNKNOWN_NAME", [PAIR, *FIT, "--leave-out", "notch"]),
         ("TOO_FEW_DATA", [PAIR, *FIT, "--leave-out", "robot"]),
+        ("CONFLICT", [PAIR, *FIT, "--leave-out", "pull", "--photograph"]),
+        ("CONFLICT", [f"offset={PAIR}", *FIT]),
+        ("UNKNOWN_NAME", [PAIR, "--fit", "times:notch.depth"]),
         ("OUT_OF_RANGE", [PAIR, *FIT, "--seed", "-1"]),
         ("NOT_A_NUMBER", [PAIR, *FIT, "--seed", "x"]),
         ("NOT_A_NUMBER", [PAIR, *FIT, "--huber", "x"]),

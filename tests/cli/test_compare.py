@@ -29,6 +29,26 @@ def test_path_compared_with_itself_has_no_error(call, loop):
     assert found["converged"] is True
 
 
+def test_angles_of_a_table_are_compared_as_edge_angles(call, tmp_path):
+    call("simulate", "pacheco2021-b-true", "--tension", "0:1.2:3", "--csv", "b.csv")
+    rows = list(csv.DictReader((tmp_path / "b.csv").read_text().splitlines()))
+    with (tmp_path / "seen.csv").open("w") as file:
+        print("tendon_force_N", *(f"notch_{n}_deg" for n in range(1, 6)), sep=",", file=file)
+        for row in rows:
+            edges = (row[f"notch_{n}_edge_deg"] for n in range(1, 6))
+            print(row["tendon_force_N"], *edges, sep=",", file=file)
+    options = ("compare", "pacheco2021-b-true", "seen.csv", "--from-rest")
+    code, out, _ = call(*options, "--measured", "edge", "--json", "edge.json")
+    assert code == 0
+    assert "(edge angles)" in out
+    found = json.loads((tmp_path / "edge.json").read_text())
+    assert found["rmse_deg"]["notches"] == pytest.approx([0.0] * 5, abs=1e-6)
+    assert found["tip_rmse_mm"] == pytest.approx(0.0, abs=1e-6)
+    assert "edge_angle_deg" in found["rows"][0]["measured"]
+    out = call(*options, "--json", "-")[1]
+    assert json.loads(out)["rmse_deg"]["total"] > 0.5
+
+
 def test_pulls_from_rest_do_not_know_the_way_back(call, loop):
     found = json.loads(call("compare", "pacheco2021-b", loop, "--from-rest", "--json", "-")[1])
     assert found["from_rest"] is True

@@ -18,7 +18,8 @@ def names(fit, robots=TWO):
 
 def test_a_name_alone_is_shared_by_all_robots():
     (one,) = unknowns(TWO, "friction.coefficient")
-    assert one.sets == (("A", "friction.coefficient"), ("B", "friction.coefficient"))
+    sets = [number[:2] for number in one.sets]
+    assert sets == [("A", "friction.coefficient"), ("B", "friction.coefficient")]
 
 
 def test_each_robot_and_each_notch_have_their_own():

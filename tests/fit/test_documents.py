@@ -111,6 +111,7 @@ def test_left_out_parts():
             "unit": "deg",
             "error": pytest.approx(np.degrees(0.1)),
             "error_of_all": pytest.approx(np.degrees(0.05)),
+            "inside_90": None,
         }
     ]
     assert (second["solved"], second["errors"]) == (False, [])

@@ -213,6 +213,9 @@ def test_distances_of_points_are_made_small():
     found = calibrate(stiff, seen, "friction.coefficient", objective=SumOfDistances(), starts=1)
     assert found.values["friction.coefficient"] == pytest.approx(0.13, abs=1e-6)
     assert not found.intervals
+    with refused("UNSUPPORTED", "prior"):
+        known = Constant("friction.coefficient", prior=(0.1, 0.1))
+        calibrate(stiff, seen, known, objective=SumOfDistances(), starts=1)
 
 
 @pytest.mark.parametrize(
@@ -220,7 +223,6 @@ def test_distances_of_points_are_made_small():
     [
         ({"objective": SumOfDistances()}, "UNSUPPORTED", "notch_angle"),
         ({"measurements": {"X": None}}, "CONFLICT", "X"),
-        ({"fit": Constant("friction.coefficient", prior=(0.1, 0.1))}, "UNSUPPORTED", "prior"),
     ],
 )
 def test_what_does_not_belong_together_is_refused(change, code, name):

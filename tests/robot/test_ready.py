@@ -1,5 +1,6 @@
 """The robots that come with the package, against the papers' tables."""
 
+import math
 import tomllib
 from pathlib import Path
 
@@ -14,10 +15,13 @@ NAMES = [
     "liu2022",
     "pacheco2021-a",
     "pacheco2021-a-specimen",
+    "pacheco2021-a-true",
     "pacheco2021-b",
     "pacheco2021-b-specimen",
+    "pacheco2021-b-true",
     "pacheco2021-c",
     "pacheco2021-c-specimen",
+    "pacheco2021-c-true",
     "two-axis-wrist",
     "york2015",
 ]
@@ -50,19 +54,27 @@ def test_every_york_value_is_marked_as_an_estimate():
         ("c", [1.36, 1.39, 1.42, 1.45], 1.0, 1.0),
     ],
 )
-@pytest.mark.parametrize("form", ["", "-specimen"])
+@pytest.mark.parametrize("form", ["", "-specimen", "-true"])
 def test_pacheco_geometry(wrist: str, form: str, depths: list, height: float, uncut: float):
     robot = nf.load_robot(f"pacheco2021-{wrist}{form}")
     assert (robot.tube.outer_diameter, robot.tube.inner_diameter) == (1.62, 1.40)
-    assert robot.tube.base_length == 0.0
     assert [notch.depth for notch in robot.notches] == depths
     assert {notch.height for notch in robot.notches} == {height}
     assert {notch.uncut_length for notch in robot.notches} == {uncut}
     assert {notch.cut for notch in robot.notches} == {"on-axis"}
     (tendon,) = robot.tendon
-    assert (tendon.radius, tendon.direction_deg, tendon.path) == (0.70, 0.0, "wall-arc")
+    assert (tendon.radius, tendon.direction_deg) == (0.70, 0.0)
     assert tendon.end_body == robot.number_of_notches
-    assert robot.friction.wrap == "whole-before"
+    if form == "-true":
+        # The uncut tube before the first notch is that between the notches.
+        assert robot.tube.base_length == uncut
+        assert (tendon.path, robot.friction.wrap) == ("straight", "geometric")
+        (degrees,) = {notch.precurvature_deg for notch in robot.notches}
+        assert degrees == pytest.approx(math.degrees(0.05 * height), abs=1e-4)
+        assert {one.ends for one in robot.notches} == {"shell"}
+    else:
+        assert robot.tube.base_length == 0.0
+        assert (tendon.path, robot.friction.wrap) == ("wall-arc", "whole-before")
 
 
 @pytest.mark.parametrize("wrist", "abc")

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("tension", "stroke", "notch_angle", "total_angle", "tip_position", "converged")
 # Quantities without a column of their own in a comparison: only their errors are kept.
-_OTHERS = ("tip_rotation", "tip_tension", "axis_points")
+_OTHERS = ("edge_angle", "tip_rotation", "tip_tension", "axis_points")
+_POINTS = ("tip_rotation", "axis_points")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,8 +41,9 @@ class Comparison:
         measured: The measurements; their `from_rest` says how the rows were loaded.
         tension: Base tension in the model [N], (P, t).
         stroke: Stroke in the model [mm], (P, t).
-        notch_angle: Notch angles of the model [rad], (P, n).
-        total_angle: Total angle of the model [rad], (P,).
+        notch_angle: Notch angles of the model [rad], (P, n): of `angle`, which was measured.
+        total_angle: Total angle of the model [rad], (P,); the sum of the edge angles where these
+            were measured without a total angle.
         tip: Tip of the model in the world [mm], (P, 3).
         converged: Whether the equilibrium was found, (P,).
         reason: Why not, P texts, "" if it was.
@@ -49,6 +51,8 @@ class Comparison:
             `Measurements.observed`: "tip_rotation" [rad], "tip_tension" [N], "axis_points" [mm].
         stroke_lost: Stroke that closed notches could not take in the kinematic model [mm], (P,);
             None for a model with forces.
+        beyond_faces: Where edge angles were measured, by how much less these are than the angles of
+            the model's rings [rad], (P, n); else 0.
     """
 
     robot: Robot
@@ -62,18 +66,25 @@ class Comparison:
     reason: tuple[str, ...]
     others: dict[str, float] = field(default_factory=dict[str, float])
     stroke_lost: Float[np.ndarray, " p"] | None = None
+    beyond_faces: Float[np.ndarray, "p n"] | float = 0.0
+
+    @property
+    def angle(self) -> str:
+        """The measured angle of notches, by its name: "notch_angle" or "edge_angle"."""
+        return _angle(self.measured)
 
     @cached_property
     def measured_notch_angle(self) -> Float[np.ndarray, "p n"]:
         """Measured angle of every notch [rad], (P, n); NaN where it was not measured."""
         nothing = np.full(self.notch_angle.shape, np.nan)
-        return self.measured.observed.get("notch_angle", nothing)
+        return self.measured.observed.get(self.angle, nothing)
 
     @cached_property
     def measured_total_angle(self) -> Float[np.ndarray, " p"]:
         """Measured total angle [rad], (P,): its own column, or else the sum of all notches."""
         added = np.sum(self.measured_notch_angle, axis=1)
-        total = self.measured.observed.get("total_angle")
+        observed = self.measured.observed
+        total = observed.get("total_angle", observed.get("total_edge_angle"))
         return added if total is None else np.where(np.isnan(total), added, total)
 
     @cached_property
@@ -82,7 +93,7 @@ class Comparison:
 
         As measured, or else by forward kinematics of the measured notch angles.
         """
-        angles = self.measured_notch_angle
+        angles = self.measured_notch_angle + self.beyond_faces
         complete = np.isfinite(angles).all(axis=1)
         tip = np.full(self.tip.shape, np.nan)
         if complete.any():
@@ -167,6 +178,7 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
     """
     _check(robot, measurements)
     others = [name for name in _OTHERS if name in measurements.observed]
+    at_faces = _angle(measurements) == "edge_angle"
 
     def read(path: EquilibriumPath) -> dict[str, Any]:
         names = [*_COLUMNS, *(OUTPUTS.get(name, name) for name in others if name != "axis_points")]
@@ -177,17 +189,25 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
         return columns
 
     model = solved_rows(robot, measurements.load, measurements.pull, measurements.from_rest, read)
+    angle, total = model[_angle(measurements)], model["total_angle"]
+    if at_faces and "total_angle" not in measurements.observed:
+        total = angle.sum(axis=1)
     return Comparison(
         robot=robot,
         measured=measurements,
         tension=model["tension"],
         stroke=model["stroke"],
-        notch_angle=model["notch_angle"],
-        total_angle=model["total_angle"],
+        notch_angle=angle,
+        total_angle=total,
+        beyond_faces=model["notch_angle"] - angle if at_faces else 0.0,
         tip=model["tip_position"],
         converged=model["converged"],
         reason=tuple(str(one) for one in model["reason"]),
-        others={name: _error(name, measurements, model) for name in others},
+        others={
+            name: _error(name, measurements, model)
+            for name in others
+            if not (at_faces and name == "edge_angle")
+        },
     )
 
 
@@ -228,9 +248,15 @@ def compare_kinematics(comparison: Comparison) -> Comparison:
         tip=_tip_in_world(robot, comparison.measured, angles),
         converged=solved,
         others={},
+        beyond_faces=0.0,
         stroke_lost=shared.stroke_lost,
         reason=tuple(np.where(solved, "", comparison.reason).tolist()),
     )
+
+
+def _angle(measured: Measurements) -> str:
+    seen = measured.observed
+    return "edge_angle" if "edge_angle" in seen and "notch_angle" not in seen else "notch_angle"
 
 
 def _check(robot: Robot, measurements: Measurements) -> None:
@@ -239,7 +265,7 @@ def _check(robot: Robot, measurements: Measurements) -> None:
             "compare needs Measurements; read_measurements reads them from a CSV, and "
             f"simulate_measurements makes them; got {type(measurements).__name__}"
         )
-    notches = measurements.observed.get("notch_angle")
+    notches = measurements.observed.get(_angle(measurements))
     if notches is not None and notches.shape[1] != robot.number_of_notches:
         raise InputError.WRONG_SHAPE(
             f"{measurements.source} has angles of {notches.shape[1]} notches, but {robot.name} has "
@@ -263,6 +289,6 @@ def _error(name: str, measured: Measurements, model: dict[str, Any]) -> float:
     output = OUTPUTS.get(name, name)
     predicted = Predicted({output: model[output][rows]}, np.ones(len(rows), bool), {})
     off, _ = misfit(name, measured.taken(rows), predicted)
-    squares = off.reshape(len(rows), -1, 1 if name == "tip_tension" else 3) ** 2
+    squares = off.reshape(len(rows), -1, 3 if name in _POINTS else 1) ** 2
     known = np.isfinite(squares).any(axis=2)
     return float(np.sqrt(np.nansum(squares) / known.sum()))

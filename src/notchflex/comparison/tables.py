@@ -29,7 +29,9 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
     columns = {
         "tendon_tension_N": (measured.measured_tension, comparison.tension),
         "tendon_stroke_mm": (measured.load.stroke, comparison.stroke),
-        "notch_angle_deg": _degrees(comparison.measured_notch_angle, comparison.notch_angle),
+        QUANTITIES[comparison.angle].key: _degrees(
+            comparison.measured_notch_angle, comparison.notch_angle
+        ),
         "total_angle_deg": _degrees(comparison.measured_total_angle, comparison.total_angle),
         "tip_position_mm": (comparison.measured_tip, comparison.tip),
     }
@@ -72,7 +74,7 @@ def errors_document(comparison: Comparison) -> dict[str, Any]:
     if comparison.stroke_lost is not None:
         source = "model" if takes_stroke_of_model(comparison) else "measurement"
         lost = {"stroke_from": source, "stroke_lost_mm": comparison.stroke_lost}
-    measured = "notch_angle" in comparison.measured.observed
+    measured = comparison.angle in comparison.measured.observed
     return {
         "rmse_deg": {
             "notches": comparison.rmse_notches * DEGREES if measured else None,
@@ -103,7 +105,7 @@ def comparison_columns(comparison: Comparison) -> dict[str, Any]:
             pairs[header] = values[:, tendon], model[:, tendon]
     angles = _degrees(comparison.measured_notch_angle, comparison.notch_angle)
     for notch in range(robot.number_of_notches):
-        header = QUANTITIES["notch_angle"].header(notch=notch + 1)
+        header = QUANTITIES[comparison.angle].header(notch=notch + 1)
         pairs[header] = angles[0][:, notch], angles[1][:, notch]
     total = _degrees(comparison.measured_total_angle, comparison.total_angle)
     pairs[QUANTITIES["total_angle"].header()] = total

@@ -3,6 +3,7 @@
 from notchflex.fit.assessment.diagnosis import diagnose as diagnose
 from notchflex.fit.assessment.errors_of_parts import PartError as PartError
 from notchflex.fit.assessment.errors_of_parts import errors_of_parts as errors_of_parts
+from notchflex.fit.assessment.folds import PHOTOGRAPH as PHOTOGRAPH
 from notchflex.fit.assessment.folds import Fold as Fold
 from notchflex.fit.assessment.folds import LeftOut as LeftOut
 from notchflex.fit.assessment.folds import leave_out as leave_out
@@ -10,6 +11,8 @@ from notchflex.fit.assessment.next_measurement import NextMeasurement as NextMea
 from notchflex.fit.assessment.next_measurement import next_measurement as next_measurement
 from notchflex.fit.assessment.posterior import Posterior as Posterior
 from notchflex.fit.assessment.posterior import sample_posterior as sample_posterior
+from notchflex.fit.assessment.specimens import Specimen as Specimen
+from notchflex.fit.assessment.specimens import update_specimen as update_specimen
 from notchflex.fit.documents import calibration_document as calibration_document
 from notchflex.fit.documents import left_out_document as left_out_document
 from notchflex.fit.documents import next_measurement_document as next_measurement_document

@@ -14,7 +14,7 @@ import numpy as np
 from notchflex import __version__
 from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
 from notchflex.fit.assessment.errors_of_parts import edge, errors_of_parts
-from notchflex.fit.assessment.folds import LeftOut
+from notchflex.fit.assessment.folds import Fold, LeftOut
 from notchflex.fit.assessment.next_measurement import NextMeasurement
 from notchflex.fit.assessment.posterior import Posterior
 from notchflex.fit.estimation.calibration import Calibration
@@ -80,7 +80,10 @@ def left_out_document(left_out: LeftOut) -> dict[str, Any]:
     Returns:
         `by`, the `constants` of the fit to everything, and `folds`: what was left out, the
         constants found without it, and root-mean-square errors on it by quantity, `error` of
-        those constants and `error_of_all` of those that were fitted to everything.
+        those constants and `error_of_all` of those that were fitted to everything, and
+        `inside_90`, the share of the numbers in the 90 % interval of the prediction; `before`, what
+        is known of constants that the robot left out has of its own (mean, standard deviation),
+        and of its `photograph`: row, values, gain and errors.
     """
     return {
         **HEAD,
@@ -98,11 +101,28 @@ def left_out_document(left_out: LeftOut) -> dict[str, Any]:
                         "unit": edge(name)[1],
                         "error": error * edge(name)[2],
                         "error_of_all": fold.errors_of_all.get(name, math.nan) * edge(name)[2],
+                        "inside_90": fold.share_inside().get(name),
                     }
                     for name, error in fold.errors.items()
                 ],
+                "before": {name: list(known) for name, known in fold.before.items()},
+                "photograph": _photograph(fold),
             }
             for fold in left_out.folds
+        ],
+    }
+
+
+def _photograph(fold: Fold) -> dict[str, Any] | None:
+    if fold.specimen is None:
+        return None
+    return {
+        "row": fold.row + 1,
+        "values": fold.specimen.values,
+        "gain": fold.specimen.gain,
+        "errors": [
+            {"quantity": name, "unit": edge(name)[1], "error": error * edge(name)[2]}
+            for name, error in fold.errors_updated.items()
         ],
     }
 
@@ -215,7 +235,7 @@ def _constants(found: Calibration) -> list[dict[str, Any]]:
                 "name": unknown.name,
                 "value": found.values[unknown.name],
                 "unit": unknown.unit,
-                "robots": list(dict.fromkeys(label for label, _ in unknown.sets)),
+                "robots": list(dict.fromkeys(one.label for one in unknown.sets)),
                 "interval_95": None if interval is None else [interval.lower, interval.upper],
                 "interval_reason": "" if interval is None else interval.reason,
                 "standard_deviation": _finite(found.deviations[unknown.name]),

@@ -8,6 +8,7 @@ from math import isfinite
 from pathlib import Path
 
 from notchflex.errors import InputError
+from notchflex.fit.assessment.diagnosis import with_unit
 from notchflex.fit.documents import data_of
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.model.constants import Unknown
@@ -62,10 +63,10 @@ def write_fitted(
     for label, target in targets.items():
         robot = found.robots[label]
         notes = {
-            path: _note(found, unknown)
+            one.path: _note(found, unknown)
             for unknown in found.problem.unknowns
-            for owner, path in unknown.sets
-            if owner == label and path not in SENSOR
+            for one in unknown.sets
+            if one.label == label and one.path not in SENSOR
         }
         write_text(target, robot_text(robot, source_of(robot), notes))
     return files
@@ -73,13 +74,15 @@ def write_fitted(
 
 def _note(found: Calibration, unknown: Unknown) -> str:
     """The comment beside a fitted value: the data, and how far to trust it."""
-    labels = dict.fromkeys(owner for owner, _ in unknown.sets)
+    labels = dict.fromkeys(one.label for one in unknown.sets)
     files = [Path(one).name for label in labels for one in data_of(found, label)]
     files = list(dict.fromkeys(" ".join(one.split()) for one in files))
     if len(files) > _FILES:
         files = [*files[: _FILES - 1], f"{len(files) - _FILES + 1} more files"]
     trouble = "" if found.converged else "; the search did not settle"
-    return f"{', '.join(files)}: {_trust(found, unknown)}{trouble}"
+    value = with_unit(found.values[unknown.name], unknown.unit)
+    rule = "" if unknown.path == unknown.sets[0].path else f"`{unknown.path}` = {value}, "
+    return f"{', '.join(files)}: {rule}{_trust(found, unknown)}{trouble}"
 
 
 def _trust(found: Calibration, unknown: Unknown) -> str:

@@ -12,6 +12,7 @@ from notchflex.robot.friction.frictionless import Frictionless
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.materials.linear import Linear
 from notchflex.robot.materials.nitinol import Nitinol
+from notchflex.robot.materials.stress_strain import StressStrain
 from notchflex.robot.materials.superelastic import Superelastic
 from notchflex.robot.notches.arc import ArcNotch
 from notchflex.robot.notches.opening import Opening
@@ -41,6 +42,7 @@ __all__ = [
     "Notch",
     "Opening",
     "Robot",
+    "StressStrain",
     "StripNotch",
     "Superelastic",
     "Tendon",

@@ -62,6 +62,18 @@ def kinds_in(annotation: Any) -> list[type]:
     return [annotation] if is_part else []
 
 
+def is_list(field: Any) -> bool:
+    """Whether a field, pydantic's record of it, takes a list of values; None takes nothing."""
+
+    def takes(annotation: Any) -> bool:
+        origin = typing.get_origin(annotation)
+        if origin in (Annotated, Union, types.UnionType):
+            return any(map(takes, typing.get_args(annotation)))
+        return origin is tuple
+
+    return field is not None and takes(field.annotation)
+
+
 @functools.cache
 def kind_of(cls: type) -> str:
     """Return the word that names a kind in a file, "" for a part that comes in one kind only."""
@@ -126,6 +138,9 @@ class _Place:
                 self.name = f"notch[{sum(repeats[:item]) + 1}]"
                 self.note = f" (in the [[notch]] table number {item + 1})"
             return
+        if isinstance(item, int) and is_list(self.field):
+            self.name += f"[{item + 1}]"
+            return
         if isinstance(item, int):  # a positional argument of a part made in Python
             names = [f.name for f in dataclasses.fields(cast("Any", self.cls)) if not f.kw_only]
             item = names[item] if item < len(names) else f"argument {item + 1}"
@@ -189,6 +204,12 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
     if kind == "literal_error":
         allowed = typing.get_args(place.field.annotation)
         return f"allowed: {_quoted(allowed)}{nearest(str(got), allowed)}"
+    if is_list(place.field) and not place.kinds:
+        if kind in ("too_short", "too_long"):
+            count = record["ctx"]["min_length" if kind == "too_short" else "max_length"]
+            return f"give at {'least' if kind == 'too_short' else 'most'} {count:g} values"
+        if kind in ("tuple_type", "list_type"):
+            return "it must be a list of numbers in brackets, such as [0.01, 0.05]"
     if kind == "too_short":
         return f"give at least one {place.wanted.removeprefix('a ')}"
     if kind in ("tuple_type", "list_type"):

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from notchflex._summary import Summary, short
-from notchflex.robot.error_messages import fields_of
+from notchflex.robot.error_messages import fields_of, is_list
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot
 
 MOST = 4
 """Different values of one key that are listed; of more, their range."""
+
+# A longer row goes on below.
+_WIDTH = 145
 
 _HINT = ".plot() draws it; .with_value(...) returns a changed copy"
 
@@ -28,7 +32,12 @@ def robot_summary(robot: Robot) -> Summary:
     for name in ("material", "friction"):
         part = getattr(robot, name)
         rows.append((name, ", ".join(one for one in (part.kind, _words([part])) if one)))
-    return Summary(f"Robot {robot.name}", rows, _HINT)
+    lines = [
+        (name if number == 0 else "", line)
+        for name, words in rows
+        for number, line in enumerate(wrap(words, _WIDTH) or [""])
+    ]
+    return Summary(f"Robot {robot.name}", lines, _HINT)
 
 
 def _words(parts: Sequence[Any]) -> str:
@@ -41,8 +50,13 @@ def _words(parts: Sequence[Any]) -> str:
         extra = field.json_schema_extra
         unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
         title = name.removesuffix(f"_{unit}").replace("_", " ")
-        words.append(f"{title} {_values(values)} {unit}".strip())
+        shown = " and ".join(_curve(one) for one in values if one) if is_list(field) else ""
+        words.append(f"{title} {shown or _values(values)} {unit}".strip())
     return ", ".join(words)
+
+
+def _curve(values: Sequence[float]) -> str:
+    return f"{short(values[0])} to {short(values[-1])} ({len(values)} values)"
 
 
 def _values(values: Sequence[Any]) -> str:

@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree
 from notchflex.loads.command import Command
-from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
 from notchflex.solver.block_elimination import Iterate, linear_step
@@ -183,7 +183,14 @@ def newton(
             terminate=solved | at_rounding | (~accept & (search.tries >= _TRIES)),
         )
 
-    return jax.lax.while_loop(proceed, iterate, _begin(problem, start)).best
+    best = jax.lax.while_loop(proceed, iterate, _begin(problem, start)).best
+    if not chain.law.remembers:
+        return best
+    # Not carried through the loop: it is long, and only that of the last point counts.
+    modes = best.point.unknowns.modes
+    return best._replace(
+        material=flexure_states(chain, modes, memory.material, with_pose=False).memory
+    )
 
 
 def _begin(problem: NewtonProblem, start: Iterate) -> _Search:
@@ -192,7 +199,7 @@ def _begin(problem: NewtonProblem, start: Iterate) -> _Search:
         point=start,
         slid=problem.memory.slid,
         bound=problem.memory.bound,
-        material=problem.memory.material,
+        material=(),
         stroke=jnp.zeros(problem.chain.tendons),
         residual=jnp.array(jnp.inf),
         iterations=jnp.array(-1),
@@ -232,7 +239,7 @@ def _result(
         point=point,
         slid=tuple(span.slid for span in at.spans),
         bound=tuple(span.bound for span in at.spans),
-        material=at.flexure.memory,
+        material=(),
         stroke=stroke(chain, point.base_tension, at.base),
         residual=residual,
         iterations=iterations,

@@ -11,54 +11,19 @@ import pytest
 from scipy.optimize import brentq
 
 import notchflex as nf
-from notchflex._jax import jax
-from notchflex.mechanics.chain.fibres import with_fibres
-from notchflex.mechanics.flexure import rod
+from fibre_sections import ENDS, bending, energy, fine_fibres, moment, respond, section
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
-from notchflex.mechanics.section.fibres import Points, sector_fibres, segment_fibres
-
-TUBE = nf.Tube(1.62, 1.40)
-ENDS = NotchEnds(
-    weak=0.6, strong=0.0, axial=0.0, torsion=0.0, odd=0.2, even=0.1, material_share=0.25
+from notchflex.mechanics.section.fibres import (
+    FIBRES,
+    Points,
+    gauss_rule,
+    sector_fibres,
+    segment_fibres,
 )
+
 STRAIGHT = dataclasses.replace(ENDS, odd=0.0, even=0.0)
 BILINEAR = nf.Nitinol(42000.0, 350.0, 6000.0, compression_ratio=1.3)
 HYSTERETIC = dataclasses.replace(BILINEAR, unloading_stress=150.0)
-
-respond = jax.jit(lambda law, strain, section, memory: law.respond(strain, section, memory))
-energy = jax.jit(lambda law, strain, section, memory: law.energy(strain, section, memory))
-
-
-def section(cut: str = "on-axis", ends: NotchEnds | None = None) -> FibreSection:
-    notch = nf.ArcNotch(cut, 1.40, 0.8, uncut_length=1.2)
-    made = with_fibres(rod(notch, TUBE), notch, TUBE).section
-    return dataclasses.replace(jax.tree.map(lambda leaf: leaf[0], made), ends=ends)
-
-
-def bending(curvature: float) -> np.ndarray:
-    return np.array([0.0, curvature, 0.0, 0.0, 0.0, 0.0])
-
-
-def moment(law: SectionLaw, curvature: float, own: FibreSection) -> float:
-    return float(respond(law, bending(curvature), own, ()).resultants[1])
-
-
-def fine_fibres(cut: str) -> tuple[np.ndarray, np.ndarray]:
-    """Strips of the section between horizontal lines: arm from the centroid, area."""
-    outer, inner, depth = 0.81, 0.70, 1.40
-    if cut == "on-axis":
-        half = np.arccos((depth - outer) / outer)
-        angle = (np.arange(4000) + 0.5) / 4000 * half
-        radius = inner + (np.arange(200) + 0.5) / 200 * (outer - inner)
-        arm = (radius[:, None] * np.cos(angle)).ravel()
-        cell = half / 4000 * (outer - inner) / 200
-        area = (2.0 * cell * radius[:, None] * np.ones(4000)).ravel()
-    else:
-        plane = depth - outer
-        height = plane + (np.arange(400_000) + 0.5) / 400_000 * (outer - plane)
-        chords = [np.sqrt(np.maximum(r**2 - height**2, 0.0)) for r in (outer, inner)]
-        arm, area = height, 2.0 * (chords[0] - chords[1]) * (outer - plane) / 400_000
-    return arm - area @ arm / area.sum(), area
 
 
 @pytest.mark.parametrize("depth", [0.05, 0.4, 0.81, 1.2, 1.40, 1.55])
@@ -71,6 +36,15 @@ def test_fibres_make_up_the_section(fibres: Callable[..., Points], depth: float)
     assert area @ arm / area.sum() == pytest.approx(float(own.centroid), rel=1e-4)
     second = area @ (arm - float(own.centroid)) ** 2
     assert second == pytest.approx(float(own.second_moment_weak), rel=1e-3)
+
+
+def test_fibres_keep_the_polynomials_of_the_section() -> None:
+    strips = sector_fibres(0.81, 0.70, 1.40)
+    arm, area = gauss_rule(*strips, FIBRES)
+    for degree in range(2 * FIBRES):
+        expected = strips[1] @ strips[0] ** degree
+        assert area @ arm**degree == pytest.approx(expected, rel=1e-12)
+    assert (area > 0.0).all()
 
 
 def stress(strain: np.ndarray) -> np.ndarray:

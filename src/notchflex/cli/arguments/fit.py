@@ -45,8 +45,10 @@ def _read_source(text: str) -> DataSource:
     label = words[0] if len(words) == 3 else robot_label(robot)
     if ":" in label or os.sep in label:
         raise InputError.BAD_SYNTAX(f"a label must not contain `:` or `{os.sep}`; choose another.")
-    if label == "each":
-        raise InputError.CONFLICT("the label `each` stands for every robot; choose another.")
+    if label in ("each", "offset", "factor"):
+        raise InputError.CONFLICT(
+            f"the label `{label}` has a meaning before names of constants; choose another."
+        )
     return DataSource(label, robot, data)
 
 
@@ -163,7 +165,9 @@ class FitOptions:
         Parameter(
             help="Constants to find, joined by commas: values of the robot file, shared by all "
             "robots; `LABEL:` before one for a single robot, `each:` for one in every robot, "
-            "`notch[each].` for one in every notch; `sensor.force_offset`, `sensor.stroke_slack`."
+            "`notch[each].` for one in every notch; `offset:notch.depth` added to, "
+            "`factor:notch.height` multiplying every such value; `notch.precurvature_deg/height`; "
+            "`sensor.force_offset`, `sensor.force_factor`, `sensor.stroke_slack`."
         ),
     ]
     bounds: Annotated[
@@ -246,6 +250,14 @@ class BeyondFit:
         Literal["pull", "robot"] | None,
         Parameter(help="Also fit without each pull or robot, and predict what was left out."),
     ] = None
+    photograph: Annotated[
+        bool,
+        Parameter(
+            negative=(),
+            help="With `--leave-out robot`: update the constants that each robot has of its own "
+            "(`each:`) by one row of the robot left out, and predict its other rows again.",
+        ),
+    ] = False
     next: Annotated[
         tuple[TendonCommand, ...],
         tendon_command("--next"),
@@ -286,6 +298,10 @@ class BeyondFit:
                     "one of the two."
                 )
             need("numpyro", "bayes", "--posterior")
+        if self.photograph and self.leave_out != "robot":
+            raise InputError.CONFLICT(
+                "--photograph belongs to --leave-out robot: it is of the robot left out."
+            )
         if self.leave_out == "robot" and len(sources.robots) < 2:
             raise InputError.TOO_FEW_DATA(
                 "--leave-out robot: there is only one robot; give two or more."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -47,6 +47,15 @@ OnePath = Annotated[
         help="Take the rows of each pull as one loading path with friction history, or each row as "
         "loaded from rest. Without either the column `from_rest` of the file decides, else the "
         "order of its rows: a force that falls step by step within a pull makes it a path.",
+    ),
+]
+
+MeasuredAs = Annotated[
+    Literal["ring", "edge"],
+    Parameter(
+        help="What columns such as `notch_1_deg` hold: the angle between the uncut pieces beside a "
+        "notch, or between its two faces, as `notch_1_edge_deg` does. They differ with elastic "
+        "ends."
     ),
 ]
 
@@ -157,17 +166,21 @@ def _label_and_robot(text: str) -> tuple[str, str]:
     return robot_label(text.strip()), text.strip()
 
 
-def read_data(file: str, robot: Robot, path: bool | None) -> Measurements:
+def read_data(
+    file: str, robot: Robot, path: bool | None, measured_as: Literal["ring", "edge"] = "ring"
+) -> Measurements:
     """Read measurements, and write how the rows were interpreted and what was not used.
 
     Args:
         file: The file.
         robot: The robot that was measured.
         path: The value of `--path`: None where neither it nor `--from-rest` was given.
+        measured_as: The value of `--measured`.
     """
     from notchflex.fit.measurements.csv import read_measurements
 
-    measured = read_measurements(file, robot, from_rest=None if path is None else not path)
+    rest = None if path is None else not path
+    measured = read_measurements(file, robot, from_rest=rest, measured=measured_as)
     if measured.order:
         terminal.note(f"{measured.source}: {measured.order}.")
     if measured.ignored:

@@ -14,7 +14,7 @@ from notchflex.cli.interview.readings import choice, reading, readings, whole
 from notchflex.cli.interview.wordings import OPTIONS, WORDINGS
 from notchflex.errors import InputError
 from notchflex.robot import Nitinol, Robot, Superelastic, Tendon, Tube
-from notchflex.robot.error_messages import fields_of, kind_of
+from notchflex.robot.error_messages import fields_of, is_list, kind_of
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.robot import MOST_NOTCHES
 
@@ -107,7 +107,8 @@ def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
     """Ask for the number of notches of a kind, and for their keys: one value, or one for each."""
     kind = _usual_or_asked(interview, "--kind", Notch, "Kind of notch, ")
     worded = WORDINGS.get(("notch", kind_of(kind)))
-    keys = list(worded or (key for key in fields_of(kind) if key not in ("kind", "repeat")))
+    unasked = ("kind", "repeat", "ends")
+    keys = list(worded or (key for key in fields_of(kind) if key not in unasked))
     same = {"cut": _ask(interview, "notch", kind, "cut")} if "cut" in keys else {}
     count: int = interview.ask(
         Question(
@@ -116,8 +117,9 @@ def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
             lambda text: whole(text, at_least=1, at_most=MOST_NOTCHES),
         )
     )
-    # From the drawing, unless told otherwise.
-    further = {"ends": "shell"} if "ends" in fields_of(kind) and "ends" not in keys else {}
+    # From the drawing, unless told otherwise: the papers' kind of ends stands first.
+    ends = fields_of(kind).get("ends")
+    further = {} if ends is None else {"ends": typing.get_args(ends.annotation)[-1]}
     further |= interview.set_values("notch", but=tuple(keys))
     columns: dict[str, list[Any]] = {
         key: [value] * count for key, value in (same | further).items()
@@ -242,6 +244,8 @@ def _reader(
     def read(text: str) -> Any:
         if type(None) in choices and text.lower() == "none":
             return each(None)
+        if is_list(field):
+            return each(tuple(reading(one.strip()) for one in text.split(",")))
         return reading(text, **bounds) if count is None else readings(text, count, **bounds)
 
     return read, False

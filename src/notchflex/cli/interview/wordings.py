@@ -166,6 +166,7 @@ _NEVER_ASKED = {
     ("notch", "closing"): "assumed",
     ("tendon", "path"): "assumed",
     ("tendon", "free_length"): "assumed; without effect on an inextensible tendon",
+    ("material", "compression_ratio"): "estimate: nitinol has 1 to 1.5",
     ("material", "plastic_strain"): _CODE,
     ("material", "plastic_modulus"): _CODE,
     ("material", "plastic_exponent"): _CODE,

@@ -57,6 +57,35 @@ def print_left_out(left_out: LeftOut) -> None:
     console.print(
         terminal.table(["left out", "quantity", ">error", ">of fit to all", "unit"], rows)
     )
+    _print_specimens(left_out)
+
+
+def _print_specimens(left_out: LeftOut) -> None:
+    """Print what is known of constants that robots have of their own, before and after a row."""
+    from notchflex.fit.assessment.errors_of_parts import edge
+
+    console = terminal.output()
+    constants: list[list[str]] = []
+    errors: list[list[str]] = []
+    for fold in left_out.folds:
+        for name, (mean, size) in fold.before.items():
+            found = "-" if fold.specimen is None else f"{fold.specimen.values[name]:.4g}"
+            gain = "-" if fold.specimen is None else f"{fold.specimen.gain:.2f}"
+            constants.append([fold.label, name, f"{mean:.4g} ± {size:.2g}", found, gain])
+        inside = fold.share_inside()
+        for name, error in fold.errors.items() if fold.before else ():
+            title, unit, scale = edge(name)
+            after = fold.errors_updated.get(name, math.nan) * scale
+            row = [fold.label, title, f"{100.0 * inside[name]:.0f} %"]
+            errors.append([*row, f"{error * scale:.3g}", _plain(after), unit])
+    if not constants:
+        return
+    console.print("\nConstants of a robot left out, by prior and others, and by one row of it:")
+    heads = ["left out", "constant", ">before", ">photograph", ">width of total after / before"]
+    console.print(terminal.table(heads, constants))
+    console.print()
+    heads = ["left out", "quantity", ">in 90 % band", ">error", ">after photograph", "unit"]
+    console.print(terminal.table(heads, errors))
 
 
 def print_next(best: NextMeasurement) -> None:

@@ -27,6 +27,8 @@ def print_comparison(comparison: Comparison, others: dict[str, Comparison]) -> N
         f"{comparison.points} points of {trials} trial{'s' if trials > 1 else ''}, each "
         f"{'pulled from rest' if measured.from_rest else 'trial one loading path'}"
     )
+    if comparison.angle == "edge_angle":
+        console.print("angles between the faces of the notches (edge angles)")
     models = {"model": comparison, **others}
     columns = _columns(models)
     for first in range(0, len(columns), MOST_COLUMNS):  # a wide robot in parts of 80 columns each

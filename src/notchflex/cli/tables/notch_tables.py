@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from itertools import compress, groupby, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -25,6 +25,10 @@ _MEANINGS = {
 }
 SHORTER = {"precurvature_deg": "precurved_deg", "direction_deg": "toward_deg"}
 """Heads for what every notch has, so that there is room for what is its own."""
+
+
+# Values that a table leaves out where all notches have them.
+_USUAL = (None, "rigid", "outer")
 
 
 def print_robot(robot: Robot, title: str, length: float, notches: list[dict[str, Any]]) -> None:
@@ -68,7 +72,7 @@ def description_tables(robot: Robot) -> list[Table]:
         kinds.setdefault(kind, {}).setdefault(tuple(values.values()), []).append(number)
     tables: list[Table] = []
     for kind, alike in kinds.items():
-        used = [any(value is not None for value in column) for column in zip(*alike, strict=True)]
+        used = [any(value not in _USUAL for value in column) for column in zip(*alike, strict=True)]
         rows = [
             [run_of(numbers), *map(_value, compress(values, used))]
             for values, numbers in alike.items()
@@ -147,6 +151,8 @@ def _numbers(rows: list[dict[str, Any]], key: str, form: str, scale: float = 1.0
 def _value(value: Any) -> str:
     if value is None:
         return NO_NUMBER
+    if isinstance(value, tuple):
+        return " ".join(f"{one:g}" for one in cast("tuple[float, ...]", value))
     return value if isinstance(value, str) else f"{value:g}"
 
 

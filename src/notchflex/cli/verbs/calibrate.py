@@ -16,7 +16,7 @@ from notchflex.cli.arguments.fit import (
     Sources,
 )
 from notchflex.cli.arguments.loads import load_columns
-from notchflex.cli.arguments.robots import OnePath, Settings, read_data
+from notchflex.cli.arguments.robots import MeasuredAs, OnePath, Settings, read_data
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
 from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED
 from notchflex.errors import InputError
@@ -30,6 +30,7 @@ def calibrate(
     *pairs: Sources,
     search: FitOptions,
     path: OnePath = None,
+    measured: MeasuredAs = "ring",
     beyond: BeyondFit = BeyondFit(),  # noqa: B008 - frozen
     settings: Settings = (),
     output: Annotated[
@@ -65,14 +66,14 @@ def calibrate(
         import notchflex.fit as fitting
 
     _check_sensor(constants)
-    measured = {
-        label: [read_data(file, robots[label], path) for file in files]
+    data = {
+        label: [read_data(file, robots[label], path, measured) for file in files]
         for label, files in sources.data.items()
     }
     with terminal.bars() as progress:
         fit = fitting.calibrate(
             robots,
-            measured,
+            data,
             [fitting.Constant(*one) for one in constants],
             starts=search.starts,
             objective=search.fit_objective(),
@@ -100,7 +101,7 @@ def _check_sensor(constants: Sequence[ParameterSpec]) -> None:
     for name, *_ in constants:
         path = name.rpartition(":")[2]
         if path.startswith("sensor.") and path not in SENSOR:
-            raise InputError.UNKNOWN_NAME(f"--fit {name}: give {' or '.join(SENSOR)}.")
+            raise InputError.UNKNOWN_NAME(f"--fit {name}: give one of {', '.join(SENSOR)}.")
 
 
 def _fitted_files(sources: DataSources, folder: str | None) -> dict[str, str]:
@@ -137,7 +138,15 @@ def _analyse(
             problems.append(f"{option}: {problem}")
 
     if by := beyond.leave_out:
-        attempt("--leave-out", fitting.leave_out, by=by, seed=seed, progress=progress)
+        part = fitting.PHOTOGRAPH if beyond.photograph else None
+        attempt(
+            "--leave-out",
+            fitting.leave_out,
+            by=by,
+            photograph=part,
+            seed=seed,
+            progress=progress,
+        )
     if candidates is not None:
         attempt(
             "--next",

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import texts
 from notchflex.cli.arguments.robots import (
+    MeasuredAs,
     OnePath,
     RobotName,
     Settings,
@@ -37,6 +38,7 @@ def compare(
     /,
     *,
     path: OnePath = None,
+    measured: MeasuredAs = "ring",
     beside: Annotated[
         tuple[str, ...],
         texts(
@@ -63,18 +65,18 @@ def compare(
     outputs = Outputs([*robot_files(robot), data], quiet=quiet, json=json, csv=csv, plot=plot)
     chosen = chosen_robot(robot, settings)
     values = dict(_variant(text) for text in beside)
-    measured = read_data(data, chosen, path)
+    seen = read_data(data, chosen, path, measured)
     robots = {label: chosen.with_values(one) for label, one in values.items() if one is not None}
-    with terminal.counting(f"solving {len(measured)} rows of {chosen.name}") as counted:
+    with terminal.counting(f"solving {len(seen)} rows of {chosen.name}") as counted:
         terminal.use_compile_cache()
         from notchflex import comparison as comparing
 
-        comparison = comparing.compare(chosen, measured)
+        comparison = comparing.compare(chosen, seen)
         others: dict[str, Comparison] = {}
         for number, label in enumerate(values, 1):
             counted(number, 1 + len(values))
             others[label] = (
-                comparing.compare(robots[label], measured)
+                comparing.compare(robots[label], seen)
                 if label in robots
                 else comparing.compare_kinematics(comparison)
             )

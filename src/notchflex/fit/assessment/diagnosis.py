@@ -91,7 +91,7 @@ def _far(found: Calibration) -> Iterator[str]:
     """Constants far from the robot file, or from their prior."""
     for unknown, value in zip(found.problem.unknowns, found.best.values.tolist(), strict=True):
         within = unknown.first <= value <= unknown.last
-        if not within and unknown.sets[0][1] not in SENSOR:
+        if not within and unknown.path not in SENSOR:
             was, now = (with_unit(one, unknown.unit) for one in (unknown.start, value))
             yield (
                 f"{unknown.name} went from {was} to {now}, much farther than such values differ: "

@@ -15,6 +15,7 @@ from notchflex.results.quantities.registry import DEGREES, QUANTITIES
 
 # Quantities that are not registered as results: title, unit, and the factor to it.
 _MEASURED_ONLY = {
+    "total_edge_angle": ("total edge angle", QUANTITIES["total_angle"].unit, DEGREES),
     "tip_rotation": ("tip rotation", QUANTITIES["total_angle"].unit, DEGREES),
     "tip_tension": ("tension at the tip", QUANTITIES["span_tension"].unit, 1.0),
     "axis_points": ("points on the axis", QUANTITIES["tip_position"].unit, 1.0),
@@ -69,8 +70,8 @@ def part_title(quantity: str, part: int) -> str:
         >>> part_title("notch_angle", 2), part_title("total_angle", 0)
         ('notch 2', 'total bending angle')
     """
-    if quantity == "notch_angle":
-        return f"notch {part}"
+    if quantity in ("notch_angle", "edge_angle"):
+        return f"notch {part}{', edges' if quantity == 'edge_angle' else ''}"
     title = edge(quantity)[0]
     return f"{title}, tendon {part}" if part else title
 
@@ -98,7 +99,7 @@ def _of_robot(found: Calibration, label: str) -> Iterator[PartError]:
         _, unit, scale = edge(quantity)
         floor = _floor([one for one in measured if quantity in one.observed], quantity) * scale
         parts = residuals.part[mine] + 1
-        if quantity in _VECTORS or quantity == "total_angle":
+        if quantity in (*_VECTORS, "total_angle", "total_edge_angle"):
             parts = np.zeros(len(parts), int)
         # Three components are one point, or one rotation of a row.
         single = residuals.row if quantity == "tip_rotation" else residuals.point

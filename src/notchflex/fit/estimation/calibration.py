@@ -18,6 +18,7 @@ from notchflex.fit.estimation.noise import Noise
 from notchflex.fit.estimation.problem import Problem
 from notchflex.fit.model.residuals import Residuals
 from notchflex.robot import Robot
+from notchflex.solver.newton import Settings
 
 # Probability below which noise does not explain the misfit: the model misses something.
 _UNLIKELY = 0.01
@@ -84,6 +85,11 @@ class Calibration:
         """Standard deviations of the measured numbers."""
         assert self.problem.noise is not None
         return self.problem.noise
+
+    @property
+    def settings(self) -> Settings:
+        """Settings of the solver."""
+        return self.problem.samples.every[0].settings
 
     @property
     def solves(self) -> int:
@@ -205,7 +211,10 @@ class Calibration:
         Infinite if nothing measured depends on a constant, or the noise is unknown.
         """
         if not self.is_likelihood:
-            return self.by_pulls.covariance
+            # What only priors determine does not scatter between pulls.
+            inverse = inverse_of(self.reached.curvature)
+            scatter = self.problem.scatter_of_priors(self.residuals)
+            return self.by_pulls.covariance + (inverse * np.nan_to_num(scatter)) @ inverse
         wider = self.by_pulls.wider
         return self.covariance_by_rows * np.outer(wider, wider)
 

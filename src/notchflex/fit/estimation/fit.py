@@ -76,7 +76,7 @@ def calibrate(
         True
     """
     check_search(starts, seed)
-    named = _by_label(robots)
+    named = by_label(robots)
     data = _of_robots(named, measurements)
     samples = Samples.of(named, data, unknowns(named, fit), settings)
     return fitted(
@@ -93,7 +93,12 @@ def check_search(starts: object, seed: object) -> None:
             )
 
 
-def _by_label(robots: Robot | Mapping[str, Robot]) -> dict[str, Robot]:
+def by_label(robots: Robot | Mapping[str, Robot]) -> dict[str, Robot]:
+    """Return robots by label; a single one has its name for it.
+
+    Raises:
+        InputError: They are no robots.
+    """
     single = not isinstance(robots, Mapping)
     named = {getattr(robots, "name", ""): robots} if single else dict(robots)
     if not all(isinstance(one, Robot) for one in named.values()):  # pyright: ignore

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex.fit.measurements.measurements import OBSERVED, Measurements
+from notchflex.fit.measurements.measurements import OBSERVED
 from notchflex.fit.measurements.repeats import repeats
 from notchflex.fit.model.residuals import Residuals
 from notchflex.fit.model.samples import Samples
@@ -17,8 +17,6 @@ _FIRST: dict[str, float] = {"tip_tension": 0.01, "tip_position": 0.1, "axis_poin
 _FIRST_ANGLE = float(np.radians(1.0))
 # Nothing is measured better than this part of that; else an exact fit would have no noise at all.
 _LEAST = 1e-9
-# Rounding of a sum of angles (rad); angles are not measured to that.
-_ADDED_UP = 1e-4
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ def first_noise(samples: Samples, residuals: Residuals) -> Noise:
             mine = residuals.of(number, name)
             missing = mine & ~(deviation > 0.0)
             key = (number, name)
-            if name == "total_angle" and _is_sum(sample.measured):
+            if sample.measured.is_sum(name):
                 deviation[mine] = np.inf
                 source[key] = "sum of the notches"
             elif not missing.any():
@@ -72,15 +70,6 @@ def first_noise(samples: Samples, residuals: Residuals) -> Noise:
                 estimated |= missing
                 source[key] = "fit"
     return Noise(deviation, estimated, source)
-
-
-def _is_sum(measured: Measurements) -> bool:
-    """Whether the total angle was not measured, but added up from the notches."""
-    notches = measured.observed.get("notch_angle")
-    if notches is None:
-        return False
-    total = measured.observed["total_angle"]
-    return bool(np.allclose(notches.sum(axis=1), total, rtol=0.0, atol=_ADDED_UP))
 
 
 def noise_left(noise: Noise, residuals: Residuals, constants: int) -> Noise:

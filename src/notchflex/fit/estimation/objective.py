@@ -23,6 +23,13 @@ class FitObjective(Protocol):
         """Raise InputError if it cannot be made of these quantities."""
         ...
 
+    takes_priors: ClassVar[bool]
+    """Whether a prior may be added to it."""
+
+    def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
+        """Return what half the square of a residual over its noise adds to the value."""
+        ...
+
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
         """Return value, gradient and curvature."""
         ...
@@ -43,6 +50,7 @@ class LeastSquares:
 
     huber: float | None = None
     is_likelihood: ClassVar[bool] = True
+    takes_priors: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         """Check the number."""
@@ -51,6 +59,10 @@ class LeastSquares:
 
     def check(self, quantities: tuple[str, ...]) -> None:
         """Accept every quantity."""
+
+    def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
+        """Return 1: it is a sum of such halves."""
+        return 1.0
 
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
         """Return half the sum of squares, or of Huber's function."""
@@ -71,7 +83,10 @@ class LeastSquares:
 class SumOfRobotErrors:
     """Sum over all robots of the norm of their root-mean-square errors, deg (Pacheco 2021, eq. 17).
 
-    Each robot adds the 2-norm of the vector of errors of its notches and of its total angle.
+    Each robot adds the 2-norm of the vector of errors of its notches and of its total angle. A
+    prior counts as one more reading that is off by as many standard deviations of its noise: at
+    residuals as large as the noise, half a squared deviation adds noise / (rows * root of the
+    angles in a row) degrees, the mean over the robots.
 
     Example:
         >>> SumOfRobotErrors().is_likelihood
@@ -79,10 +94,20 @@ class SumOfRobotErrors:
     """
 
     is_likelihood: ClassVar[bool] = False
+    takes_priors: ClassVar[bool] = True
 
     def check(self, quantities: tuple[str, ...]) -> None:
         """Raise InputError unless all quantities are angles."""
         _check(quantities, ANGLES, "SumOfRobotErrors adds angles")
+
+    def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
+        """Return the mean over the robots where residuals are as large as the noise, deg."""
+        known, size = np.isfinite(noise), int(residuals.robot.max()) + 1
+        robot = residuals.robot[known]
+        count = np.bincount(robot, minlength=size)
+        noise = np.sqrt(np.bincount(robot, noise[known] ** 2, size) / count)
+        rows = np.array([residuals.rows[residuals.robot == one][0] for one in range(size)])
+        return float(np.degrees(np.mean(noise / np.sqrt(rows * count))))
 
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
         """Return the sum of norms, a group per robot, each over the root of its number of rows."""
@@ -100,10 +125,15 @@ class SumOfDistances:
     """
 
     is_likelihood: ClassVar[bool] = False
+    takes_priors: ClassVar[bool] = False
 
     def check(self, quantities: tuple[str, ...]) -> None:
         """Raise InputError unless all quantities are points."""
         _check(quantities, LENGTHS, "SumOfDistances adds distances of points")
+
+    def weight_of_one(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> float:
+        """Return 0: it takes no priors."""
+        return 0.0
 
     def cost(self, residuals: Residuals, noise: Float[np.ndarray, " r"]) -> Cost:
         """Return the sum of norms, a group per point."""

@@ -13,6 +13,7 @@ from notchflex.fit.estimation.intervals import unit_free
 from notchflex.fit.estimation.minimise import Cost, Minimum, Vector, minimise
 from notchflex.fit.estimation.noise import Noise, first_noise
 from notchflex.fit.estimation.objective import FitObjective
+from notchflex.fit.model.residuals import Residuals
 from notchflex.fit.model.samples import Samples
 
 Progress = Callable[[str, int, int], None]
@@ -39,9 +40,9 @@ class Problem:
 
     def __init__(self, samples: Samples, objective: FitObjective) -> None:
         objective.check(samples.quantities)
-        if not objective.is_likelihood and any(one.prior for one in samples.unknowns):
+        if not objective.takes_priors and any(one.prior for one in samples.unknowns):
             raise InputError.UNSUPPORTED(
-                "a prior needs LeastSquares(); other objectives are no likelihoods"
+                "a prior needs LeastSquares() or SumOfRobotErrors(); other objectives take none"
             )
         self.samples, self.objective, self.unknowns = samples, objective, samples.unknowns
         self.noise: Noise | None = None
@@ -61,11 +62,20 @@ class Problem:
         for number, unknown in enumerate(self.unknowns):
             if unknown.prior is not None:  # as a measurement of the constant itself
                 mean, deviation = unknown.prior
+                weight = self.objective.weight_of_one(residuals, self.noise.deviation)
                 off = (float(values[number]) - mean) / deviation
-                cost = cost._replace(value=cost.value + 0.5 * off**2)
-                cost.gradient[number] += off / deviation
-                cost.curvature[number, number] += 1.0 / deviation**2
+                cost = cost._replace(value=cost.value + 0.5 * weight * off**2)
+                cost.gradient[number] += weight * off / deviation
+                cost.curvature[number, number] += weight / deviation**2
         return cost
+
+    def scatter_of_priors(self, residuals: Residuals) -> Float[np.ndarray, " k"]:
+        """Return the variance of the gradient of the objective that the priors stand for."""
+        assert self.noise is not None
+        weight = self.objective.weight_of_one(residuals, self.noise.deviation)
+        return np.array(
+            [0.0 if one.prior is None else (weight / one.prior[1]) ** 2 for one in self.unknowns]
+        )
 
     def minimum(self, start: Vector) -> Minimum:
         """Return the minimum that a search from a start ends at."""

@@ -34,7 +34,7 @@ BASE_TURN = "base_r{a}_deg"
 
 _AXIS = re.compile(r"axis_(\d+(?:\.\d+)?)_([xyz])_(?:sd_)?mm")
 _NUMBERED = re.compile(
-    r"notch_\d+_(?:sd_)?deg"
+    r"notch_\d+_(?:edge_)?(?:sd_)?deg"
     r"|tendon_\d+_(?:force_N|displacement_mm|tip_force_(?:sd_)?N)"
     r"|body_\d+_(?:force_[xyz]_N|moment_[xyz]_Nmm|point_[xyz]_mm|following)"
 )
@@ -69,10 +69,12 @@ def measured_columns(
     notches: int, tendons: int, axis_at: Sequence[float]
 ) -> Iterator[MeasuredColumn]:
     """Yield all columns that measurements of a robot may have; a single tendon has no number."""
-    for notch in range(notches):
-        name = QUANTITIES["notch_angle"].header(notch=notch + 1)
-        yield MeasuredColumn(name, "notch_angle", (notch,))
+    for quantity in ("notch_angle", "edge_angle"):
+        for notch in range(notches):
+            name = QUANTITIES[quantity].header(notch=notch + 1)
+            yield MeasuredColumn(name, quantity, (notch,))
     yield MeasuredColumn(QUANTITIES["total_angle"].header(), "total_angle", ())
+    yield MeasuredColumn("total_edge_deg", "total_edge_angle", ())
     for axis, letter in enumerate(AXES):
         name = QUANTITIES["tip_position"].header(axis=letter)
         yield MeasuredColumn(name, "tip_position", (axis,))

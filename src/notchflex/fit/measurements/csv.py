@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,11 @@ Numbers = NDArray[np.float64]
 
 
 def read_measurements(
-    source: str | os.PathLike[str], robot: Robot, *, from_rest: bool | None = None
+    source: str | os.PathLike[str],
+    robot: Robot,
+    *,
+    from_rest: bool | None = None,
+    measured: Literal["ring", "edge"] = "ring",
 ) -> Measurements:
     r"""Read measurements of a robot from a CSV.
 
@@ -39,6 +44,9 @@ def read_measurements(
             it, the order of the rows: a force or displacement that falls step by step is
             unloading, one that falls at once to where it began is the next pull from rest.
             `Measurements.order` says how the order was understood.
+        measured: What columns such as `notch_1_deg` hold: "ring", the angle between the uncut
+            pieces beside a notch, or "edge", the angle between its two faces, as `notch_1_edge_deg`
+            holds; then a total that was added up from them is taken so too.
 
     Returns:
         The measurements, in the order of the file.
@@ -54,6 +62,8 @@ def read_measurements(
         >>> read_measurements("pull.csv", load_robot("pacheco2021-a"))
         <Measurements of pull.csv: 2 rows of 1 pull, each from rest; total_angle>
     """
+    if measured not in ("ring", "edge"):
+        raise InputError.UNKNOWN_NAME(f'measured is "ring" or "edge"; got {measured!r}')
     reader = MeasurementReader(read_table(source), robot)
     table = reader.table
     reader.check_numbers()
@@ -64,7 +74,7 @@ def read_measurements(
     labels = next((reader.texts(name) for name in columns.PULL if name in table.header), None)
     in_file = reader.from_rest()
     order = _order(table, tension, stroke, labels, in_file if from_rest is None else from_rest)
-    return Measurements(
+    found = Measurements(
         source=table.name,
         load=LoadPath(np.maximum(tension, 0.0), stroke, base_rotation, external),
         pull=order.pull,
@@ -76,6 +86,7 @@ def read_measurements(
         ignored=tuple(name for name in table.header if name not in reader.used),
         order=order.words,
     )
+    return found.as_edge_angles() if measured == "edge" else found
 
 
 def _order(
@@ -114,6 +125,8 @@ def _observed(
     shapes = {
         "notch_angle": (notches,),
         "total_angle": (),
+        "edge_angle": (notches,),
+        "total_edge_angle": (),
         "tip_position": (3,),
         "tip_rotation": (3,),
         "tip_tension": (tendons,),

@@ -17,6 +17,8 @@ from notchflex.loads import LoadPath
 OBSERVED = (
     "notch_angle",
     "total_angle",
+    "edge_angle",
+    "total_edge_angle",
     "tip_position",
     "tip_rotation",
     "tip_tension",
@@ -25,7 +27,10 @@ OBSERVED = (
 """Quantities that can be measured."""
 
 # Axes of their arrays, rows included, and the last axis of vectors.
-_AXES = {"total_angle": 1, "axis_points": 3}
+_AXES = {"total_angle": 1, "total_edge_angle": 1, "axis_points": 3}
+# What totals are sums of. Rounding of a sum of angles (rad); angles are not measured to that.
+_SUMMED = {"total_angle": "notch_angle", "total_edge_angle": "edge_angle"}
+_ADDED_UP = 1e-4
 _VECTORS = ("tip_position", "tip_rotation", "axis_points")
 
 
@@ -42,7 +47,8 @@ class Measurements:
         from_rest: True if every row is a pull from rest; False if the rows of a pull, in their
             order, are one path with friction history.
         observed: Measured quantities by name, rows as leading axis, NaN where not measured:
-            "notch_angle" (P, n) and "total_angle" (P,) rad, "tip_position" (P, 3) mm,
+            "notch_angle" (P, n) and "total_angle" (P,) rad, between the faces of notches
+            "edge_angle" (P, n) and their sum "total_edge_angle" (P,) rad, "tip_position" (P, 3) mm,
             "tip_rotation" (P, 3) as rotation vectors in the world rad, "tip_tension" (P, t) N in
             the last span of every tendon, "axis_points" (P, m, 3) mm on the tube axis.
         deviation: Their standard deviations, in the same shapes; NaN, or left out, if unknown.
@@ -175,6 +181,40 @@ class Measurements:
     def values(self) -> int:
         """Number of measured numbers."""
         return sum(int(np.isfinite(value).sum()) for value in self.observed.values())
+
+    def is_sum(self, name: str) -> bool:
+        """Return whether a quantity is a total that was added up from the notches."""
+        parts = self.observed.get(_SUMMED.get(name, ""))
+        if parts is None or name not in self.observed:
+            return False
+        return bool(np.allclose(parts.sum(1), self.observed[name], rtol=0.0, atol=_ADDED_UP))
+
+    def as_edge_angles(self) -> Measurements:
+        """Return the same with angles of notches taken as those between their faces.
+
+        A total angle that was added up from them is taken so too.
+
+        Raises:
+            InputError: Angles between faces were measured beside those of the rings.
+        """
+        names = {"notch_angle": "edge_angle"}
+        if self.is_sum("total_angle"):
+            names["total_angle"] = "total_edge_angle"
+        if "notch_angle" not in self.observed:
+            raise InputError.CONFLICT(
+                f"{self.source} has no columns such as notch_1_deg to be read as edge angles"
+            )
+        if any(name in self.observed for name in names.values()):
+            raise InputError.CONFLICT(
+                f"{self.source} has angles of rings and of faces (notch_1_edge_deg); leave out "
+                "one of them, or read each as its column says"
+            )
+        tables = (
+            {names.get(name, name): table for name, table in tables.items()}
+            for tables in (self.observed, self.deviation)
+        )
+        observed, deviation = tables
+        return replace(self, observed=observed, deviation=deviation)
 
     def taken(self, rows: ArrayLike | slice) -> Measurements:
         """Return some of the rows.

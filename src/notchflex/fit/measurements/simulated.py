@@ -25,7 +25,7 @@ from notchflex.robot import Robot
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
 
-_ANGLES = ("notch_angle", "total_angle", "tip_rotation")
+_ANGLES = ("notch_angle", "total_angle", "edge_angle", "total_edge_angle", "tip_rotation")
 
 
 def simulate_measurements(
@@ -118,6 +118,7 @@ def modelled(
     """Return what would be measured on solved states, as in `Measurements.observed`."""
     derived: dict[str, Callable[[], Any]] = {
         "tip_rotation": lambda: Rotation.from_matrix(path.tip_rotation).as_rotvec(),
+        "total_edge_angle": lambda: path.edge_angle.sum(axis=-1),
         "tip_tension": lambda: _tip_tension(path),
         "axis_points": lambda: axis_points(path, axis_at),
     }

@@ -74,7 +74,8 @@ def _commands(measurements: Measurements) -> dict[str, Any]:
 
 def _observed(measurements: Measurements) -> dict[str, Any]:
     observed, deviation = measurements.observed, measurements.deviation
-    notches = observed["notch_angle"].shape[1] if "notch_angle" in observed else 0
+    angles = [observed[name] for name in ("notch_angle", "edge_angle") if name in observed]
+    notches = angles[0].shape[1] if angles else 0
     tendons = measurements.measured_tension.shape[1]
     table: dict[str, Any] = {}
     for column in columns.measured_columns(notches, tendons, measurements.axis_at.tolist()):

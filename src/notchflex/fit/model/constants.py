@@ -5,23 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
-from notchflex.robot.value_names import described_at, number_at
+from notchflex.robot.value_names import described_at, number_at, numbers_at
 
 _EACH_NOTCH = "[each]"
 _EACH_ROBOT = "each"
+_OFFSET, _TIMES = "offset", "factor"
 
 # Where a search looks without limits of the user: lengths vary by a tolerance, angles by some
 # degrees, all else by a factor.
 _TOLERANCE, _TURN, _FACTOR = 0.2, 10.0, 4.0
-# Unit, least value, and where a search looks, of the numbers of the measurement.
+# Unit, least value, value without it, and where a search looks, of numbers of the measurement.
 _SENSOR = {
-    "sensor.force_offset": ("N", -math.inf, -0.1, 0.1),
-    "sensor.stroke_slack": ("mm", 0.0, 0.0, 0.5),
+    "sensor.force_offset": ("N", -math.inf, 0.0, -0.1, 0.1),
+    "sensor.force_factor": ("", 1e-3, 1.0, 0.5, 2.0),
+    "sensor.stroke_slack": ("mm", 0.0, 0.0, 0.0, 0.5),
 }
 
 
@@ -32,9 +35,12 @@ class Constant:
     Args:
         name: A value of the robot file (`material.elastic_modulus`, `notch[2].depth`), shared by
             all robots of the fit; with a label before it (`A:friction.coefficient`) of one robot;
-            with `each:` one for every robot; with `notch[each].` one for every notch. Of the
-            measurement: `sensor.force_offset` (what the gauge shows at no force, N) and
-            `sensor.stroke_slack` (stroke that only takes up slack, mm).
+            with `each:` one for every robot; with `notch[each].` one for every notch. One constant
+            for unlike values: `offset:notch.depth` is added to each of them, `factor:notch.height`
+            multiplies each of them, and `notch.precurvature_deg/height` is their ratio to another
+            value of the same part. Of the measurement: `sensor.force_offset` (what the gauge shows
+            at no force, N), `sensor.force_factor` (the tension that acts is this times the reading
+            less the offset) and `sensor.stroke_slack` (stroke that only takes up slack, mm).
         lower: Least value allowed, in the unit of the robot file; by default that of the robot.
         upper: Greatest value allowed, likewise.
         prior: Mean and standard deviation of prior knowledge.
@@ -73,6 +79,15 @@ class Constant:
                 )
 
 
+class Number(NamedTuple):
+    """A number of the robot of a label that a constant sets: `base` + `slope` * its value."""
+
+    label: str
+    path: str
+    base: float = 0.0
+    slope: float = 1.0
+
+
 @dataclass(frozen=True)
 class Unknown:
     """A constant of a fit, and the robots' numbers that it sets.
@@ -80,49 +95,63 @@ class Unknown:
     Attributes:
         name: Name that is shown.
         unit: Unit of its value, "" for a pure number.
-        sets: Labels of robots and the names of their numbers.
+        sets: The numbers that it sets.
         lower: Least value, -inf if there is none.
         upper: Greatest value.
         start: Its value in the robots as they are.
         first: Least value that a search starts from.
         last: Greatest value that a search starts from.
         prior: Mean and standard deviation, or None.
+        path: Its name without the label of a robot.
+        each: Whether every robot of the fit has one of its own.
     """
 
     name: str
     unit: str
-    sets: tuple[tuple[str, str], ...]
+    sets: tuple[Number, ...]
     lower: float
     upper: float
     start: float
     first: float
     last: float
     prior: tuple[float, float] | None = None
+    path: str = ""
+    each: bool = False
 
     @property
     def scale(self) -> float:
         """A typical size of its changes."""
         return self.last - self.first
 
-    def among(self, labels: Collection[str]) -> Unknown:
+    @property
+    def shared(self) -> bool:
+        """Whether all robots of the fit have it in common."""
+        return self.name == self.path
+
+    def among(self, labels: Collection[str]) -> Unknown | None:
         """Return the same constant of some of the robots.
 
-        Raises:
-            InputError: None of them has it.
-        """
-        sets = tuple(one for one in self.sets if one[0] in labels)
-        if not sets:
-            raise InputError.TOO_FEW_DATA(
-                f"`{self.name}` belongs to {self.sets[0][0]} alone; without it there is nothing "
-                "to find it from"
-            )
-        return replace(self, sets=sets)
+        None if it belongs to another robot, and what is known of it without that one's data is a
+        prior, or the values of robots that each have one.
 
-    def shared_with(self, label: str) -> Unknown:
+        Raises:
+            InputError: None of them has it, and nothing else is known of it.
+        """
+        sets = tuple(one for one in self.sets if one.label in labels)
+        if sets:
+            return replace(self, sets=sets)
+        if self.prior is None and not (self.each and len(labels) > 1):
+            raise InputError.TOO_FEW_DATA(
+                f"`{self.name}` belongs to {self.sets[0].label} alone; without it there is nothing "
+                f"to find it from. Give a prior (--prior), or measure more robots"
+            )
+        return None
+
+    def of(self, label: str, robot: Robot) -> Unknown:
         """Return the same constant of a robot outside the fit; one of other robots sets nothing."""
-        sets = tuple(one for one in self.sets if one[0] == label)
-        if not sets and ":" not in self.name:
-            sets = ((label, self.sets[0][1]),)
+        sets = tuple(one for one in self.sets if one.label == label)
+        if not sets and self.shared:
+            sets = _numbers(label, robot, self.path)
         return replace(self, sets=sets)
 
 
@@ -134,9 +163,9 @@ def unknowns(
     Raises:
         InputError: A name is unknown, is given twice, or belongs to no robot.
     """
-    if _EACH_ROBOT in robots:
+    for word in {_EACH_ROBOT, _OFFSET, _TIMES} & set(robots):
         raise InputError.CONFLICT(
-            "no robot can be called each: `each:` stands for every robot of the fit"
+            f"no robot can be called {word}: `{word}:` has a meaning in names of constants"
         )
     constants = (fit,) if isinstance(fit, str | Constant) else tuple(fit)
     if not constants:
@@ -145,24 +174,24 @@ def unknowns(
     set_by: dict[tuple[str, str], str] = {}
     for constant in constants:
         constant = constant if isinstance(constant, Constant) else Constant(constant)
-        for label, path in _expanded(robots, constant.name.strip()):
+        for label, path, each in _expanded(robots, constant.name.strip()):
             name = f"{label}:{path}" if label else path
             owners = {label: robots[label]} if label else robots
-            every.append(_unknown(owners, path, replace(constant, name=name)))
-            for place in every[-1].sets:
-                if place in set_by:
+            every.append(_unknown(owners, path, replace(constant, name=name), each))
+            for one in every[-1].sets:
+                if one[:2] in set_by:
                     raise InputError.CONFLICT(
-                        f"`{path}` of {place[0]} is set by `{set_by[place]}` and by `{name}`; "
-                        "fit it once"
+                        f"`{one.path}` of {one.label} is set by `{set_by[one[:2]]}` and by "
+                        f"`{name}`; fit it once"
                     )
-                set_by[place] = name
+                set_by[one[:2]] = name
     return tuple(every)
 
 
-def _expanded(robots: Mapping[str, Robot], name: str) -> Iterator[tuple[str, str]]:
-    """Yield label and number of every constant that a name stands for; "" is all robots."""
+def _expanded(robots: Mapping[str, Robot], name: str) -> Iterator[tuple[str, str, bool]]:
+    """Yield label ("" is all robots), number, and whether it is one of each robot."""
     before, colon, path = name.partition(":")
-    if not colon:
+    if not colon or before in (_OFFSET, _TIMES):
         before, path = "", name
     each = before == _EACH_ROBOT or (not before and _EACH_NOTCH in path and len(robots) > 1)
     for label in robots if each else [before]:
@@ -172,18 +201,76 @@ def _expanded(robots: Mapping[str, Robot], name: str) -> Iterator[tuple[str, str
             )
         robot = robots[label or next(iter(robots))]
         for notch in range(robot.number_of_notches if _EACH_NOTCH in path else 1):
-            yield label, path.replace(_EACH_NOTCH, f"[{notch + 1}]")
+            yield label, path.replace(_EACH_NOTCH, f"[{notch + 1}]"), each
 
 
-def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant) -> Unknown:
+def _parsed(path: str) -> tuple[str, str, str]:
+    """Rule ("", offset, factor or the key of a ratio), the number, and what the rule reads."""
+    rule, _, number = path.rpartition(":")
+    number, _, key = number.partition("/")
+    if rule not in ("", _OFFSET, _TIMES) or (rule and key):
+        raise InputError.UNKNOWN_NAME(
+            f"`{path}` is not the name of a constant; write it like notch.depth, "
+            "offset:notch.depth, factor:notch.depth or notch.precurvature_deg/height"
+        )
+    return (key or rule, number, f"{number.rpartition('.')[0]}.{key}" if key else number)
+
+
+def _numbers(label: str, robot: Robot, path: str) -> tuple[Number, ...]:
+    """The numbers of a robot that a constant sets."""
+    rule, number, read = _parsed(path)
+    if path in _SENSOR or not rule:
+        return (Number(label, number),)
+    key, end = number.rpartition(".")[2], len(read.rpartition(".")[2])
+    values = [(one[:-end] + key, value) for one, value in _apart(robot, read).items()]
+    if rule == _OFFSET:
+        return tuple(Number(label, one, value, 1.0) for one, value in values)
+    if not any(value for _, value in values):
+        raise InputError.MISSING_VALUE(
+            f"`{path}` multiplies `{read}`, which is 0 in {robot.name}; give it a value first"
+        )
+    return tuple(Number(label, one, 0.0, value) for one, value in values)
+
+
+def _apart(robot: Robot, path: str) -> dict[str, float]:
+    """The numbers that a name means, part by part where they are unlike."""
+    found = numbers_at(robot, path)
+    return found if len(set(found.values())) > 1 else {path: next(iter(found.values()))}
+
+
+def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: bool) -> Unknown:
+    sets = tuple(one for label, robot in robots.items() for one in _numbers(label, robot, path))
     if path in _SENSOR:
-        unit, lower, first, last = _SENSOR[path]
-        start, upper = 0.0, math.inf
+        unit, lower, start, first, last = _SENSOR[path]
+        upper = math.inf
     else:
-        start = math.fsum(number_at(robot, path) for robot in robots.values()) / len(robots)
-        number = described_at(next(iter(robots.values())), path)
-        unit, lower, upper = number.unit, number.lower, number.upper
-        first, last = _range(path, unit, start)
+        rule, number, read = _parsed(path)
+        # Without a rule robots have one value each, alike in all their parts.
+        here = [
+            value
+            for label, one, *_ in sets
+            for value in (
+                numbers_at(robots[label], one).values() if rule else [number_at(robots[label], one)]
+            )
+        ]
+        start = math.fsum(here) / len(here)
+        robot = next(iter(robots.values()))
+        unit, lower, upper = described_at(robot, number)
+        first, last = _range(number, unit, start)
+        if rule:
+            lower, upper, size = -math.inf, math.inf, 1.0
+            if rule not in (_OFFSET, _TIMES):
+                unit = f"{unit}/{described_at(robot, read).unit}".removesuffix("/")
+            elif rule == _TIMES:
+                unit = ""
+            if rule != _OFFSET:
+                size = math.fsum(one.slope for one in sets) / len(sets)
+                if not size:
+                    raise InputError.MISSING_VALUE(f"the mean of `{read}` is 0; give limits")
+            mean, start = start, 0.0 if rule == _OFFSET else start / size
+            first, last = sorted(
+                (end - mean if rule == _OFFSET else end / size) for end in (first, last)
+            )
     lower = lower if constant.lower is None else constant.lower
     upper = upper if constant.upper is None else constant.upper
     first = max(first, lower) if constant.lower is None else lower
@@ -193,13 +280,15 @@ def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant) -> Unkn
     return Unknown(
         name=constant.name,
         unit=unit,
-        sets=tuple((label, path) for label in robots),
+        sets=sets,
         lower=lower,
         upper=upper,
         start=min(max(start, lower), upper),
         first=first,
         last=last,
         prior=constant.prior,
+        path=path,
+        each=each,
     )
 
 

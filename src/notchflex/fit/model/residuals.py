@@ -13,7 +13,7 @@ from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.rows import OUTPUTS, Predicted
 from notchflex.mechanics.motion import left_slope
 
-ANGLES = ("notch_angle", "total_angle")
+ANGLES = ("notch_angle", "total_angle", "edge_angle", "total_edge_angle")
 LENGTHS = ("tip_position", "axis_points")
 
 
@@ -79,6 +79,8 @@ def misfit(
         last = np.isfinite(values[0]).sum(axis=-1) - 1
         tendons = np.arange(len(last))
         values, slopes = values[:, tendons, last], slopes[:, :, tendons, last]
+    if name == "total_edge_angle":
+        values, slopes = values.sum(axis=-1), slopes.sum(axis=-1)
     values = (values - seen).reshape(len(seen), -1)
     return values, slopes.reshape(len(slopes), *values.shape)
 

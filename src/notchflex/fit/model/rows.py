@@ -15,17 +15,25 @@ from notchflex.analysis.axis_points import AxisPlaces, axis_places, points_on_ax
 from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.fit.measurements.measurements import Measurements, rows_of
+from notchflex.fit.model.constants import Number
 from notchflex.loads.load_path import LoadPath
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
 
-SENSOR = {"sensor.force_offset": "tension", "sensor.stroke_slack": "stroke"}
-"""Numbers of the measurement itself, and the command that each is subtracted from: what a force
-gauge shows at no force (N), and the stroke that only takes up slack (mm)."""
+SENSOR = {
+    "sensor.force_offset": "tension",
+    "sensor.force_factor": "tension",
+    "sensor.stroke_slack": "stroke",
+}
+"""Numbers of the measurement itself, and the command that each changes: what a force gauge shows at
+no force (N), the tension that acts over the reading less that, and the stroke that only takes up
+slack (mm)."""
+
+_NO_SENSOR = {"sensor.force_offset": 0.0, "sensor.force_factor": 1.0, "sensor.stroke_slack": 0.0}
 
 # Outputs of the model that measured quantities are compared with, if of another name.
-OUTPUTS = {"tip_tension": "span_tension"}
+OUTPUTS = {"tip_tension": "span_tension", "total_edge_angle": "edge_angle"}
 _BODIES = ("body_position", "body_rotation")
 
 
@@ -48,8 +56,8 @@ class Sample:
         label: Label of the robot.
         robot: The robot as it is.
         measured: The measurements.
-        names: Numbers that vary: of the robot by name, or of `SENSOR`.
-        columns: Number of the constant that each of them is.
+        numbers: What varies: of the robot by name, or of `SENSOR`.
+        setters: Number of the constant that sets each of them.
         pulls: Pull of every row, counted over all measurements.
         settings: Settings of the solver.
     """
@@ -57,10 +65,15 @@ class Sample:
     label: str
     robot: Robot
     measured: Measurements
-    names: tuple[str, ...]
-    columns: tuple[int, ...]
+    numbers: tuple[Number, ...]
+    setters: tuple[int, ...]
     pulls: Int[np.ndarray, " p"]
     settings: Settings
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Numbers of the constants that set something here."""
+        return tuple(dict.fromkeys(self.setters))
 
     def robot_with(self, values: Float[np.ndarray, " k"]) -> Robot:
         """Return the robot with other values of all constants.
@@ -68,8 +81,7 @@ class Sample:
         Raises:
             InputError: The robot cannot have them.
         """
-        numbers = zip(self.names, values[list(self.columns)].tolist(), strict=True)
-        of_robot = {name: value for name, value in numbers if name not in SENSOR}
+        of_robot = {path: value for path, value in self._set(values).items() if path not in SENSOR}
         return self.robot.with_values(of_robot) if of_robot else self.robot
 
     def predict(self, values: Float[np.ndarray, " k"]) -> Predicted:
@@ -81,13 +93,13 @@ class Sample:
         robot, load = self.robot_with(values), self._load(values)
         path = self._model.solve(robot, load)
         names = [OUTPUTS.get(name, name) for name in self.measured.observed]
-        solved = tuple(name for name in names if name != "axis_points")
+        solved = tuple(dict.fromkeys(name for name in names if name != "axis_points"))
         if self._places is not None:
             solved = tuple(dict.fromkeys((*solved, *_BODIES)))
         outputs = {name: np.asarray(path.quantity(name)) for name in solved}
         slopes: dict[str, np.ndarray] = {}
-        if self.names and path.converged.all():
-            changes = [self._change(path, load, name) for name in self.names]
+        if self.numbers and path.converged.all():
+            changes = [self._change(path, load, values, column) for column in self.columns]
             slopes = self._model.derivatives(path, changes, solved)
         if self._places is not None:
             bodies = [outputs[name] for name in _BODIES]
@@ -122,25 +134,51 @@ class Sample:
             return None
         return axis_places(self.robot, self.measured.axis_at)
 
-    def _load(self, values: Float[np.ndarray, " k"]) -> LoadPath:
-        """The loads of the robot: the measured ones less what the sensor adds."""
-        load, measured = self._model.load, self.measured
-        shown = {"tension": measured.measured_tension, "stroke": measured.load.stroke}
-        for name, column in zip(self.names, self.columns, strict=True):
-            if name in SENSOR:
-                command = SENSOR[name]
-                true = np.maximum(shown[command][self._order] - values[column], 0.0)
-                true = np.where(np.isnan(getattr(load, command)), np.nan, true)
-                load = replace(load, **{command: true})
-        return load
+    def _set(self, values: Float[np.ndarray, " k"]) -> dict[str, float]:
+        """The numbers that values of all constants set."""
+        numbers = zip(self.numbers, values[list(self.setters)].tolist(), strict=True)
+        return {one.path: one.base + one.slope * value for one, value in numbers}
 
-    def _change(self, path: EquilibriumPath, load: LoadPath, name: str) -> Change:
-        if name not in SENSOR:
-            return self._model.change(path.robot, load, name)
-        value = getattr(load, SENSOR[name])
+    def _load(self, values: Float[np.ndarray, " k"]) -> LoadPath:
+        """The loads of the robot: the measured ones, corrected for the sensor."""
+        load, measured, numbers = self._model.load, self.measured, self._set(values)
+        if not SENSOR.keys() & numbers.keys():
+            return load
+        offset, factor, slack = (numbers.get(name, none) for name, none in _NO_SENSOR.items())
+        tension = factor * (measured.measured_tension[self._order] - offset)
+        acting = {"tension": tension, "stroke": measured.load.stroke[self._order] - slack}
+        given = {
+            command: np.where(np.isnan(getattr(load, command)), np.nan, np.maximum(true, 0.0))
+            for command, true in acting.items()
+        }
+        return replace(load, **given)
+
+    def _change(
+        self, path: EquilibriumPath, load: LoadPath, values: Float[np.ndarray, " k"], column: int
+    ) -> Change:
+        """Change of the robot and of its loads with a constant: the sum over what it sets."""
+        loads, chain = np.zeros(1), np.zeros(1)
+        for one, setter in zip(self.numbers, self.setters, strict=True):
+            if setter != column or not one.slope:
+                continue
+            if one.path in SENSOR:
+                loads = loads + one.slope * self._load_change(path, load, values, one.path)
+                continue
+            change = self._model.change(path.robot, load, one.path)
+            loads = loads if change.loads is None else loads + one.slope * change.loads
+            chain = chain if change.chain is None else chain + one.slope * change.chain
+        return Change(*(one if one.any() else None for one in (loads, chain)))
+
+    def _load_change(
+        self, path: EquilibriumPath, load: LoadPath, values: Float[np.ndarray, " k"], name: str
+    ) -> Float[np.ndarray, "p command"]:
+        command = SENSOR[name]
+        value, factor = getattr(load, command), self._set(values).get("sensor.force_factor", 1.0)
         # Loads are linear in tension and stroke; below 0 N the robot has none.
-        more = replace(load, **{SENSOR[name]: np.where(value > 0.0, value + 1.0, value)})
-        return Change(-self._model.load_change(path, more), None)
+        size = {"sensor.force_offset": factor, "sensor.stroke_slack": 1.0}.get(name)
+        more = value / factor if size is None else np.where(value > 0.0, size, 0.0)
+        varied = self._model.load_change(path, replace(load, **{command: value + more}))
+        return varied if size is None else -varied
 
 
 def _points(places: AxisPlaces, bodies: Sequence[np.ndarray]) -> Float[np.ndarray, "p m 3"]:

@@ -49,12 +49,12 @@ class Samples:
         pulls = 0
         for label, robot in robots.items():
             numbers = [
-                (path, column)
+                (one, column)
                 for column, unknown in enumerate(unknowns)
-                for owner, path in unknown.sets
-                if owner == label
+                for one in unknown.sets
+                if one.label == label
             ]
-            names = tuple(path for path, _ in numbers)
+            names = tuple(one for one, _ in numbers)
             columns = tuple(column for _, column in numbers)
             for measured in measurements[label]:
                 pull = pulls + np.array([measured.pulls.index(one) for one in measured.pull])

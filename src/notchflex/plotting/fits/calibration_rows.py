@@ -24,7 +24,8 @@ MOST_NAMED = 8
 """Of so many notches a legend has the first and the last colour only."""
 
 _OTHERS = dots([], GREY, 3.5, marker="X", name="residuals of others", group="others")
-_KINDS = dict.fromkeys(("notch_angle", "total_angle", "tip_rotation"), "angle") | {
+_NOTCHES = ("notch_angle", "edge_angle")
+_KINDS = dict.fromkeys((*_NOTCHES, "total_angle", "total_edge_angle", "tip_rotation"), "angle") | {
     "tip_tension": "tension"
 }
 
@@ -74,7 +75,7 @@ def data_panel(fit: Calibration, label: str, quantity: str, component: int) -> P
     if quantity in ("tip_position", "tip_rotation"):
         title = f"{name}, {'xyz'[component]}"
     else:
-        title = part_title(quantity, 0 if quantity == "total_angle" else component + 1)
+        title = part_title(quantity, 0 if quantity.startswith("total_") else component + 1)
     y_label = f"{_KINDS.get(quantity, 'position')} [{unit}]"
     return Panel(items, x_label, y_label, title=_titled(fit, label, title))
 
@@ -92,7 +93,7 @@ def residual_panel(fit: Calibration, label: str) -> Panel:
     residuals, noise = fit.residuals, fit.noise.deviation
     x, x_label = _abscissa(fit, label)
     points = np.stack([x, residuals.values / noise], axis=1)
-    angles = _rows_of(fit, label, "notch_angle") & np.isfinite(noise)
+    angles = _rows_of(fit, label, *_NOTCHES) & np.isfinite(noise)
     others = _rows_of(fit, label) & np.isfinite(noise) & ~angles
     items: list[Mark] = [Span("y", -1.96, 1.96, GREY, opacity=0.15), Span("y", 0.0, 0.0, GREY)]
     if others.any():
@@ -113,7 +114,7 @@ def residual_entries(fit: Calibration) -> list[Curve]:
 
 def _notch_entries(fit: Calibration) -> dict[int, Curve]:
     """Return the marker of every notch (from 0), the same for all robots."""
-    angles = np.any([_rows_of(fit, label, "notch_angle") for label in fit.given], axis=0)
+    angles = np.any([_rows_of(fit, label, *_NOTCHES) for label in fit.given], axis=0)
     notches = np.unique(fit.residuals.part[angles]).tolist()
     entries: dict[int, Curve] = {}
     for notch, colour in zip(notches, sequence_colours(len(notches)), strict=True):
@@ -126,14 +127,14 @@ def _titled(fit: Calibration, label: str, title: str) -> str:
     return f"{label}: {title}" if len(fit.given) > 1 else title
 
 
-def _rows_of(fit: Calibration, label: str, quantity: str | None = None) -> NDArray[np.bool_]:
-    """Return which residuals belong to a robot, and to one of its quantities."""
+def _rows_of(fit: Calibration, label: str, *quantities: str) -> NDArray[np.bool_]:
+    """Return which residuals belong to a robot, and to some of its quantities."""
     from notchflex.fit.measurements.measurements import OBSERVED
 
     of_robot = fit.residuals.robot == list(fit.given).index(label)
-    if quantity is None:
+    if not quantities:
         return of_robot
-    return of_robot & (fit.residuals.quantity == OBSERVED.index(quantity))
+    return of_robot & np.isin(fit.residuals.quantity, [OBSERVED.index(one) for one in quantities])
 
 
 def _lines(

@@ -1,0 +1,289 @@
+"""Law of fibres: the stress of each follows its own strain, and may remember.
+
+A fibre carries sigma = E (eps - e), with the transformed strain e between two curves over its
+strain: one that it does not fall below while the strain grows, and one that it does not exceed
+while it shrinks. Between them e stays and the fibre is elastic: a play operator, independent of
+rate, whose loops close (return-point memory). One number a fibre remembers the past, since
+unloading ends before the stress is gone. Without hysteresis the two curves are one.
+
+The curvature k of the section and the strain of its neutral axis follow together: the forces of
+the fibres vanish in sum, and section and ends (`law.py`) bend by s between them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import constant, jax, jnp
+from notchflex.mechanics.material.fibre_section import Fibres, FibreSection
+from notchflex.mechanics.material.law import Bending, SectionLaw
+
+# Newton's method ends at this imbalance, as a part of the strain of bending, or after many tries.
+_BALANCED, _MOST_TRIES = 1e-13, 16
+# So many fibres at once: programs get longer with more, and slower with fewer.
+_AT_ONCE = 5
+# A transformed strain this near to a curve goes on along it.
+_ON_CURVE = 1e-12
+
+
+class _Sums(NamedTuple):
+    """Sums over the fibres: force (N) and moment (N mm), and how they change.
+
+    Attributes:
+        force: Axial force.
+        moment: Moment.
+        stretch: Change of the force with the strain of the neutral axis.
+        mixed: Change of the force with the curvature, and of the moment with that strain.
+        bending: Change of the moment with the curvature.
+    """
+
+    force: Array
+    moment: Array
+    stretch: Array
+    mixed: Array
+    bending: Array
+
+
+class _Joint(NamedTuple):
+    """The section between its ends: own * k + soft * moment = s."""
+
+    own: Array | float
+    soft: Array | float
+    reduced: Array
+
+    def step(self, curvature: Array, sums: _Sums, slopes: _Sums) -> tuple[Array, Array]:
+        """Newton's step of the strain of the neutral axis and of the curvature."""
+        beyond = self.own * curvature + self.soft * sums.moment - self.reduced
+        by_strain, by_curvature = self.soft * slopes.mixed, self.own + self.soft * slopes.bending
+        determinant = slopes.stretch * by_curvature - slopes.mixed * by_strain
+        strain = slopes.mixed * beyond - by_curvature * sums.force
+        return strain / determinant, (
+            by_strain * sums.force - slopes.stretch * beyond
+        ) / determinant
+
+    def size(self, curvature: Array, sums: _Sums, scale: tuple[Array, Array]) -> Array:
+        """Imbalance of forces and of bending, as strains."""
+        beyond = self.own * curvature + self.soft * sums.moment - self.reduced
+        return jnp.abs(sums.force) / scale[1] + scale[0] * jnp.abs(beyond)
+
+    def slope(self, slopes: _Sums) -> Array:
+        """Change of the moment with s."""
+        free = slopes.bending - slopes.mixed**2 / slopes.stretch
+        return free / (self.own + self.soft * free)
+
+
+class FibreLaw(SectionLaw):
+    """Fibres that transform; everything but bending about the weak axis is elastic.
+
+    The transformed strain on a curve is a sum over its kinks: change * (strain - the strain clipped
+    between low and high).
+
+    Attributes:
+        low: Strain in compression where each kink of the lower and of the upper curve lies; one
+            curve without hysteresis.
+        high: The same in tension.
+        change: Change of transformed strain per strain at each kink.
+    """
+
+    low: Float[Array, "curves kinks"]
+    high: Float[Array, "curves kinks"]
+    change: Float[Array, " kinks"]
+
+    @property
+    def remembers(self) -> bool:
+        """Whether loading and unloading differ."""
+        return self.low.shape[0] == 2
+
+    def rest(self, section: FibreSection) -> Any:
+        """No fibre is transformed."""
+        assert section.fibres is not None
+        return constant(np.zeros(np.shape(section.fibres.arm))) if self.remembers else ()
+
+    def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
+        """Moment halfway between loading and unloading."""
+        return self.bent(curvature, dataclasses.replace(section, ends=None), ()).moment
+
+    def bent(self, reduced: Float[Array, ""], section: FibreSection, memory: Any) -> Bending:
+        """Bend the section between its ends; the last of Newton's steps is differentiated."""
+        fibres, ends = section.fibres, section.ends
+        assert fibres is not None
+        weak, share = (0.0, 0.0) if ends is None else (ends.weak, ends.material_share)
+        rigidity = self.elastic_modulus * section.second_moment_weak
+        joint = _Joint(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
+        start = reduced / (1.0 + weak)
+        scale = section.edge_near, self.elastic_modulus * section.area
+        everything = self, fibres, memory, joint, scale, start
+        still = jax.tree.map(jax.lax.stop_gradient, everything)
+        strain, curvature, slopes = _settled(*still)
+        _, held, past, fixed, *_ = still
+        sums = jax.tree.map(
+            _derived_from, slopes, self.sum_fibres(fibres, memory, strain, curvature)
+        )
+        by_strain, by_curvature = joint.step(curvature, sums, slopes)
+        if not isinstance(memory, tuple):
+            own = strain + curvature * fibres.arm
+            slope = self._transformed(jax.lax.stop_gradient(own), past)[1]
+            moved = by_strain + by_curvature * held.arm
+            memory = self._transformed(own, memory)[0] + jax.lax.stop_gradient(slope) * moved
+        return Bending(
+            curvature=curvature + by_curvature,
+            moment=sums.moment + slopes.mixed * by_strain + slopes.bending * by_curvature,
+            memory=memory,
+            slope=fixed.slope(slopes),
+            strain=strain + by_strain,
+        )
+
+    def sum_fibres(self, fibres: Fibres, memory: Any, strain: Array, curvature: Array) -> _Sums:
+        """Sums over the fibres."""
+
+        def some(array: Array) -> Array:
+            return jnp.reshape(array, (-1, _AT_ONCE))
+
+        def add(total: _Sums, some: tuple[Array, Array, Any]) -> tuple[_Sums, None]:
+            arm, area, past = some
+            own = strain + curvature * arm
+            transformed, slope = self._transformed(own, past)
+            force, tangent = area * (own - transformed), area * (1.0 - slope)
+            turning = tangent * arm
+            parts = force, force * arm, tangent, turning, turning * arm
+            added = _Sums(*(jnp.sum(part) for part in parts))
+            return jax.tree.map(jnp.add, total, added), None
+
+        none = _Sums(*(jnp.zeros_like(strain) for _ in _Sums._fields))
+        every = some(fibres.arm), some(fibres.area), jax.tree.map(some, memory)
+        sums = jax.lax.scan(add, none, every)[0]
+        return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
+
+    def _transformed(self, strain: Array, past: Any) -> tuple[Array, Array]:
+        """Transformed strain of fibres after a strain, and its change with that strain."""
+        if isinstance(past, tuple):
+            return self._curve(strain, *self._halfway())
+        (lower, by_lower), (upper, by_upper) = (
+            self._curve(strain, *kinks) for kinks in zip(self.low, self.high, strict=True)
+        )
+        transformed = jnp.clip(past, lower, upper)
+        slope = jnp.where(past >= upper - _ON_CURVE, by_upper, 0.0)
+        return transformed, jnp.where(past <= lower + _ON_CURVE, by_lower, slope)
+
+    def _halfway(self) -> tuple[Array, Array]:
+        """Kinks of the curve halfway between loading and unloading."""
+        return jnp.mean(self.low, axis=0), jnp.mean(self.high, axis=0)
+
+    def _curve(self, strain: Array, low: Array, high: Array) -> tuple[Array, Array]:
+        """Transformed strain on a curve, and its slope."""
+        transformed, slope = jnp.zeros_like(strain), jnp.zeros_like(strain)
+        for kink in range(self.change.shape[0]):
+            beyond = strain - jnp.clip(strain, low[kink], high[kink])
+            transformed = transformed + self.change[kink] * beyond
+            slope = slope + jnp.where(beyond != 0.0, self.change[kink], 0.0)
+        return transformed, slope
+
+    def bending_energy(
+        self, curvature: Float[Array, ""], section: FibreSection, memory: Any
+    ) -> Float[Array, ""]:
+        """Energy that the fibres hold: with hysteresis that of the curve halfway, and elastic."""
+        fibres, plain = section.fibres, dataclasses.replace(section, ends=None)
+        assert fibres is not None
+        bent = self.bent(curvature, plain, memory)
+        strain = bent.strain + bent.curvature * fibres.arm
+        if isinstance(memory, tuple):
+            return fibres.area @ self._area_under(strain)
+        # Where the curve halfway has the same transformed strain.
+        (low, *_), (high, *_) = self._halfway()
+        transformed = bent.memory
+        onset = jnp.where(transformed > 0.0, high, jnp.where(transformed < 0.0, low, 0.0))
+        there = onset + transformed / self.change[0]
+        elastic = (strain - transformed) ** 2 - (there - transformed) ** 2
+        return fibres.area @ (self._area_under(there) + 0.5 * self.elastic_modulus * elastic)
+
+    def _area_under(self, strain: Array) -> Array:
+        """Area under the stress of the curve halfway up to a strain, N mm/mm^3."""
+        square = strain**2
+        for change, low, high in zip(self.change, *self._halfway(), strict=True):
+            square = square - change * (strain - jnp.clip(strain, low, high)) ** 2
+        return 0.5 * self.elastic_modulus * square
+
+    def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
+        """Energy per length turned to heat between two memories, N mm/mm; for plain arrays."""
+        if not self.remembers or section.fibres is None:
+            return super().dissipated(section, before, after)
+        loss = 0.0
+        for side, kinks in (np.minimum, self.low), (np.maximum, self.high):
+            change = np.abs(side(after, 0.0) - side(before, 0.0))
+            loss = loss + 0.5 * self.elastic_modulus * np.abs(kinks[1, 0] - kinks[0, 0]) * change
+        ends = section.ends
+        follows = 1.0 if ends is None else 1.0 + ends.material_share * ends.weak
+        return follows * np.sum(loss * section.fibres.area, axis=-1)
+
+
+def _settle(
+    law: FibreLaw,
+    fibres: Fibres,
+    memory: Any,
+    joint: _Joint,
+    scale: tuple[Array, Array],
+    start: Array,
+) -> tuple[Array, Array, _Sums]:
+    """Find strain of the neutral axis, curvature and sums of all sections, from a curvature.
+
+    All together, so that one condition stops the search; the sections may have leading axes.
+    """
+    balance = law.sum_fibres
+    for _ in start.shape:
+        balance = jax.vmap(balance)
+
+    def proceed(search: tuple[Array, ...]) -> Array:
+        *_, least, tries = search
+        return jnp.any(least > _BALANCED * scale[0] * jnp.abs(joint.reduced)) & (
+            tries < _MOST_TRIES
+        )
+
+    def improve(search: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Try a step: the next one where the imbalance falls, half of it where not."""
+        strain, curvature, by_strain, by_curvature, sums, least, tries = search
+        trial = strain + by_strain, curvature + by_curvature
+        found = balance(fibres, memory, *trial)
+        size = joint.size(trial[1], found, scale)
+        falls = size < least
+        new = *trial, *joint.step(trial[1], found, found), found, size
+        old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, sums, least
+        return *jax.tree.map(lambda *pair: jnp.where(falls, *pair), new, old), tries + 1
+
+    none, far = jnp.zeros_like(start), jnp.full_like(start, jnp.inf)
+    sums = _Sums(*(none for _ in _Sums._fields))
+    begin = none, start, none, none, sums, far, jnp.zeros((), int)
+    strain, curvature, _, _, sums, *_ = jax.lax.while_loop(proceed, improve, begin)
+    return strain, curvature, sums
+
+
+_settled = jax.custom_batching.custom_vmap(_settle)
+
+
+@_settled.def_vmap
+def _(size: int, batched: Any, law: FibreLaw, *sections: Any) -> tuple[Any, Any]:
+    all_batched = True, True, _Sums._make([True] * len(_Sums._fields))
+    if any(jax.tree.leaves(batched[0])):  # rows of a batch that is not one of sections
+        axes = jax.tree.map(lambda one: 0 if one else None, list(batched))
+        return jax.vmap(_settle, in_axes=tuple(axes))(law, *sections), all_batched
+    every = jax.tree.map(
+        lambda one, leaf: leaf if one else jnp.broadcast_to(leaf, (size, *jnp.shape(leaf))),
+        list(batched[1:]),
+        list(sections),
+    )
+    return _settled(law, *every), all_batched
+
+
+@jax.custom_jvp
+def _derived_from(value: Array, varied: Array) -> Array:
+    """A value with the derivatives of another that equals it, and need not be computed."""
+    del varied
+    return value
+
+
+@_derived_from.defjvp
+def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
+    return primals[0], tangents[1]

@@ -1,0 +1,141 @@
+"""A curve of stress over strain against fine quadratures, Nitinol by formulas, and its files."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import notchflex as nf
+from fibre_sections import ENDS, bending, energy, fine_fibres, moment, respond, section
+from notchflex.mechanics.material import section_law
+from notchflex.robot import robot_from_text, robot_text
+
+BILINEAR = nf.Nitinol(42000.0, 350.0, 6000.0, compression_ratio=1.3)
+CURVE = nf.StressStrain(
+    strain=(0.008, 0.02, 0.05, 0.07),
+    stress=(336.0, 400.0, 480.0, 900.0),
+    compression_strain=(0.01, 0.03),
+    compression_stress=(450.0, 800.0),
+)
+WRIST = nf.load_robot("pacheco2021-a")
+TEXT = robot_text(WRIST.replace(material=CURVE))
+
+
+@pytest.mark.parametrize("cut", ["on-axis", "off-axis"])
+def test_moment_is_that_of_a_fine_quadrature(cut: str) -> None:
+    law, own, (arm, area) = section_law(CURVE), section(cut), fine_fibres(cut)
+    tension, compression = (
+        np.array(one)
+        for one in (
+            (CURVE.strain, CURVE.stress),
+            (CURVE.compression_strain, CURVE.compression_stress),
+        )
+    )
+
+    def stress(strain: np.ndarray) -> np.ndarray:
+        """The curve, and beyond its end as between its last two points."""
+        at = [*-compression[0, ::-1], 0.0, *tension[0]]
+        values = [*-compression[1, ::-1], 0.0, *tension[1]]
+        beyond = (values[-1] - values[-2]) / (at[-1] - at[-2])
+        before = (values[1] - values[0]) / (at[1] - at[0])
+        ends = beyond * np.maximum(strain - at[-1], 0.0), before * np.minimum(strain - at[0], 0.0)
+        return np.interp(strain, at, values) + sum(ends)
+
+    for curvature in (-0.9, 0.1, 0.4, 1.3):
+        found = brentq(lambda x, k=curvature: area @ stress(x + k * arm), -0.3, 0.3, xtol=1e-15)
+        expected = float(area @ (stress(found + curvature * arm) * arm))
+        assert moment(law, curvature, own) == pytest.approx(expected, rel=6e-3)
+
+
+def test_the_curve_of_a_bilinear_law_is_that_law() -> None:
+    begin = 350.0 / 42_000.0
+    by_points = nf.StressStrain(
+        strain=(begin, begin + 0.05),
+        stress=(350.0, 650.0),
+        compression_strain=(1.3 * begin, 1.3 * begin + 0.01),
+        compression_stress=(455.0, 515.0),
+    )
+    own, laws = section(ends=ENDS), (section_law(by_points), section_law(BILINEAR))
+    for curvature in (-0.8, 0.2, 1.1):
+        one, other = (respond(law, bending(curvature), own, ()) for law in laws)
+        np.testing.assert_allclose(one.resultants, other.resultants, rtol=1e-12, atol=1e-13)
+        assert float(one.slope) == pytest.approx(float(other.slope), rel=1e-12)
+        held = [float(energy(law, bending(curvature), own, ())) for law in laws]
+        assert held[0] == pytest.approx(held[1], rel=1e-12)
+
+
+def test_energy_is_the_area_under_the_moment() -> None:
+    law, own, step = section_law(CURVE), section(), 1e-6
+    for curvature in (-0.6123, 0.2042, 1.2):
+        ahead, behind = (
+            float(energy(law, bending(curvature + by), own, ())) for by in (step, -step)
+        )
+        slope = (ahead - behind) / (2.0 * step)
+        assert slope == pytest.approx(moment(law, curvature, own), rel=1e-8)
+
+
+def test_a_wrist_of_it_softens_where_the_curve_does() -> None:
+    begin = 280.0 / 10_000.0
+    curve = nf.StressStrain(strain=(begin, begin + 0.02), stress=(280.0, 340.0))
+    bilinear = nf.Nitinol(10_000.0, 280.0, 3_000.0)
+    loads = [nf.Load(tension=one) for one in (0.3, 0.9, 1.4)]
+    paths = [nf.simulate(WRIST.replace(material=one), loads) for one in (curve, bilinear)]
+    np.testing.assert_allclose(paths[0].notch_angle, paths[1].notch_angle, rtol=1e-10)
+    linear = nf.simulate(WRIST.replace(material=nf.Linear(10_000.0)), loads)
+    assert paths[0].total_angle[2] > 1.05 * linear.total_angle[2]
+
+
+def test_its_file_is_read_written_and_changed(tmp_path: Path) -> None:
+    robot = WRIST.replace(material=CURVE)
+    assert "strain = [0.008, 0.02, 0.05, 0.07]" in TEXT
+    assert robot_from_text(TEXT) == robot
+    nf.save_robot(robot, tmp_path / "own.toml")
+    read = nf.load_robot(tmp_path / "own.toml")
+    assert read == robot
+    assert hash(read) == hash(robot)
+    text = (tmp_path / "own.toml").read_text()
+    nf.save_robot(read, tmp_path / "again.toml")
+    assert (tmp_path / "again.toml").read_text() == text
+    changed = read.with_value("material.stress", [336.0, 420.0, 500.0, 900.0])
+    assert changed.material.stress == (336.0, 420.0, 500.0, 900.0)
+    nf.save_robot(changed, tmp_path / "changed.toml")
+    assert nf.load_robot(tmp_path / "changed.toml") == changed
+    assert "strain 0.008 to 0.07 (4 values)" in repr(robot)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"strain": (0.01,)}, "`strain` is a list; give at least 2 values"),
+        ({"strain": 0.01}, "`strain` is 0.01; it must be a list of numbers"),
+        ({"strain": (0.01, "a")}, '`strain[2]` is "a" (text); it must be a number'),
+        ({"strain": (0.0, 0.02)}, "`strain[1]` is 0.0; it must be greater than 0"),
+        ({"strain": (0.02, 0.01)}, "`strain` has 0.01 behind 0.02 (number 2); strains must rise"),
+        ({"strain": (0.01, 0.02, 0.03)}, "`stress` has 2 values and `strain` 3; give one stress"),
+        ({"stress": (400.0, 390.0)}, "`stress` rises from 400 to 390 MPa (number 2)"),
+        ({"compression_strain": (0.01, 0.02)}, "`compression_stress` is missing"),
+        ({"strain": tuple(0.01 * (k + 1) for k in range(41))}, "give at most 40 values"),
+    ],
+)
+def test_bad_values_name_what_is_allowed(keys: dict, message: str) -> None:
+    with pytest.raises(nf.InputError) as caught:
+        dataclasses.replace(nf.StressStrain(strain=(0.01, 0.02), stress=(400.0, 450.0)), **keys)
+    assert message in str(caught.value)
+    assert "None" not in str(caught.value)
+
+
+def test_files_name_the_value_that_is_wrong() -> None:
+    for old, new, message in (
+        ("0.02, 0.05", '"x", 0.05', '`material.strain[2]` is "x" (text); it must be a number'),
+        ("[336.0, 400.0", "[336.0, 300.0", "`material.stress` rises from 336 to 300 MPa"),
+    ):
+        with pytest.raises(nf.InputError) as caught:
+            robot_from_text(TEXT.replace(old, new))
+        assert message in str(caught.value)
+    robot = robot_from_text(TEXT)
+    with pytest.raises(nf.InputError, match="no number that changes smoothly"):
+        nf.differentiable(robot, [nf.Load(tension=1.0)], ["material.strain"])
