@@ -141,3 +141,28 @@ def test_every_notch_kind_takes_nitinol(name: str) -> None:
     path = nf.simulate(of(0.02), loads)
     assert path.converged.all()
     assert path.material_dissipation[-1].sum() > 0.0
+
+
+def test_derivatives_where_friction_holds_a_notch(margin) -> None:
+    """A held notch rests on its curve of loading: value and slope take the same side of the kink."""
+    notch = nf.ArcNotch("on-axis", depth=1.4, height=1.0, uncut_length=1.0, repeat=2)
+    robot = nf.Robot(
+        name="held",
+        tube=nf.Tube(1.62, 1.40),
+        notch=(notch,),
+        tendon=(nf.Tendon(0.70, path="straight"),),
+        material=nf.Nitinol(unloading_stress=150.0),
+        friction=nf.Capstan(0.15),
+    )
+    tension = np.concatenate([np.linspace(0.1, 1.6, 8), np.linspace(1.58, 1.2, 20)])
+    loads = [nf.Load(tension=float(one)) for one in tension]
+    model = nf.differentiable(robot, loads, ["material.elastic_modulus"], outputs=["total_angle"])
+    slope = jax.jacfwd(lambda start: model(start)["total_angle"])(model.start)
+    value, step = 42_000.0, 0.42
+    ends = [
+        nf.simulate(robot.with_value("material.elastic_modulus", value + by), loads).total_angle
+        for by in (step, -step)
+    ]
+    difference = (ends[0] - ends[1]) / (2.0 * step)
+    found = np.asarray(slope["material.elastic_modulus"])
+    margin.within("slope, per modulus", (found - difference) * value, 1e-6)

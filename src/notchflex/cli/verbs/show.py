@@ -13,6 +13,7 @@ from notchflex.cli.arguments.robots import (
     robot_files,
 )
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
+from notchflex.errors import InputError
 from notchflex.results.files.writing import PAPER
 
 DrawingFile = Annotated[
@@ -50,12 +51,8 @@ def show(
         from notchflex.results.files.json import document_head
 
         notches = notch_table(chosen)
-        wanted = outputs.prints_tables or json is not None
-        bands = closing_bands(chosen, closing(chosen)) if wanted else None
         straight = np.zeros((1, chosen.number_of_notches))
         length = float(tip_from_angles(chosen, straight)[0][0, 2])
-    more = {} if bands is None else {"tolerances": closing_document(bands)}
-    outputs.write_json(lambda: {**document_head(chosen), "notches": notches, **more})
     if plot is not None:
         from notchflex.plotting.drawings.dimensioned import save_dimensioned
 
@@ -64,7 +61,16 @@ def show(
         from notchflex.cli.tables.notch_tables import print_robot
 
         print_robot(chosen, changed_title(chosen, settings), length, notches)
-        if bands is not None:
-            from notchflex.cli.tables.tolerance_lines import closing_lines
+    bands = None
+    if outputs.prints_tables or json is not None:
+        with terminal.working("drawing robots within the tolerances"):
+            try:
+                bands = closing_bands(chosen, closing(chosen))
+            except InputError as problem:
+                terminal.warn(f"no bands: {problem}")
+    more = {} if bands is None else {"tolerances": closing_document(bands)}
+    outputs.write_json(lambda: {**document_head(chosen), "notches": notches, **more})
+    if bands is not None and outputs.prints_tables:
+        from notchflex.cli.tables.tolerance_lines import closing_lines
 
-            terminal.output().print("\n" + "\n".join(closing_lines(chosen, bands)))
+        terminal.output().print("\n" + "\n".join(closing_lines(chosen, bands)))

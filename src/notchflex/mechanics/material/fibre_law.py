@@ -165,9 +165,11 @@ class FibreLaw(SectionLaw):
         (lower, by_lower), (upper, by_upper) = (
             self._curve(strain, *kinks) for kinks in zip(self.low, self.high, strict=True)
         )
-        transformed = jnp.clip(past, lower, upper)
-        slope = jnp.where(past >= upper - _ON_CURVE, by_upper, 0.0)
-        return transformed, jnp.where(past <= lower + _ON_CURVE, by_lower, slope)
+        # One condition for value and slope: a fibre that rests on a curve, as where friction holds
+        # its notch, must be differentiated as what its slope says.
+        on_upper, on_lower = past >= upper - _ON_CURVE, past <= lower + _ON_CURVE
+        transformed = jnp.where(on_lower, lower, jnp.where(on_upper, upper, past))
+        return transformed, jnp.where(on_lower, by_lower, jnp.where(on_upper, by_upper, 0.0))
 
     def _halfway(self) -> tuple[Array, Array]:
         """Kinks of the curve halfway between loading and unloading."""
