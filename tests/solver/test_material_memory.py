@@ -144,7 +144,7 @@ def test_every_notch_kind_takes_nitinol(name: str) -> None:
 
 
 def test_derivatives_where_friction_holds_a_notch(margin) -> None:
-    """A held notch rests on its curve of loading: value and slope take the same side of the kink."""
+    """A held notch rests on a kink: value and slope are of the same side."""
     notch = nf.ArcNotch("on-axis", depth=1.4, height=1.0, uncut_length=1.0, repeat=2)
     robot = nf.Robot(
         name="held",
