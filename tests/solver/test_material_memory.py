@@ -122,6 +122,7 @@ def test_no_random_history_gains_work() -> None:
     assert found.tendon_work[-1, 0] == pytest.approx(whole, rel=2e-2)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["liu2022", "gao2017", "two-axis-wrist"])
 def test_every_notch_kind_takes_nitinol(name: str) -> None:
     robot = nf.load_robot(name)

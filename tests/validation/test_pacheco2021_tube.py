@@ -42,7 +42,7 @@ def fit(constants, starts):
 def test_the_ready_robots_hold_the_fitted_set():
     found = fit((*TUBE, FACTORS), 1)
     # The search from the values of the files ends where it begins.
-    assert found.cost == pytest.approx(7.9929, abs=2e-4)
+    assert found.cost == pytest.approx(8.0007, abs=2e-4)
     for name in ("elastic_modulus", "plateau_stress", "plateau_modulus"):
         value = getattr(nf.load_robot("pacheco2021-a-true").material, name)
         assert found.values[f"material.{name}"] == pytest.approx(value, rel=2e-3)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from notchflex.errors import InputError
 from notchflex.robot import Friction, Material, Robot, kinds_of, list_robots, load_robot, to_table
+from notchflex.robot.error_messages import fields_of, is_list
 
 SECTIONS: dict[str, type] = {"friction": Friction, "material": Material}
 
@@ -21,8 +22,9 @@ class PartNumber(NamedTuple):
 
 
 def kinds(section: str) -> list[str]:
-    """Return the kinds of a part, `friction` or `material`."""
-    return list(kinds_of(SECTIONS[section]))
+    """Return the kinds of a part, `friction` or `material`, whose values are single numbers."""
+    every = kinds_of(SECTIONS[section])
+    return [kind for kind, cls in every.items() if not any(map(is_list, fields_of(cls).values()))]
 
 
 def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = None) -> Robot:
@@ -45,9 +47,13 @@ def with_kind(robot: Robot, section: str, kind: str, original: Robot | None = No
     for ready in list_robots():
         table = to_table(load_robot(ready))[section]
         if table["kind"] == kind:
-            keys = {key: present.get(key, value) for key, value in table.items() if key != "kind"}
-            values = {f"{section}.{key}": value for key, value in keys.items()}
-            return robot.with_values({f"{section}.kind": kind, **values})
+            shared = {key: present.get(key, value) for key, value in table.items()}
+            for values in (shared, table):  # values of both kinds need not fit together
+                named = {f"{section}.{key}": value for key, value in values.items()}
+                try:
+                    return robot.with_values({**named, f"{section}.kind": kind})
+                except InputError:
+                    continue
     raise InputError.UNKNOWN_NAME(
         f'no ready robot has a {section} of the kind "{kind}" to take values from'
     )

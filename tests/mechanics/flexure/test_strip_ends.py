@@ -124,6 +124,7 @@ def test_liu_pulled_to_12_degrees(margin):
         margin.within(f"{name} per N", 100.0 * (value / wanted - 1.0), 2.0, "%")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("use", ["fit", "judge"])
 def test_cells_inside_validity(use, margin):
     """The rule against the cells it was fitted to, and against those that only judge it."""
@@ -138,6 +139,7 @@ def test_cells_inside_validity(use, margin):
         margin.within(f"{use}: {name}, max", worst, most, "%")
 
 
+@pytest.mark.nightly
 def test_cells_outside_validity(margin):
     """What the sentence on thin walls says."""
     rows = [row for row in STRIPS + LINKS if row["inner"] / row["outer"] > 0.77]
@@ -160,6 +162,7 @@ def test_validity_names_each_range():
     assert len(strip_validity(link, nf.Tube(5.99, 4.0))) == 2
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("direction", [0.0, 35.0, 180.0])
 def test_the_frame_turns_with_the_notch(direction):
     """The compliance along the strip turns with it, and halves of a row mirror each other."""
@@ -176,6 +179,7 @@ def test_the_frame_turns_with_the_notch(direction):
     np.testing.assert_allclose(one, mirror @ other @ mirror, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "tensions"), [("liu2022", (6.0, 0.0)), ("gao2017", (8.0,))])
 def test_robots_with_friction_and_loads(name, tensions):
     robot = nf.load_robot(name).with_values({"notch[*].ends": "elastic"})

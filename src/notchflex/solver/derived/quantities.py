@@ -60,7 +60,7 @@ def notch_angle(state: SolvedState) -> Array:
     return notch_angles(state.chain, state.relative.rotation)
 
 
-@Quantity("state", "edge angle", r"\theta_{\mathrm{e},j}", "deg", key="edge_angle_deg",
+@Quantity("state", "edge angle", r"\phi_j", "deg", key="edge_angle_deg",
           column="notch_{notch}_edge_deg", per=("notch",), optional=True)  # fmt: skip
 def edge_angle(state: SolvedState) -> Array:
     """Angle between the two faces of a notch, as a photograph shows it.
@@ -291,7 +291,7 @@ def stored_energy(state: SolvedState) -> Array:
         forces = jnp.stack(
             [jnp.sum(one**2, axis=-1) for one in state.solved.point.unknowns.contact_force]
         )
-        in_lips = 0.5 * jnp.sum(chain.contact_flexibility * forces)
+        in_lips = 0.5 * jnp.sum(chain.contact_flexibility[None] * forces)
     return (
         in_lips
         + jnp.sum(chain.rods.length * density)
