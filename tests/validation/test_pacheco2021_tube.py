@@ -41,11 +41,12 @@ def fit(constants, starts):
 
 def test_the_ready_robots_hold_the_fitted_set():
     found = fit((*TUBE, FACTORS), 1)
-    # The search from the values of the files ends where it begins.
+    # The search from the values of the files ends close to where it begins: they were fitted with
+    # 40 fibres a section, now there are 20.
     assert found.cost == pytest.approx(8.0007, abs=2e-4)
     for name in ("elastic_modulus", "plateau_stress", "plateau_modulus"):
         value = getattr(nf.load_robot("pacheco2021-a-true").material, name)
-        assert found.values[f"material.{name}"] == pytest.approx(value, rel=2e-3)
+        assert found.values[f"material.{name}"] == pytest.approx(value, rel=2e-2)
     assert found.values["A:sensor.force_factor"] == pytest.approx(1.0445, abs=2e-3)
 
 
