@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, dataclass_transform
+from typing import Any, TypeVar, dataclass_transform
 
-from notchflex._jax import jax
+from notchflex._jax import jax, jnp
+
+Tree = TypeVar("Tree")
 
 
 def static(**options: Any) -> Any:
@@ -40,4 +42,9 @@ class Pytree:
         jax.tree_util.register_dataclass(cls)
 
 
-__all__ = ["Pytree", "static"]
+def choose(condition: Any, new: Tree, old: Tree) -> Tree:
+    """Return the new tree of arrays where a condition holds, the old one where not."""
+    return jax.tree.map(lambda one, other: jnp.where(condition, one, other), new, old)
+
+
+__all__ = ["Pytree", "choose", "static"]

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
+from notchflex._pytree import choose
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import ErrorCode, InputError
@@ -162,7 +163,7 @@ def follow_row(
     def step(state: tuple[SolverState, Array], command: Any) -> tuple[Any, dict[str, Array]]:
         last, alive = state
         result = solve_load_step(robot, command, last, settings)
-        solved = jax.tree.map(lambda new, old: jnp.where(alive, new, old), result.solved, last)
+        solved = choose(alive, result.solved, last)
         reached = alive & result.converged
         quantity = SolvedState(robot, solved).quantity
         values = {name: quantity(name) for name in outputs if name in _OF_STATE} | {

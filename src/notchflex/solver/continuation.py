@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import constant, jax, jnp
+from notchflex._pytree import choose
 from notchflex.loads.applied import BodyLoads
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
@@ -155,15 +156,14 @@ def solve_load_step(
         at_aim = SolverState(new.point, memory, new.stroke, towards.applied)
         still = viscosity == 0.0
         solved = new.converged & still
-        keep = partial(jax.tree.map, lambda old, new_leaf: jnp.where(solved, new_leaf, old))
         result = LoadStepResult(
-            solved=keep(result.solved, at_aim),
+            solved=choose(solved, at_aim, result.solved),
             residual=new.residual,
             iterations=result.iterations + new.iterations,
             converged=solved & (aim >= 1.0),
             reached=jnp.where(solved, aim, result.reached),
             parts=result.parts + new.converged,
-            between=keep(result.between, result.solved),
+            between=choose(solved, result.solved, result.between),
             part_before=jnp.where(solved, state.result.reached, result.part_before),
         )
         shorter = jnp.where(still, 0.5 * part, part)
@@ -172,11 +172,9 @@ def solve_load_step(
         if not can_snap:
             return _Search(result, part, tries, viscosity, result.solved)
         viscosity = _next_viscosity(viscosity, new.converged, part)
-        move = partial(jax.tree.map, lambda old, new_leaf: jnp.where(new.converged, new_leaf, old))
-        moving = move(state.moving, at_aim)
         given_up = ~still & ~new.converged & (viscosity == 0.0)
-        restart = partial(jax.tree.map, lambda old, new_leaf: jnp.where(given_up, new_leaf, old))
-        return _Search(result, part, tries, viscosity, restart(moving, result.solved))
+        moving = choose(given_up, result.solved, choose(new.converged, at_aim, state.moving))
+        return _Search(result, part, tries, viscosity, moving)
 
     start = LoadStepResult(
         solved=last,

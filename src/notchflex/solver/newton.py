@@ -10,7 +10,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import jax, jnp
-from notchflex._pytree import Pytree
+from notchflex._pytree import Pytree, choose
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
@@ -175,7 +175,7 @@ def newton(
             lambda: (search.step, 0.5 * search.fraction),
         )
         return _Search(
-            best=jax.tree.map(lambda old, new: jnp.where(accept, new, old), best, new),
+            best=choose(accept, new, best),
             allowed=jnp.where(accept, (1.0 - 1e-4) * size, search.allowed),
             step=step,
             fraction=fraction,
