@@ -6,20 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.analysis.closing_loads.closing import closing, moment_arms
+from notchflex.analysis.closing_loads.closing import Closing, closing, moment_arms
 from notchflex.mechanics.chain import assemble, sites_of
-from notchflex.mechanics.flexure import Site, rod
+from notchflex.mechanics.flexure import Site, rod_at
 from notchflex.results.quantities.registry import DEGREES
 from notchflex.robot import Robot, Tube
 from notchflex.robot.error_messages import fields_of
 from notchflex.robot.kinds import Notch
 
 
-def notch_table(robot: Robot) -> list[dict[str, Any]]:
+def notch_table(robot: Robot, found: Closing | None = None) -> list[dict[str, Any]]:
     """Return geometry, section and closing of every notch, base to tip.
 
     Args:
         robot: The robot, n notches, t tendons.
+        found: What `closing` returned of it; found anew where not given.
 
     Returns:
         n rows with the values of the robot file, their units in their names, and
@@ -40,7 +41,7 @@ def notch_table(robot: Robot) -> list[dict[str, Any]]:
         >>> round(row["closing_angle_deg"], 2), round(row["moment_arm_mm"][0], 3)
         (30.63, 1.387)
     """
-    table = closing(robot)
+    table = closing(robot) if found is None else found
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
     described = {each: _description(*each, robot.tube) for each in dict.fromkeys(placed)}
@@ -76,7 +77,7 @@ def named_values(notch: Notch) -> dict[str, Any]:
 
 
 def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
-    one = rod(notch, tube) if site is None else rod(notch, tube, site=site)
+    one = rod_at(site, notch, tube)
     section = one.section
     weakest = int(np.argmin(section.second_moment_weak))
     values: dict[str, Any] = {

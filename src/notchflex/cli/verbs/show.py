@@ -50,7 +50,8 @@ def show(
         from notchflex.analysis.uncertainty.closing_bands import closing_bands, closing_document
         from notchflex.results.files.json import document_head
 
-        notches = notch_table(chosen)
+        table = closing(chosen)
+        notches = notch_table(chosen, table)
         straight = np.zeros((1, chosen.number_of_notches))
         length = float(tip_from_angles(chosen, straight)[0][0, 2])
     if plot is not None:
@@ -65,7 +66,7 @@ def show(
     if outputs.prints_tables or json is not None:
         with terminal.working("drawing robots within the tolerances"):
             try:
-                bands = closing_bands(chosen, closing(chosen))
+                bands = closing_bands(chosen, table)
             except InputError as problem:
                 terminal.warn(f"no bands: {problem}")
     more = {} if bands is None else {"tolerances": closing_document(bands)}

@@ -24,7 +24,7 @@ from notchflex.mechanics.flexure import (
     flattened,
     flexure_state,
     free_pose,
-    rod,
+    rod_at,
     stack,
     with_level,
 )
@@ -308,9 +308,7 @@ def _flexure(
     notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
 ) -> tuple[Rod, Motion]:
     """A flexure and its pose in the free robot."""
-    # Kinds whose ends are rigid need not know of sites.
-    whole = rod(notch, tube, refinement) if site is None else rod(notch, tube, refinement, site)
-    made = with_level(whole, level)
+    made = with_level(rod_at(site, notch, tube, refinement), level)
     made = with_fibres(made, notch, tube) if by_fibres else made
     return made, free_pose(made)
 

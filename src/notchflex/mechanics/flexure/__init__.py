@@ -4,7 +4,7 @@ from notchflex._packages import import_all
 from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.plane import flattened
-from notchflex.mechanics.flexure.registry import Site, rod, unchecked
+from notchflex.mechanics.flexure.registry import Site, rod, rod_at, unchecked
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.rod_kinematics import (
     free_pose,
@@ -45,6 +45,7 @@ __all__ = [
     "of_rod",
     "relative_pose",
     "rod",
+    "rod_at",
     "rod_end",
     "stack",
     "turn_doubt",

@@ -51,6 +51,18 @@ def rod(notch: Any, tube: Tube, refinement: int = 0, site: Site | None = None) -
     )
 
 
+def rod_at(site: Site | None, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
+    """Make the rod of a notch where it stands; kinds whose ends are rigid need not know of sites.
+
+    Args:
+        site: What surrounds it; None where its ends are rigid.
+        notch: A notch description.
+        tube: The tube it is cut into.
+        refinement: As for `rod`.
+    """
+    return rod(notch, tube, refinement) if site is None else rod(notch, tube, refinement, site)
+
+
 @singledispatch
 def unchecked(notch: Any, tube: Tube, site: Site) -> list[str]:
     """List where the law of a notch with elastic ends was not checked.
