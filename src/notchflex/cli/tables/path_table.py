@@ -50,9 +50,7 @@ def print_path(
     rows, stride = shown_rows(path, every_row=every_row)
     room = terminal.width()
     console = terminal.output(room)
-    console.print(title, style="bold", soft_wrap=True)
-    for sentence in load_sentences(path.load.external):
-        console.print(sentence, soft_wrap=True)
+    _print_head(console, path, title)
     step = step_column(rows)
     groups = named_groups(path, rows, columns) if columns else usual_groups(path, rows)
     left_out = [] if columns else _without_room(groups, room - step.width)
@@ -104,9 +102,7 @@ def print_bands(
     rows, stride = shown_rows(path, every_row=every_row)
     room = terminal.width()
     console = terminal.output(room)
-    console.print(title, style="bold", soft_wrap=True)
-    for sentence in load_sentences(path.load.external):
-        console.print(sentence, soft_wrap=True)
+    _print_head(console, path, title)
     commanded = named_groups(path, rows, ("commanded_tension", "commanded_stroke"))
     for group in commanded:
         group.columns[:] = [one for one in group.columns if {*one.cells} != {NO_NUMBER}]
@@ -136,6 +132,13 @@ def print_bands(
 def _varies(column: PathColumn) -> bool:
     """Whether a column holds another number than zero."""
     return any(cell.strip("-0.* ") not in ("", NO_NUMBER) for cell in column.cells)
+
+
+def _print_head(console: Console, path: EquilibriumPath, title: str) -> None:
+    """Print a title and the external loads of a path."""
+    console.print(title, style="bold", soft_wrap=True)
+    for sentence in load_sentences(path.load.external):
+        console.print(sentence, soft_wrap=True)
 
 
 def load_sentences(external: Sequence[ExternalLoad]) -> list[str]:
