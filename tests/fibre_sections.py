@@ -17,6 +17,17 @@ ENDS = NotchEnds(
     weak=0.6, strong=0.0, axial=0.0, torsion=0.0, odd=0.2, even=0.1, material_share=0.25
 )
 
+PLAIN = FibreSection(
+    area=0.125,
+    second_moment_weak=5.8e-4,
+    second_moment_strong=2.0e-2,
+    torsion_constant=5.0e-4,
+    shear_centre=0.7,
+    edge_spine=0.1235,
+    edge_near=0.177,
+)
+"""A section of wrist A as plain numbers, without ends and fibres."""
+
 respond = jax.jit(lambda law, strain, section, memory: law.respond(strain, section, memory))
 energy = jax.jit(lambda law, strain, section, memory: law.energy(strain, section, memory))
 

@@ -10,7 +10,6 @@ from notchflex.analysis.uncertainty.closing_bands import closing_bands
 from notchflex.plotting import picture
 from notchflex.plotting.sheet import Area
 from notchflex.robot import from_table, to_table
-from notchflex.robot.kinds import Material, kinds_of
 from notchflex.robot.tolerance import amount
 from notchflex.robot.value_names import number_at
 
@@ -177,7 +176,6 @@ def test_the_file_replaces_what_is_assumed(wrist: nf.Robot):
     assert sizes["notch.depth"] == pytest.approx(0.005 * large.tube.outer_diameter, rel=0.01)
 
 
-@pytest.mark.skipif("nitinol" not in kinds_of(Material), reason="no such kind of material")
 def test_nitinol_has_the_ranges_of_published_tubes(wrist: nf.Robot):
     table = to_table(wrist)
     table["material"] = {"kind": "nitinol", "elastic_modulus": 42e3, "plateau_stress": 350.0}

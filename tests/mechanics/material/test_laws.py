@@ -7,17 +7,9 @@ import pytest
 from scipy.integrate import quad
 
 import notchflex as nf
-from notchflex.mechanics.material import FibreSection, SectionLaw, section_law
+from fibre_sections import PLAIN as SECTION
+from notchflex.mechanics.material import SectionLaw, section_law
 
-SECTION = FibreSection(
-    area=0.125,
-    second_moment_weak=5.8e-4,
-    second_moment_strong=2.0e-2,
-    torsion_constant=5.0e-4,
-    shear_centre=0.7,
-    edge_spine=0.1235,
-    edge_near=0.177,
-)
 LAWS = {
     "linear": nf.Linear(60000.0),
     "superelastic": nf.Superelastic(10000.0, 3000.0, 0.028),

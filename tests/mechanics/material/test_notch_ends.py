@@ -10,6 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import notchflex as nf
+from fibre_sections import PLAIN
 from notchflex._jax import jax
 from notchflex.mechanics.flexure import rod, stack
 from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, section_law
@@ -17,17 +18,7 @@ from notchflex.mechanics.material import FibreSection, NotchEnds, SectionLaw, se
 ENDS = NotchEnds(
     weak=0.6, strong=0.3, axial=0.2, torsion=-0.4, odd=0.4, even=0.25, material_share=0.25
 )
-SECTION = FibreSection(
-    area=0.125,
-    second_moment_weak=5.8e-4,
-    second_moment_strong=2.0e-2,
-    torsion_constant=5.0e-4,
-    shear_centre=0.7,
-    edge_spine=0.1235,
-    edge_near=0.177,
-    ends=ENDS,
-)
-PLAIN = dataclasses.replace(SECTION, ends=None)
+SECTION = dataclasses.replace(PLAIN, ends=ENDS)
 LINEAR = section_law(nf.Linear(60000.0))
 SUPERELASTIC = section_law(nf.Superelastic(10000.0, 3000.0, 0.028))
 
