@@ -1,0 +1,82 @@
+"""Where tendons pass the edges of the bodies, and their levers about the hinges."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.export.simulators.hinges import HingeChain
+from notchflex.mechanics.chain.mass import body_lengths
+from notchflex.mechanics.tendon.openings import passage
+from notchflex.robot import Robot
+
+
+class Hole(NamedTuple):
+    """A point that a tendon is led through.
+
+    Attributes:
+        body: The body it is fixed to, 0 the base.
+        place: Its place in the frame of that body, mm.
+    """
+
+    body: int
+    place: Float[np.ndarray, " 3"]
+
+
+def tendon_holes(robot: Robot, tendon: int) -> list[Hole]:
+    """Return the points that a tendon runs through, base to tip.
+
+    Args:
+        robot: The robot.
+        tendon: Which tendon, from 0.
+    """
+    one = robot.tendon[tendon]
+    lengths = body_lengths(robot.tube, robot.notches)
+    line = passage(
+        robot.notches, lengths, one.direction_deg, robot.tube.outer_radius, one.radius
+    )
+    side = np.radians(one.direction_deg)
+    place = one.radius * np.array([np.cos(side), np.sin(side), 0.0])
+
+    def hole(body: int, along: float) -> Hole:
+        return Hole(body, place + [0.0, 0.0, along])
+
+    last = one.end_body or robot.number_of_notches
+    holes = [hole(0, 0.0)]
+    if line.base_leaves > 0.0:
+        holes.append(hole(0, float(line.base_leaves)))
+    for j in np.flatnonzero(line.visits[:last]):
+        holes.append(hole(int(j) + 1, float(line.enters[j])))
+        if j + 1 < last:
+            holes.append(hole(int(j) + 1, float(line.leaves[j])))
+    return holes
+
+
+def tendon_levers(
+    chain: HingeChain, holes: list[Hole], angle: Float[np.ndarray, "s n"]
+) -> Float[np.ndarray, "s n"]:
+    """Return by how much a tendon shortens per turn of every hinge, mm/rad.
+
+    Args:
+        chain: The hinges.
+        holes: The points that the tendon runs through.
+        angle: Angles of the hinges from the free robot, rad.
+    """
+    position, rotation = chain.bodies(angle)
+    first = position[:, :-1] + np.einsum(
+        "snab,nb->sna", rotation[:, :-1], chain.offset - chain.lever
+    )
+    axis = np.einsum("snab,nb->sna", rotation[:, :-1], chain.axis)
+    points = [position[:, h.body] + rotation[:, h.body] @ h.place for h in holes]
+    levers = np.zeros(angle.shape)
+    for (a, start), (b, stop) in zip(
+        zip(holes, points, strict=True), list(zip(holes, points, strict=True))[1:], strict=False
+    ):
+        along = stop - start
+        along /= np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-300)
+        for j in range(a.body, b.body):
+            turned = np.cross(axis[:, j], stop - first[:, j])
+            levers[:, j] -= np.einsum("sa,sa->s", along, turned)
+    return levers
