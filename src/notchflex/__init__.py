@@ -133,6 +133,13 @@ _HOME = {
         ),
         "notchflex.comparison",
     ),
+    **dict.fromkeys(
+        (
+            "Exported",
+            "export_robot",
+        ),
+        "notchflex.export",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

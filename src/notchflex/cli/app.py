@@ -94,6 +94,10 @@ VERBS = {
         "    echo 200,126.8,88,86 >> readings.csv\n"
         "    notchflex friction-rig readings.csv --plot friction.png",
     ),
+    "export": (
+        "Write files for the laser, for CAD and for simulators.",
+        "notchflex export pacheco2021-a --pdf wrist.pdf",
+    ),
     "bench": (
         "Time the solver on this machine.",
         "notchflex bench --json bench.json\n    notchflex bench --only wrist",
