@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.export.simulators.hinges import HingeChain, fit_hinges
+from notchflex.export.simulators.levers import tendon_levers
 from notchflex.export.simulators.samples import PullSamples, load_range, pull_samples
 from notchflex.export.simulators.springs import HingeSpring, fit_spring
-from notchflex.export.simulators.tendon_holes import Hole, tendon_holes, tendon_levers
+from notchflex.export.tendon_holes import Hole, tendon_holes
 from notchflex.mechanics.chain import assemble
 from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.mechanics.contact import closing_travel

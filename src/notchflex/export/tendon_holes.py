@@ -1,4 +1,4 @@
-"""Where tendons pass the edges of the bodies, and their levers about the hinges."""
+"""Where tendons pass the edges of the bodies."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.export.simulators.hinges import HingeChain
 from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.mechanics.tendon.openings import passage
 from notchflex.robot import Robot
@@ -52,31 +51,3 @@ def tendon_holes(robot: Robot, tendon: int) -> list[Hole]:
         if j + 1 < last:
             holes.append(hole(int(j) + 1, float(line.leaves[j])))
     return holes
-
-
-def tendon_levers(
-    chain: HingeChain, holes: list[Hole], angle: Float[np.ndarray, "s n"]
-) -> Float[np.ndarray, "s n"]:
-    """Return by how much a tendon shortens per turn of every hinge, mm/rad.
-
-    Args:
-        chain: The hinges.
-        holes: The points that the tendon runs through.
-        angle: Angles of the hinges from the free robot, rad.
-    """
-    position, rotation = chain.bodies(angle)
-    first = position[:, :-1] + np.einsum(
-        "snab,nb->sna", rotation[:, :-1], chain.offset - chain.lever
-    )
-    axis = np.einsum("snab,nb->sna", rotation[:, :-1], chain.axis)
-    points = [position[:, h.body] + rotation[:, h.body] @ h.place for h in holes]
-    levers = np.zeros(angle.shape)
-    for (a, start), (b, stop) in zip(
-        zip(holes, points, strict=True), list(zip(holes, points, strict=True))[1:], strict=False
-    ):
-        along = stop - start
-        along /= np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-300)
-        for j in range(a.body, b.body):
-            turned = np.cross(axis[:, j], stop - first[:, j])
-            levers[:, j] -= np.einsum("sa,sa->s", along, turned)
-    return levers
