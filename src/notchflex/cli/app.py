@@ -96,7 +96,8 @@ VERBS = {
     ),
     "export": (
         "Write files for the laser, for CAD and for simulators.",
-        "notchflex export pacheco2021-a --pdf wrist.pdf",
+        "notchflex export pacheco2021-a --dxf wrist.dxf --two-axis\n"
+        "    notchflex export two-axis-wrist --svg wrist.svg --kerf 0.025 --seam split",
     ),
     "bench": (
         "Time the solver on this machine.",

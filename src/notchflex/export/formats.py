@@ -14,7 +14,7 @@ from typing import Any
 from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.export.document import Document, Subject
-from notchflex.export.options import SheetOptions
+from notchflex.export.options import PatternOptions
 
 Builder = Callable[[Subject, Any], Document]
 
@@ -51,13 +51,21 @@ class Format:
             need(module, extra, option)
 
 
+_EZDXF = (("ezdxf", "export"),)
+
 FORMATS: dict[str, Format] = {
-    "pdf": Format(
-        "dimensioned sheet for the shop and for incoming inspection",
-        (".pdf",),
-        "notchflex.export.sheet:sheet",
-        SheetOptions,
-        (("matplotlib", "plot"),),
+    "dxf": Format(
+        "flat pattern for the laser",
+        (".dxf",),
+        "notchflex.export.flat.dxf:dxf_pattern",
+        PatternOptions,
+        _EZDXF,
+    ),
+    "svg": Format(
+        "flat pattern at full size",
+        (".svg",),
+        "notchflex.export.flat.svg:svg_pattern",
+        PatternOptions,
     ),
 }
 """Name of a format, which is also that of its option, to what writes it."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.arguments.export import PatternArguments
 from notchflex.cli.arguments.loads import TendonCommand, load_columns, tendon_command
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
@@ -14,6 +15,7 @@ from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
 from notchflex.export.export import Exported, build, write
 from notchflex.export.formats import FORMATS, check_suffix
+from notchflex.export.options import PatternOptions
 
 if TYPE_CHECKING:
     from notchflex.export.document import Subject
@@ -30,7 +32,9 @@ def export(
     robot: RobotName,
     /,
     *,
-    pdf: Annotated[str | None, _file("pdf")] = None,
+    dxf: Annotated[str | None, _file("dxf")] = None,
+    svg: Annotated[str | None, _file("svg")] = None,
+    pattern: PatternArguments = PatternArguments(),  # noqa: B008 - frozen
     tension: Annotated[
         tuple[TendonCommand, ...],
         tendon_command("--tension"),
@@ -52,8 +56,8 @@ def export(
 
     All files are made before the first one is written. A file that is already there is replaced.
     """
-    outputs = Outputs(robot_files(robot), quiet=quiet, json=json, pdf=pdf)
-    options: dict[str, Any] = {}
+    outputs = Outputs(robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg)
+    options: dict[type, Any] = {PatternOptions: pattern.options()}
     files = {name: file for name, file in outputs.targets.items() if name in FORMATS}
     if not files:
         raise InputError.MISSING_VALUE(
@@ -77,7 +81,9 @@ def export(
             return NOT_CONVERGED
         documents = {
             files[name]: build(
-                name, subject if FORMATS[name].bends else _free(chosen), options.get(name)
+                name,
+                subject if FORMATS[name].bends else _free(chosen),
+                options[FORMATS[name].options],
             )
             for name in files
         }
