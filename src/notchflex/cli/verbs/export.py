@@ -14,8 +14,10 @@ from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
 from notchflex.export.export import Exported, build, write
+from notchflex.export.finite_elements.options import DeckOptions, Mesh
 from notchflex.export.formats import FORMATS, check_suffix
 from notchflex.export.options import PatternOptions
+from notchflex.export.simulators.options import SimulatorOptions
 
 if TYPE_CHECKING:
     from notchflex.export.document import Subject
@@ -34,13 +36,22 @@ def export(
     *,
     dxf: Annotated[str | None, _file("dxf")] = None,
     svg: Annotated[str | None, _file("svg")] = None,
+    mjcf: Annotated[str | None, _file("mjcf")] = None,
+    urdf: Annotated[str | None, _file("urdf")] = None,
+    transmission: Annotated[str | None, _file("transmission")] = None,
+    inp: Annotated[str | None, _file("inp")] = None,
     pattern: PatternArguments = PatternArguments(),  # noqa: B008 - frozen
+    mesh: Annotated[
+        Mesh,
+        Parameter(help="How fine the mesh of `--inp` is."),
+    ] = "medium",
     tension: Annotated[
         tuple[TendonCommand, ...],
         tendon_command("--tension"),
         Parameter(
             help="Bend a solid by this tension at the base of a tendon [N], written as for "
-            "`simulate`; its last step counts."
+            "`simulate`; its last step counts. It is the load of a deck, and the largest tension "
+            "that the joints of a simulator are fitted to."
         ),
     ] = (),
     stroke: Annotated[
@@ -56,8 +67,22 @@ def export(
 
     All files are made before the first one is written. A file that is already there is replaced.
     """
-    outputs = Outputs(robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg)
-    options: dict[type, Any] = {PatternOptions: pattern.options()}
+    outputs = Outputs(
+        robot_files(robot),
+        quiet=quiet,
+        json=json,
+        dxf=dxf,
+        svg=svg,
+        mjcf=mjcf,
+        urdf=urdf,
+        transmission=transmission,
+        inp=inp,
+    )
+    options: dict[type, Any] = {
+        PatternOptions: pattern.options(),
+        SimulatorOptions: SimulatorOptions(),
+        DeckOptions: DeckOptions.of_mesh(mesh),
+    }
     files = {name: file for name, file in outputs.targets.items() if name in FORMATS}
     if not files:
         raise InputError.MISSING_VALUE(

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from notchflex.export.finite_elements.half_tube import DeckOptions, HalfTube
+from notchflex.export.finite_elements.half_tube import HalfTube
 from notchflex.export.finite_elements.material_cards import material_cards
+from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.tendon_spans import TendonSpan
 from notchflex.robot import Robot
 

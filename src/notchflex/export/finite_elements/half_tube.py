@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex.errors import InputError
+from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.robot import ArcNotch, Robot
 
 # Corners and middle nodes of an element in steps of half an element, as CalculiX counts them: first
@@ -22,40 +23,6 @@ _NODES = np.array(
     + [(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)]
     + [(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)]
 )[:, [1, 0, 2]]
-
-
-@dataclass(frozen=True)
-class DeckOptions:
-    """Options of a deck of finite elements.
-
-    Args:
-        wall: Elements through the wall.
-        spine: Elements over half the arc that a notch leaves.
-        opening: Elements over half the opening of a notch.
-        notch: Elements along a notch.
-        uncut: Elements along an uncut length.
-        contact: Whether the faces of the notches may touch.
-        tip_moment: A moment on the end of the tube, which it keeps plane, toward the notches, N mm.
-    """
-
-    wall: int = 1
-    spine: int = 5
-    opening: int = 6
-    notch: int = 6
-    uncut: int = 8
-    contact: bool = True
-    tip_moment: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        for name in ("wall", "spine", "opening", "notch", "uncut"):
-            value: Any = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= 100:
-                raise InputError.OUT_OF_RANGE(
-                    f"{name} must be a whole number from 1 to 100; got {value!r}"
-                )
-        if not np.isfinite(self.tip_moment):
-            raise InputError.NOT_FINITE(f"tip_moment must be finite; got {self.tip_moment}")
 
 
 @dataclass(frozen=True)
@@ -154,7 +121,9 @@ def half_tube(robot: Robot, options: DeckOptions) -> HalfTube:
     radius = np.linspace(robot.tube.inner_radius, robot.tube.outer_radius, 2 * options.wall + 1)
     edge = np.stack([edge_angle(notch, robot, radius) for notch in notches])  # (n, radii)
     # Between two notches the lines go over from the edge of one to that of the next.
-    at = np.stack([np.interp(height, notch_of[0], edge[notch_of[1], i]) for i in range(len(radius))])
+    at = np.stack(
+        [np.interp(height, notch_of[0], edge[notch_of[1], i]) for i in range(len(radius))]
+    )
     to_edge = 1.0 - _graded(2 * options.spine)[::-1]
     beyond = _graded(2 * options.opening)[1:]
     angle = np.concatenate(

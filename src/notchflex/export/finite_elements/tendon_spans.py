@@ -54,7 +54,9 @@ def tendon_spans(
             "notches: half of the tube is meshed, so that it must lie on their side"
         )
     radii = np.hypot(*mesh.place[:, :2].T)
-    column = int(np.argmin([_distance(mesh, radii, i, one.radius) for i in range(mesh.nodes.shape[0])]))
+    column = int(
+        np.argmin([_distance(mesh, radii, i, one.radius) for i in range(mesh.nodes.shape[0])])
+    )
     if _distance(mesh, radii, column, one.radius) > _NEAR * one.radius:
         raise InputError.UNSUPPORTED(
             f"tendon[{tendon + 1}].radius is {one.radius} mm: the mesh has nodes between "

@@ -97,7 +97,9 @@ def _springs(
         rows = [one.slips[:, j] for one in pulls]
         angle = [one.angle[row, j] for one, row in zip(pulls, rows, strict=True)]
         moment = [each[row, j] for each, row in zip(moments, rows, strict=True)]
-        rising = [np.where(one.loading[row], 1.0, -1.0) for one, row in zip(pulls, rows, strict=True)]
+        rising = [
+            np.where(one.loading[row], 1.0, -1.0) for one, row in zip(pulls, rows, strict=True)
+        ]
         samples = (np.concatenate(each) for each in (angle, moment, rising))
         springs.append(fit_spring(*samples, float(own)))
     return tuple(springs)

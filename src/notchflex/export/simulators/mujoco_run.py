@@ -113,7 +113,9 @@ def _compare(
         tendon=one.tendon + 1,
         largest_tension=model.top,
         total_angle=float(np.abs(own - total).max() / np.ptp(total)),
-        notch_angle=float(np.abs(found.angle - one.angle[rows]).max() / np.ptp(one.angle, axis=0).max()),
+        notch_angle=float(
+            np.abs(found.angle - one.angle[rows]).max() / np.ptp(one.angle, axis=0).max()
+        ),
         tip_position=float(np.linalg.norm(found.tip - one.tip[rows], axis=1).max() / moved),
         loop_area=float(abs(own_area / area - 1.0)) if abs(area) > least else float("nan"),
     )

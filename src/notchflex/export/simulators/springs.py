@@ -16,8 +16,9 @@ from jaxtyping import Float
 
 _POWERS = np.array([1, 2, 3])
 _BEYOND = np.array([1, 2])
-# Where further springs may begin between the free robot and the largest angle, how many to each side
-# at most, and the error of the angle that is good enough, as a part of its range.
+# Where further springs may begin between the free robot and the largest angle, how many to each
+# side at most, how far apart, and the error of the angle that is good enough, all as parts of the
+# range.
 _PLACES = np.linspace(0.05, 0.95, 37)
 _MOST_KNOTS = 6
 _APART = 0.06
