@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from notchflex._jax import constant
 from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.mechanics.tendon.openings import passage
 from notchflex.robot import Robot
@@ -32,7 +33,7 @@ def tendon_holes(robot: Robot, tendon: int) -> list[Hole]:
         tendon: Which tendon, from 0.
     """
     one = robot.tendon[tendon]
-    lengths = body_lengths(robot.tube, robot.notches)
+    lengths = constant(body_lengths(robot.tube, robot.notches))
     line = passage(robot.notches, lengths, one.direction_deg, robot.tube.outer_radius, one.radius)
     side = np.radians(one.direction_deg)
     place = one.radius * np.array([np.cos(side), np.sin(side), 0.0])

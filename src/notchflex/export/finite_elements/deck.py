@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from notchflex.export.finite_elements.half_tube import HalfTube
-from notchflex.export.finite_elements.material_cards import material_cards
+from notchflex.export.finite_elements.material_cards import material_cards, with_cards
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.tendon_spans import TendonSpan
 from notchflex.robot import Robot
@@ -142,8 +142,7 @@ def _tip_plate(mesh: HalfTube, extra: int) -> list[str]:
 
 def _contact(mesh: HalfTube, robot: Robot) -> Iterator[str]:
     """Both faces of every notch, over the outer half of the opening, where they meet."""
-    # Whatever the law of the material: it sets the scale of the stiffness of a contact.
-    modulus = float(robot.material.elastic_modulus)
+    modulus = with_cards(robot.material).elastic_modulus
     outer = 2 * mesh.cell[:, 1] >= mesh.opening + (mesh.nodes.shape[1] - 1 - mesh.opening) // 2
     number = np.arange(1, len(mesh.cell) + 1)
     names: list[tuple[str, str]] = []

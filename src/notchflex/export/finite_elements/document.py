@@ -46,8 +46,9 @@ def deck_document(subject: Subject, options: DeckOptions) -> TextDocument:
         f"Load: {', '.join(loads)}.",
         "Tendons are springs of constant force between the edges that they touch; the force falls "
         "from edge to edge by the friction that the chain has at this load.",
-        "Run it with: ccx, followed by the name of this file without .inp. Sets NRING0, NRING1, "
-        "...: sections in the middle of the uncut lengths, whose displacements go to the .dat file.",
+        "Run it with: ccx, followed by the name of this file without .inp.",
+        "Sets NRING0, NRING1, ...: sections in the middle of the uncut lengths. The .dat file has "
+        "their displacements.",
         *warnings,
     ]
     facts = {"nodes": len(mesh.place), "elements": len(mesh.elements)}

@@ -19,9 +19,11 @@ from notchflex.robot import ArcNotch, Robot
 # Corners and middle nodes of an element in steps of half an element, as CalculiX counts them: first
 # along the angle, then along the radius (which makes a right-handed frame with z).
 _NODES = np.array(
-    [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]
-    + [(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)]
-    + [(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)]
+    [
+        *[(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)],
+        *[(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)],
+        *[(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)],
+    ]
 )[:, [1, 0, 2]]
 
 
@@ -117,13 +119,12 @@ def half_tube(robot: Robot, options: DeckOptions) -> HalfTube:
         InputError: The robot has another shape than the mesh can have.
     """
     notches = check_shape(robot)
-    height, notch_of, faces = _layers(robot, notches, options)
+    height, edges_at, faces = _layers(robot, notches, options)
     radius = np.linspace(robot.tube.inner_radius, robot.tube.outer_radius, 2 * options.wall + 1)
     edge = np.stack([edge_angle(notch, robot, radius) for notch in notches])  # (n, radii)
     # Between two notches the lines go over from the edge of one to that of the next.
-    at = np.stack(
-        [np.interp(height, notch_of[0], edge[notch_of[1], i]) for i in range(len(radius))]
-    )
+    edge = np.repeat(edge, 2, axis=0)
+    at = np.stack([np.interp(height, edges_at, each) for each in edge.T])
     to_edge = 1.0 - _graded(2 * options.spine)[::-1]
     beyond = _graded(2 * options.opening)[1:]
     angle = np.concatenate(
@@ -142,24 +143,25 @@ def half_tube(robot: Robot, options: DeckOptions) -> HalfTube:
 
 def _layers(
     robot: Robot, notches: list[ArcNotch], options: DeckOptions
-) -> tuple[Float[np.ndarray, " c"], tuple[np.ndarray, np.ndarray], Int[np.ndarray, "n 2"]]:
-    """Heights of the layers, the notch at each of some heights, and the faces of the notches."""
-    height, faces, known = [np.zeros(1)], [], []
+) -> tuple[Float[np.ndarray, " c"], list[float], Int[np.ndarray, "n 2"]]:
+    """Heights of the layers, of both edges of every notch, and the indices of these layers."""
+    height: list[np.ndarray] = [np.zeros(1)]
+    edges: list[float] = []
+    faces: list[tuple[int, int]] = []
     base, top = robot.tube.base_length, 0.0
     if base > 0.0:
         height.append(base * _both_ends(2 * options.uncut)[1:])
         top = base
-    for number, notch in enumerate(notches):
+    for notch in notches:
         start = sum(map(len, height)) - 1
         height.append(top + notch.height * np.linspace(0.0, 1.0, 2 * options.notch + 1)[1:])
         faces.append((start, start + 2 * options.notch))
-        known += [(top, number), (top + notch.height, number)]
+        edges += [top, top + notch.height]
         top += notch.height
         if notch.uncut_length > 0.0:
             height.append(top + notch.uncut_length * _both_ends(2 * options.uncut)[1:])
             top += notch.uncut_length
-    at, which = zip(*known, strict=True)
-    return np.concatenate(height), (np.array(at), np.array(which)), np.array(faces)
+    return np.concatenate(height), edges, np.array(faces)
 
 
 def _graded(count: int) -> Float[np.ndarray, " k"]:

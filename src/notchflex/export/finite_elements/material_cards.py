@@ -18,29 +18,38 @@ def material_cards(material: Material) -> list[str]:
     Raises:
         InputError: The kind has no cards.
     """
-    elastic = ["*ELASTIC", f"{material.elastic_modulus:.10g},{material.poisson_ratio:.10g}"]
-    if isinstance(material, Linear):
+    known = with_cards(material)
+    modulus = known.elastic_modulus
+    elastic = ["*ELASTIC", f"{modulus:.10g},{known.poisson_ratio:.10g}"]
+    if isinstance(known, Linear):
         return elastic
-    points = _curve(material)
-    lines = [
-        f"{stress:.10g},{strain - stress / material.elastic_modulus:.10g}"
-        for strain, stress in points
-    ]
+    points = _curve(known, modulus)
+    lines = [f"{stress:.10g},{strain - stress / modulus:.10g}" for strain, stress in points]
     return [*elastic, "*PLASTIC", *lines]
 
 
-def _curve(material: Material) -> list[tuple[float, float]]:
+def with_cards(material: Material) -> Linear | Superelastic | Nitinol | StressStrain:
+    """Return a material of a kind that has cards.
+
+    Raises:
+        InputError: The kind has none.
+    """
+    if isinstance(material, (Linear, Superelastic, Nitinol, StressStrain)):
+        return material
+    raise InputError.UNSUPPORTED(
+        f"a material of kind {material.kind!r} has no cards for CalculiX; use a linear, "
+        "superelastic, nitinol or stress-strain one"
+    )
+
+
+def _curve(
+    material: Superelastic | Nitinol | StressStrain, modulus: float
+) -> list[tuple[float, float]]:
     """Strains and stresses (MPa) from the end of the elastic line on."""
-    modulus = material.elastic_modulus
     if isinstance(material, Superelastic):
         first, slope = material.transition_strain, material.superelastic_modulus
         return [(e, modulus * first + slope * (e - first)) for e in (first, max(_FAR, 2 * first))]
     if isinstance(material, Nitinol):
         first, slope = material.plateau_stress / modulus, material.plateau_modulus
         return [(e, modulus * first + slope * (e - first)) for e in (first, max(_FAR, 2 * first))]
-    if isinstance(material, StressStrain):
-        return list(zip(material.strain, material.stress, strict=True))
-    raise InputError.UNSUPPORTED(
-        f"a material of kind {material.kind!r} has no cards for CalculiX; use a linear, "
-        "superelastic, nitinol or stress-strain one"
-    )
+    return list(zip(material.strain, material.stress, strict=True))

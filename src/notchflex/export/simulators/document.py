@@ -113,7 +113,7 @@ _MOST = 0.02
 def _large(errors: list[SimulatorError]) -> tuple[str, ...]:
     return tuple(
         f"The MJCF model misses the total angle under tendon {error.tendon} by "
-        f"{error.total_angle:.1%} of its range; take a smaller range of tension."
+        f"{error.total_angle:.1%} of its range; a smaller largest tension brings it closer."
         for error in errors
         if not error.total_angle <= _MOST
     )

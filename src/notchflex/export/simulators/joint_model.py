@@ -100,6 +100,6 @@ def _springs(
         rising = [
             np.where(one.loading[row], 1.0, -1.0) for one, row in zip(pulls, rows, strict=True)
         ]
-        samples = (np.concatenate(each) for each in (angle, moment, rising))
-        springs.append(fit_spring(*samples, float(own)))
+        joined = [np.concatenate(each) for each in (angle, moment, rising)]
+        springs.append(fit_spring(joined[0], joined[1], joined[2], float(own)))
     return tuple(springs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from notchflex.export.simulators.joint_model import JointModel
 from notchflex.export.simulators.samples import PullSamples
 
 _LEVELS = 24  # up, and as many down
-_RAMP = 60  # time steps from level to level
+_RAMP = 200  # time steps from level to level: faster, and inertia carries hinges too far
 _HOLD, _MOST_HOLDS = 100, 60  # time steps between looks whether all stands still, and how many
 _STILL = 5e-5  # rad/s
 
@@ -39,8 +40,11 @@ class SimulatorError:
     loop_area: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the numbers by name, None for NaN."""
-        return {name: None if value != value else value for name, value in asdict(self).items()}
+        """Return the numbers by name, with units, None for NaN."""
+        named = {
+            "largest_tension_N" if k == "largest_tension" else k: v for k, v in asdict(self).items()
+        }
+        return {name: None if value != value else value for name, value in named.items()}
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,7 @@ def run_mujoco(
         tension: The levels, N.
         notches: Number of notches.
     """
-    import mujoco  # pyright: ignore[reportMissingTypeStubs]
-
+    mujoco: Any = import_module("mujoco")  # it has no types
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     # One joint coordinate and one velocity a hinge.

@@ -16,12 +16,13 @@ from jaxtyping import Float
 
 _POWERS = np.array([1, 2, 3])
 _BEYOND = np.array([1, 2])
-# Where further springs may begin between the free robot and the largest angle, how many to each
-# side at most, how far apart, and the error of the angle that is good enough, all as parts of the
+# Where further springs may begin between the free robot and the largest angle, how many at
+# most, how far apart, and the error of the angle that is good enough, all as parts of the
 # range.
-_PLACES = np.linspace(0.05, 0.95, 37)
+_PLACES = np.linspace(0.05, 0.95, 28)
 _MOST_KNOTS = 6
 _APART = 0.06
+_WORTH = 0.95  # of the error before; a knot that leaves more is not worth its spring
 _GOOD = 5e-4
 # No sample weighs more than that of a flexure softer than the free one by this factor.
 _SOFTEST = 50.0
@@ -84,7 +85,9 @@ def fit_spring(
         rising: 1 where the angle moves away from that of the free robot, -1 where it comes back.
         stiffness: Stiffness of the free flexure, N mm/rad, where the samples say nothing.
     """
-    low, high = min(angle.min(initial=0.0), 0.0), max(angle.max(initial=0.0), 0.0)
+    low, high = float(angle.min(initial=0.0)), float(angle.max(initial=0.0))
+    # Rounding is no motion to a side.
+    low, high = (0.0 if abs(end) < _LEAST_TURN else end for end in (low, high))
     if high - low < _LEAST_TURN:
         return linear_spring(stiffness)
     slope = (rising * np.sign(angle))[:, None] * _friction(angle)
@@ -92,7 +95,7 @@ def fit_spring(
     goal = _GOOD * (high - low)
     places = np.concatenate([end * _PLACES for end in (low, high) if abs(end) > _LEAST_TURN])
     best = _least_squares(angle, moment, slope, weight, np.zeros(0))
-    for _ in range(_MOST_KNOTS * len(places) // len(_PLACES)):
+    for _ in range(_MOST_KNOTS):
         # A superelastic notch yields somewhere: the knot that helps most is found by trying.
         apart = _APART * (high - low)
         free = [at for at in places if np.abs(at - best.knots).min(initial=np.inf) > apart]
@@ -102,7 +105,10 @@ def fit_spring(
             _least_squares(angle, moment, slope, weight, np.sort(np.append(best.knots, at)))
             for at in free
         ]
-        best = min(trials, key=lambda trial: trial.error)
+        better = min(trials, key=lambda trial: trial.error)
+        if better.error > _WORTH * best.error:
+            break
+        best = better
     own, further, friction = np.split(best.found, [3, 3 + 2 * len(best.knots)])
     return HingeSpring(low, high, best.knots, own, further.reshape(-1, 2), friction)
 

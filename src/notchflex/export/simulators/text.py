@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -52,7 +52,7 @@ def _text(value: object) -> str:
     return " ".join(f"{number:.9g}" for number in np.atleast_1d(np.asarray(value, float)))
 
 
-def comment(text: str) -> ElementTree.Element:
+def comment(text: str) -> Any:
     """Return a comment; XML allows no two hyphens in one."""
     return ElementTree.Comment(f"\n{text.replace('--', '- -')}\n")
 
