@@ -24,7 +24,6 @@ TIME_STEP = 5e-4  # s
 _YIELD = 3e-3
 # Largest natural frequency times the time step.
 _RESOLVED = 0.5
-_LEAST_FRICTION = 1e-9  # N mm
 
 
 class _Drum(NamedTuple):
@@ -43,7 +42,7 @@ class _Drum(NamedTuple):
 
 def _drum(spring: HingeSpring) -> _Drum | None:
     moment = potential_range(spring)
-    if moment < _LEAST_FRICTION:
+    if moment == 0.0:
         return None
     at = np.linspace(spring.low, spring.high, 201)
     steepest = float(np.abs(spring.friction_moment(at)).max() / moment)

@@ -26,6 +26,8 @@ _WORTH = 0.95  # of the error before; a knot that leaves more is not worth its s
 _GOOD = 5e-4
 # No sample weighs more than that of a flexure softer than the free one by this factor.
 _SOFTEST = 50.0
+# Friction below this part of the elastic moment is none.
+_ROUNDING = 1e-3
 _FRICTION_POWERS = np.array([2, 3, 4])  # a joint equality has powers up to 4
 _LEAST_TURN = 1e-4  # rad; a flexure that turns less is given its stiffness in the free robot
 
@@ -170,6 +172,9 @@ def _friction(angle: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 3"]:
 
 
 def potential_range(spring: HingeSpring) -> float:
-    """Largest value of the friction potential over the range of a hinge, N mm."""
+    """Largest value of the friction potential over the range of a hinge, N mm; 0 for rounding."""
     at = np.linspace(spring.low, spring.high, 201)
+    rounding = _ROUNDING * np.abs(spring.moment(at)).max()
+    if np.abs(spring.friction_moment(at)).max() <= rounding:
+        return 0.0
     return float(np.abs(at[:, None] ** _FRICTION_POWERS @ spring.friction).max())
