@@ -158,13 +158,10 @@ def test_a_notch_closes_at_its_stop(written):
 
 
 def test_without_friction_there_are_no_drums(wrist):
-    slick = wrist.replace(friction=nf.Frictionless())
-    model = joint_model(slick, 1.0)
+    model = joint_model(wrist.with_value("friction.coefficient", 1e-6), 1.0)
     text = mjcf(model)
     assert "springyield" not in text
-    error = measure_errors(model, text)[0]
-    assert error.total_angle < 0.01
-    assert np.isnan(error.loop_area)
+    assert measure_errors(model, text)[0].total_angle < 0.01
 
 
 def test_without_mujoco_a_sentence_says_that_nothing_was_measured(wrist, tmp_path, monkeypatch):

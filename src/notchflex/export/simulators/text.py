@@ -13,7 +13,7 @@ from notchflex.export.simulators.joint_model import JointModel
 METRE = 1e-3
 """mm to m, N mm to N m, g to kg."""
 
-_LEAST_MASS = 1e-3  # g, where nothing is known of the density
+_LEAST_MASS = 1e-5  # g, where nothing is known of the density
 
 
 class Inertia(NamedTuple):
