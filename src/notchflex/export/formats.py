@@ -14,7 +14,7 @@ from typing import Any
 from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.export.document import Document, Subject
-from notchflex.export.options import PatternOptions
+from notchflex.export.options import PatternOptions, SolidOptions
 
 Builder = Callable[[Subject, Any], Document]
 
@@ -66,6 +66,14 @@ FORMATS: dict[str, Format] = {
         (".svg",),
         "notchflex.export.flat.svg:svg_pattern",
         PatternOptions,
+    ),
+    "stl": Format(
+        "solid as triangles",
+        (".stl",),
+        "notchflex.export.solids.stl:stl_solid",
+        SolidOptions,
+        (("manifold3d", "export"), ("matplotlib", "plot")),
+        bends=True,
     ),
 }
 """Name of a format, which is also that of its option, to what writes it."""

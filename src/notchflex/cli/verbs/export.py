@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.export import PatternArguments
+from notchflex.cli.arguments.conversion import converted, number
+from notchflex.cli.arguments.export import SOLIDS, PatternArguments
 from notchflex.cli.arguments.loads import TendonCommand, load_columns, tendon_command
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
@@ -15,7 +17,7 @@ from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
 from notchflex.export.export import Exported, build, write
 from notchflex.export.formats import FORMATS, check_suffix
-from notchflex.export.options import PatternOptions
+from notchflex.export.options import PatternOptions, SolidOptions
 
 if TYPE_CHECKING:
     from notchflex.export.document import Subject
@@ -34,19 +36,32 @@ def export(
     *,
     dxf: Annotated[str | None, _file("dxf")] = None,
     svg: Annotated[str | None, _file("svg")] = None,
+    stl: Annotated[str | None, _file("stl")] = None,
+    channels: Annotated[
+        float,
+        converted(partial(number, form="a diameter in mm, 0 or more", least=0.0), "MM"),
+        Parameter(
+            group=SOLIDS,
+            help="Diameter of the channels of the tendons through the wall [mm]; 0 for none.",
+        ),
+    ] = 0.0,
     pattern: PatternArguments = PatternArguments(),  # noqa: B008 - frozen
     tension: Annotated[
         tuple[TendonCommand, ...],
         tendon_command("--tension"),
         Parameter(
+            group=SOLIDS,
             help="Bend a solid by this tension at the base of a tendon [N], written as for "
-            "`simulate`; its last step counts."
+            "`simulate`; its last step counts.",
         ),
     ] = (),
     stroke: Annotated[
         tuple[TendonCommand, ...],
         tendon_command("--stroke", negative=True),
-        Parameter(help="Bend a solid by this tendon length drawn out at the base [mm]."),
+        Parameter(
+            group=SOLIDS,
+            help="Bend a solid by this tendon length drawn out at the base [mm].",
+        ),
     ] = (),
     settings: Settings = (),
     json: JsonFile = None,
@@ -56,8 +71,11 @@ def export(
 
     All files are made before the first one is written. A file that is already there is replaced.
     """
-    outputs = Outputs(robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg)
-    options: dict[type, Any] = {PatternOptions: pattern.options()}
+    outputs = Outputs(robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg, stl=stl)
+    options: dict[type, Any] = {
+        PatternOptions: pattern.options(),
+        SolidOptions: SolidOptions(channels=channels, shank=pattern.shank, chord=pattern.chord),
+    }
     files = {name: file for name, file in outputs.targets.items() if name in FORMATS}
     if not files:
         raise InputError.MISSING_VALUE(
