@@ -21,18 +21,18 @@ def test_options_can_be_left_out(name):
 
 @pytest.mark.parametrize("file", ["wrist", "wrist.txt", "."])
 def test_a_suffix_that_no_format_has_is_refused(wrist, file):
-    with refused("FILE_FORMAT", ".pdf"):
+    with refused("FILE_FORMAT", ".dxf", ".stl"):
         nf.export_robot(wrist, file)
 
 
 def test_what_is_no_robot_is_refused(tmp_path):
     with refused("WRONG_TYPE", "dict"):
-        nf.export_robot({}, tmp_path / "a.pdf")
+        nf.export_robot({}, tmp_path / "a.dxf")
 
 
 def test_options_of_another_format_are_refused(wrist, tmp_path):
     with refused("WRONG_TYPE", "int"):
-        nf.export_robot(wrist, tmp_path / "a.pdf", 3)
+        nf.export_robot(wrist, tmp_path / "a.dxf", 3)
     assert not list(tmp_path.iterdir())
 
 

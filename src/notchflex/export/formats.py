@@ -15,7 +15,7 @@ from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.export.document import Document, Subject
 from notchflex.export.finite_elements.options import DeckOptions
-from notchflex.export.options import PatternOptions
+from notchflex.export.options import PatternOptions, SolidOptions
 from notchflex.export.simulators.options import SimulatorOptions
 
 Builder = Callable[[Subject, Any], Document]
@@ -68,6 +68,14 @@ FORMATS: dict[str, Format] = {
         (".svg",),
         "notchflex.export.flat.svg:svg_pattern",
         PatternOptions,
+    ),
+    "stl": Format(
+        "solid as triangles",
+        (".stl",),
+        "notchflex.export.solids.stl:stl_solid",
+        SolidOptions,
+        (("manifold3d", "export"), ("matplotlib", "plot")),
+        bends=True,
     ),
     "mjcf": Format(
         "MuJoCo model",

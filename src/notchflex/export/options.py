@@ -77,7 +77,7 @@ class PatternOptions:
             _check_number(name, getattr(self, name), 0.0, 10.0)
         _check_number("seam_deg", self.seam_deg, -360.0, 360.0, "deg")
         _check_number("shank", self.shank, 0.0, _LONGEST)
-        _check_number("chord", self.chord, 1e-6, 1.0)
+        _check_number("chord", self.chord, 1e-5, 1.0)
         _check_word("seam", self.seam, Seam)
         _check_word("y_unit", self.y_unit, AngleUnit)
         _check_word("dxf_version", self.dxf_version, DxfVersion)
@@ -91,3 +91,32 @@ class PatternOptions:
     def inside(self) -> float:
         """Distance of the path from the edges of the cuts, into the waste [mm]."""
         return 0.5 * self.kerf + self.polishing
+
+
+@dataclass(frozen=True)
+class SolidOptions:
+    """Options of solids (STL, STEP).
+
+    Args:
+        channels: Diameter of the channels of the tendons, drilled through the wall along the whole
+            tube [mm]; 0 for none.
+        shank: Uncut tube on the base side [mm].
+        chord: Largest distance of the flat sides of an STL from the round surface [mm].
+
+    Raises:
+        InputError: A value is not allowed.
+
+    Example:
+        >>> SolidOptions(shank=2.0).channels
+        0.0
+    """
+
+    channels: float = 0.0
+    shank: float = 10.0
+    chord: float = 0.001
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        _check_number("channels", self.channels, 0.0, _LONGEST)
+        _check_number("shank", self.shank, 0.0, _LONGEST)
+        _check_number("chord", self.chord, 1e-5, 1.0)

@@ -12,6 +12,7 @@ from notchflex.cli.arguments.conversion import converted, flag, number
 from notchflex.export.options import DxfVersion, PatternOptions, Seam
 
 PATTERN = Group("Flat pattern (--dxf, --svg, --pdf)", sort_key=1)
+SOLIDS = Group("Solids (--stl, --step)", sort_key=2)
 _LENGTH = partial(number, form="a length in mm, 0 or more", least=0.0)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.export import PatternArguments
+from notchflex.cli.arguments.conversion import converted, number
+from notchflex.cli.arguments.export import SOLIDS, PatternArguments
 from notchflex.cli.arguments.loads import TendonCommand, load_columns, tendon_command
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
@@ -16,7 +18,7 @@ from notchflex.errors import InputError
 from notchflex.export.export import Exported, build, write
 from notchflex.export.finite_elements.options import DeckOptions, Mesh
 from notchflex.export.formats import FORMATS, check_suffix
-from notchflex.export.options import PatternOptions
+from notchflex.export.options import PatternOptions, SolidOptions
 from notchflex.export.simulators.options import SimulatorOptions
 
 if TYPE_CHECKING:
@@ -36,6 +38,15 @@ def export(
     *,
     dxf: Annotated[str | None, _file("dxf")] = None,
     svg: Annotated[str | None, _file("svg")] = None,
+    stl: Annotated[str | None, _file("stl")] = None,
+    channels: Annotated[
+        float,
+        converted(partial(number, form="a diameter in mm, 0 or more", least=0.0), "MM"),
+        Parameter(
+            group=SOLIDS,
+            help="Diameter of the channels of the tendons through the wall [mm]; 0 for none.",
+        ),
+    ] = 0.0,
     mjcf: Annotated[str | None, _file("mjcf")] = None,
     urdf: Annotated[str | None, _file("urdf")] = None,
     transmission: Annotated[str | None, _file("transmission")] = None,
@@ -49,15 +60,19 @@ def export(
         tuple[TendonCommand, ...],
         tendon_command("--tension"),
         Parameter(
+            group=SOLIDS,
             help="Bend a solid by this tension at the base of a tendon [N], written as for "
             "`simulate`; its last step counts. It is the load of a deck, and the largest tension "
-            "that the joints of a simulator are fitted to."
+            "that the joints of a simulator are fitted to.",
         ),
     ] = (),
     stroke: Annotated[
         tuple[TendonCommand, ...],
         tendon_command("--stroke", negative=True),
-        Parameter(help="Bend a solid by this tendon length drawn out at the base [mm]."),
+        Parameter(
+            group=SOLIDS,
+            help="Bend a solid by this tendon length drawn out at the base [mm].",
+        ),
     ] = (),
     settings: Settings = (),
     json: JsonFile = None,
@@ -73,6 +88,7 @@ def export(
         json=json,
         dxf=dxf,
         svg=svg,
+        stl=stl,
         mjcf=mjcf,
         urdf=urdf,
         transmission=transmission,
@@ -80,6 +96,7 @@ def export(
     )
     options: dict[type, Any] = {
         PatternOptions: pattern.options(),
+        SolidOptions: SolidOptions(channels=channels, shank=pattern.shank, chord=pattern.chord),
         SimulatorOptions: SimulatorOptions(),
         DeckOptions: DeckOptions.of_mesh(mesh),
     }

@@ -55,12 +55,13 @@ def dxf_pattern(subject: Subject, options: PatternOptions) -> DxfPattern:
 
 def _text_of(drawing: PatternDrawing) -> str:
     import ezdxf
+    from ezdxf._options import options as ezdxf_options
     from ezdxf.enums import TextEntityAlignment
 
     options = drawing.pattern.options
     # The same robot gives the same file: without times and random names.
-    before = ezdxf.options.write_fixed_meta_data_for_testing
-    ezdxf.options.write_fixed_meta_data_for_testing = True
+    before = ezdxf_options.write_fixed_meta_data_for_testing
+    ezdxf_options.write_fixed_meta_data_for_testing = True
     try:
         units = 0 if options.dxf_version == "R12" else _MM  # R12 has no units
         made = ezdxf.new(options.dxf_version, units=units)  # pyright: ignore[reportPrivateImportUsage]
@@ -81,7 +82,7 @@ def _text_of(drawing: PatternDrawing) -> str:
         stream = io.StringIO()
         made.write(stream)
     finally:
-        ezdxf.options.write_fixed_meta_data_for_testing = before
+        ezdxf_options.write_fixed_meta_data_for_testing = before
     return stream.getvalue()
 
 

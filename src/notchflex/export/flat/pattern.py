@@ -25,6 +25,9 @@ from notchflex.robot.notches.cut import Point
 WEB_IN_KERFS = 3.0
 """A thinner web warns: the beam heats it from both sides."""
 
+WEB_CHORD = 0.001
+"""Largest distance of a curve from its chords where webs are measured [mm]."""
+
 _EPSILON = 1e-9  # mm; less than this beyond the seam is on it
 
 
@@ -117,8 +120,8 @@ def flat_pattern(subject: Subject, options: PatternOptions) -> FlatPattern:
         _check_two_axis(found.cuts)
     end = tube_end(robot, found)
     order = sorted(found.cuts, key=lambda one: (-one.end, -one.start, one.cut.side_deg))
-    edge = Path(0.0, options.corner_radius, options.chord)
-    beam = edge._replace(inside=options.inside)
+    edge = Path(0.0, options.corner_radius, max(options.chord, WEB_CHORD))
+    beam = Path(options.inside, options.corner_radius, options.chord)
     radius = robot.tube.outer_radius
     high = radius * math.radians(options.seam_deg)
     cuts: list[PatternCut] = []
