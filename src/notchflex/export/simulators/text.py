@@ -37,8 +37,10 @@ def inertia(model: JointModel, body: int) -> Inertia:
     tube, length = model.robot.tube, METRE * float(model.body_length[body])
     mass = METRE * max(float(model.body_mass[body]), _LEAST_MASS)
     radii = (METRE * tube.outer_radius) ** 2 + (METRE * tube.inner_radius) ** 2
-    across = mass * (3.0 * radii + length**2) / 12.0
-    return Inertia(mass, METRE * model.body_centre[body], across, 0.5 * mass * radii)
+    along = 0.5 * mass * radii
+    # A ring without length has half as much across as along, and simulators refuse less.
+    across = max(mass * (3.0 * radii + length**2) / 12.0, 0.51 * along)
+    return Inertia(mass, METRE * model.body_centre[body], across, along)
 
 
 def add(parent: ElementTree.Element, tag: str, /, **keys: object) -> ElementTree.Element:
