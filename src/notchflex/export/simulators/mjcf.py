@@ -16,7 +16,15 @@ import numpy as np
 
 from notchflex.export.simulators.joint_model import JointModel
 from notchflex.export.simulators.springs import HingeSpring, potential_range
-from notchflex.export.simulators.text import METRE, add, comment, finished, inertia, quaternion
+from notchflex.export.simulators.text import (
+    METRE,
+    add,
+    comment,
+    finished,
+    inertia,
+    printable,
+    quaternion,
+)
 
 TIME_STEP = 5e-4  # s
 # Turn of a drum before it yields, of about 1 rad over the whole range: smaller is closer to dry
@@ -57,7 +65,7 @@ def mjcf(model: JointModel, head: str = "", numbers: Mapping[str, float] | None 
         head: What stands at the head of the file.
         numbers: Named numbers that the file carries as `<custom><numeric>`.
     """
-    root = ElementTree.Element("mujoco", model=model.robot.name)
+    root = ElementTree.Element("mujoco", model=printable(model.robot.name))
     root.append(comment(head))
     add(root, "compiler", angle="radian", autolimits="true")
     add(
