@@ -7,11 +7,11 @@ import pytest
 import trimesh
 
 import notchflex as nf
+from notchflex.export.cuts import cuts_of
 from notchflex.export.document import Subject
 from notchflex.export.options import SolidOptions
 from notchflex.export.solids.bent import Motion
 from notchflex.export.solids.stl import stl_solid
-from notchflex.robot.cuts import cuts_of
 from refusals import refused
 
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex.export.cuts import RobotCuts
 from notchflex.plotting.shapes.robot_shape import RobotShape, shape_at, shape_from_angles
-from notchflex.robot.cuts import RobotCuts
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

@@ -10,10 +10,10 @@ import numpy as np
 
 from notchflex import __version__
 from notchflex.errors import InputError
+from notchflex.export.cuts import cuts_of
 from notchflex.export.document import Subject
 from notchflex.export.options import SolidOptions
 from notchflex.export.tube_ends import tube_end
-from notchflex.robot.cuts import cuts_of
 from notchflex.robot.digest import robot_digest
 
 if TYPE_CHECKING:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from notchflex.errors import InputError
+from notchflex.export.cuts import RobotCuts
 from notchflex.export.options import SolidOptions
 from notchflex.export.tube_ends import TubeEnd
 from notchflex.plotting.shapes.prisms import fair_growth, prism, tube_wall
 from notchflex.robot import Robot
-from notchflex.robot.cuts import RobotCuts
 from notchflex.robot.notches.cut import NotchCut
 from notchflex.robot.notches.profile import outline
 
