@@ -75,6 +75,14 @@ FORMATS: dict[str, Format] = {
         (("manifold3d", "export"), ("matplotlib", "plot")),
         bends=True,
     ),
+    "step": Format(
+        "solid for CAD",
+        (".step", ".stp"),
+        "notchflex.export.solids.step:step_solid",
+        SolidOptions,
+        (("build123d", "cad"), ("matplotlib", "plot")),
+        bends=True,
+    ),
 }
 """Name of a format, which is also that of its option, to what writes it."""
 

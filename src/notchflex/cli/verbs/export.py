@@ -37,6 +37,7 @@ def export(
     dxf: Annotated[str | None, _file("dxf")] = None,
     svg: Annotated[str | None, _file("svg")] = None,
     stl: Annotated[str | None, _file("stl")] = None,
+    step: Annotated[str | None, _file("step")] = None,
     channels: Annotated[
         float,
         converted(partial(number, form="a diameter in mm, 0 or more", least=0.0), "MM"),
@@ -71,7 +72,9 @@ def export(
 
     All files are made before the first one is written. A file that is already there is replaced.
     """
-    outputs = Outputs(robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg, stl=stl)
+    outputs = Outputs(
+        robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg, stl=stl, step=step
+    )
     options: dict[type, Any] = {
         PatternOptions: pattern.options(),
         SolidOptions: SolidOptions(channels=channels, shank=pattern.shank, chord=pattern.chord),

@@ -164,8 +164,8 @@ def _web_warnings(web: Web, options: PatternOptions) -> list[str]:
         return []
     return [
         f"the web between the {web.between[0]} and the {web.between[1]} is {web.width:.4g} mm, "
-        f"thinner than {WEB_IN_KERFS:g} kerfs ({WEB_IN_KERFS * kerf:.4g} mm); it may burn through or bend "
-        "while it is cut."
+        f"thinner than {WEB_IN_KERFS:g} kerfs ({WEB_IN_KERFS * kerf:.4g} mm); it may burn through "
+        "or bend while it is cut."
     ]
 
 
