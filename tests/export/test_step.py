@@ -64,7 +64,7 @@ def test_a_channel_takes_its_volume(tmp_path):
     )
     plain, drilled = (written(robot, tmp_path, channels=width).volume for width in (0.0, 0.6))
     uncut = cuts_of(robot).tip + 10.0 - 2 * 0.55
-    assert plain - drilled == pytest.approx(uncut * math.pi * 0.3**2, rel=1e-9)
+    assert plain - drilled == pytest.approx(uncut * math.pi * 0.3**2, rel=1e-6)
 
 
 def test_the_tip_of_the_free_robot_is_that_of_the_chain(tmp_path):

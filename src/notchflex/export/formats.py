@@ -67,6 +67,13 @@ FORMATS: dict[str, Format] = {
         "notchflex.export.flat.svg:svg_pattern",
         PatternOptions,
     ),
+    "pdf": Format(
+        "sheet with the pattern, a table of the cuts and a dimensioned drawing",
+        (".pdf",),
+        "notchflex.export.flat.sheet:pattern_sheet",
+        PatternOptions,
+        (("matplotlib", "plot"),),
+    ),
     "stl": Format(
         "solid as triangles",
         (".stl",),

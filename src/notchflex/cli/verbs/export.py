@@ -36,6 +36,7 @@ def export(
     *,
     dxf: Annotated[str | None, _file("dxf")] = None,
     svg: Annotated[str | None, _file("svg")] = None,
+    pdf: Annotated[str | None, _file("pdf")] = None,
     stl: Annotated[str | None, _file("stl")] = None,
     step: Annotated[str | None, _file("step")] = None,
     channels: Annotated[
@@ -73,7 +74,7 @@ def export(
     All files are made before the first one is written. A file that is already there is replaced.
     """
     outputs = Outputs(
-        robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg, stl=stl, step=step
+        robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg, pdf=pdf, stl=stl, step=step
     )
     options: dict[type, Any] = {
         PatternOptions: pattern.options(),
