@@ -41,6 +41,7 @@ def test_a_file_that_is_there_is_replaced(call, tmp_path):
     assert (tmp_path / "a.dxf").read_text() != "old"
 
 
+@pytest.mark.nightly
 def test_a_solid_under_load_is_bent(call, tmp_path):
     code, *_ = call(
         "export", "pacheco2021-a", "--stl", "a.stl", "--dxf", "a.dxf", "--tension", "0:1:2",
