@@ -135,7 +135,11 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "DeckOptions",
             "Exported",
+            "PatternOptions",
+            "SimulatorOptions",
+            "SolidOptions",
             "export_robot",
         ),
         "notchflex.export",
