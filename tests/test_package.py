@@ -33,7 +33,8 @@ NAMES = [
     "Measurements", "read_measurements", "write_measurements",
     "Calibration", "Constant", "LeastSquares", "SumOfDistances", "SumOfRobotErrors", "leave_out",
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
-    "DeckOptions", "Exported", "SimulatorOptions", "export_robot",
+    "DeckOptions", "Exported", "PatternOptions", "SimulatorOptions",
+    "SolidOptions", "export_robot",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
 ]
 # fmt: on

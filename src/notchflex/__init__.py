@@ -137,7 +137,9 @@ _HOME = {
         (
             "DeckOptions",
             "Exported",
+            "PatternOptions",
             "SimulatorOptions",
+            "SolidOptions",
             "export_robot",
         ),
         "notchflex.export",

@@ -41,6 +41,7 @@ def test_a_file_that_is_there_is_replaced(call, tmp_path):
     assert (tmp_path / "a.dxf").read_text() != "old"
 
 
+@pytest.mark.nightly
 def test_a_solid_under_load_is_bent(call, tmp_path):
     code, *_ = call(
         "export", "pacheco2021-a", "--stl", "a.stl", "--dxf", "a.dxf", "--tension", "0:1:2",
@@ -102,14 +103,23 @@ def test_the_robot_file_is_not_replaced(call, tmp_path):
     assert err.startswith("Error: ")
 
 
-def test_a_missing_package_is_named(refused, monkeypatch):
+@pytest.mark.parametrize(
+    ("option", "package", "extra"),
+    [
+        ("--dxf", "ezdxf", "export"),
+        ("--stl", "manifold3d", "export"),
+        ("--step", "build123d", "cad"),
+    ],
+)
+def test_a_missing_package_is_named(refused, monkeypatch, option, package, extra):
     import importlib.util
 
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util,
         "find_spec",
-        lambda name, *rest: None if name == "ezdxf" else find(name, *rest),
+        lambda name, *rest: None if name == package else find(name, *rest),
     )
-    message = refused("MISSING_PACKAGE", "export", "pacheco2021-a", "--dxf", "a.dxf")
-    assert "notchflex[export]" in message
+    file = f"a.{option.removeprefix('--')}"
+    message = refused("MISSING_PACKAGE", "export", "pacheco2021-a", option, file)
+    assert f"notchflex[{extra}]" in message

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.export.cuts import cuts_of
 from notchflex.export.document import Subject
 from notchflex.export.flat.pattern import flat_pattern
 from notchflex.export.options import PatternOptions
-from notchflex.robot.cuts import cuts_of
 from refusals import refused
 
 READY = list(nf.list_robots())

@@ -69,12 +69,27 @@ FORMATS: dict[str, Format] = {
         "notchflex.export.flat.svg:svg_pattern",
         PatternOptions,
     ),
+    "pdf": Format(
+        "sheet with the pattern, a table of the cuts and a dimensioned drawing",
+        (".pdf",),
+        "notchflex.export.flat.sheet:pattern_sheet",
+        PatternOptions,
+        (("matplotlib", "plot"),),
+    ),
     "stl": Format(
         "solid as triangles",
         (".stl",),
         "notchflex.export.solids.stl:stl_solid",
         SolidOptions,
         (("manifold3d", "export"), ("matplotlib", "plot")),
+        bends=True,
+    ),
+    "step": Format(
+        "solid for CAD",
+        (".step", ".stp"),
+        "notchflex.export.solids.step:step_solid",
+        SolidOptions,
+        (("build123d", "cad"), ("matplotlib", "plot")),
         bends=True,
     ),
     "mjcf": Format(

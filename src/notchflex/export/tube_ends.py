@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from notchflex.export.cuts import RobotCuts
 from notchflex.robot import Robot
-from notchflex.robot.cuts import RobotCuts
 
 
 class TubeEnd(NamedTuple):

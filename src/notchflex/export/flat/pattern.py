@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from notchflex.errors import InputError
+from notchflex.export.cuts import PlacedCut, cuts_of
 from notchflex.export.document import Subject
 from notchflex.export.flat.unroll import Path, unrolled
 from notchflex.export.flat.webs import Web, smallest_web
 from notchflex.export.options import PatternOptions
 from notchflex.export.tube_ends import tube_end
 from notchflex.robot import Robot
-from notchflex.robot.cuts import PlacedCut, cuts_of
 from notchflex.robot.digest import robot_digest
 from notchflex.robot.notches.cut import Point
 
@@ -124,25 +124,23 @@ def flat_pattern(subject: Subject, options: PatternOptions) -> FlatPattern:
     beam = Path(options.inside, options.corner_radius, options.chord)
     radius = robot.tube.outer_radius
     high = radius * math.radians(options.seam_deg)
+    low = high - math.tau * radius
     cuts: list[PatternCut] = []
     for number, one in enumerate(order, start=1):
         name = f"the cut of notch {one.notch}"
-        middle = high - (high - radius * math.radians(one.cut.side_deg)) % (math.tau * radius)
-
-        def moved(
-            path: Path, one: PlacedCut = one, name: str = name, by: float = middle
-        ) -> list[Point]:
-            return [(x, y + by) for x, y in unrolled(one.cut, radius, path, name)]
-
-        outlines = [moved(beam)]
-        if options.seam == "split":
-            outlines = _split(outlines[0], high - math.tau * radius, high)
-        cuts.append(PatternCut(number, one, moved(edge), outlines))
-    web = smallest_web(cuts, math.tau * radius, -options.shank, end.at)
+        middle = high - (high - radius * math.radians(one.cut.side_deg)) % (high - low)
+        nominal, path = (
+            [(x, y + middle) for x, y in unrolled(one.cut, radius, way, name)]
+            for way in (edge, beam)
+        )
+        outlines = _split(path, low, high) if options.seam == "split" else [path]
+        cuts.append(PatternCut(number, one, nominal, outlines))
+    edges = {f"cut {one.number} of notch {one.placed.notch}": one.nominal for one in cuts}
+    web = smallest_web(edges, math.tau * radius, -options.shank, end.at)
     if web.width <= _EPSILON:
         raise InputError.UNSUPPORTED(
-            f"{web.between[0]} and {web.between[1]} meet: no material is left between them; give "
-            "the notches a larger uncut_length or a smaller depth"
+            f"the {web.between[0]} and the {web.between[1]} meet: no material is left "
+            "between them; give the notches a larger uncut_length or a smaller depth"
             f"{', or a larger shank' if 'cut-off' in ' '.join(web.between) else ''}."
         )
     warnings = [end.warning] if end.warning else []
@@ -165,9 +163,9 @@ def _web_warnings(web: Web, options: PatternOptions) -> list[str]:
     if kerf == 0.0 or web.width >= WEB_IN_KERFS * kerf:
         return []
     return [
-        f"the web between {web.between[0]} and {web.between[1]} is {web.width:.4g} mm, thinner "
-        f"than {WEB_IN_KERFS:g} kerfs ({WEB_IN_KERFS * kerf:.4g} mm); it may burn through or bend "
-        "while it is cut."
+        f"the web between the {web.between[0]} and the {web.between[1]} is {web.width:.4g} mm, "
+        f"thinner than {WEB_IN_KERFS:g} kerfs ({WEB_IN_KERFS * kerf:.4g} mm); it may burn through "
+        "or bend while it is cut."
     ]
 
 

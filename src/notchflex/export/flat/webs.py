@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from notchflex.export.flat.pattern import PatternCut
+from notchflex.robot.notches.cut import Point
 
 Points = NDArray[np.float64]
 
@@ -27,20 +26,22 @@ class Web(NamedTuple):
     between: tuple[str, str]
 
 
-def smallest_web(cuts: Sequence[PatternCut], around: float, start: float, end: float) -> Web:
+def smallest_web(
+    outlines: Mapping[str, Sequence[Point]], around: float, start: float, end: float
+) -> Web:
     """Find the thinnest web of a pattern.
 
     Args:
-        cuts: The cuts.
+        outlines: Closed edges of the cuts by their names.
         around: Circumference [mm].
         start: Where the tube is cut off [mm].
         end: Where it ends at the tip [mm].
     """
-    edges = [np.array(one.nominal) for one in cuts]
-    names = [f"the cut {one.number} of notch {one.placed.notch}" for one in cuts]
+    edges = [np.array(one) for one in outlines.values()]
+    names = list(outlines)
     best = Web(math.inf, ("", ""))
     for name, edge in zip(names, edges, strict=True):
-        ends = ((edge[:, 0].min() - start, "the cut-off"), (end - edge[:, 0].max(), "the tip"))
+        ends = ((edge[:, 0].min() - start, "cut-off"), (end - edge[:, 0].max(), "tip"))
         for width, other in ends:
             best = min(best, Web(float(width), (name, other)), key=lambda web: web.width)
     shift = np.array([0.0, around])

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from notchflex.export.cuts import RobotCuts
+from notchflex.plotting.shapes.interpolation import rotation_of
 from notchflex.plotting.shapes.robot_shape import RobotShape, shape_at, shape_from_angles
-from notchflex.robot.cuts import RobotCuts
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -51,6 +53,21 @@ class Zone:
     places: Points
     turns: Points
     moves: Points
+
+    @property
+    def along_tube(self) -> bool:
+        """Whether it is a spine along the tube, not a strip across it."""
+        return bool(self.direction[2] > 0.5)
+
+    def pose_at(self, height: float) -> tuple[Points, Points]:
+        """Return rotation and displacement at a height of a spine, between two sections [mm]."""
+        before = int(np.clip(np.searchsorted(self.places, height) - 1, 0, len(self.places) - 2))
+        step = self.places[before + 1] - self.places[before]
+        part = float(np.clip((height - self.places[before]) / step, 0.0, 1.0))
+        first, second = self.turns[before], self.turns[before + 1]
+        turn = first @ rotation_of(part * Rotation.from_matrix(first.T @ second).as_rotvec())
+        middle = np.array([[0.0, 0.0, height]])
+        return turn, self.moved(middle)[0] - turn @ middle[0]
 
     def moved(self, points: Points) -> Points:
         """Return points of the zone where they are in the state [mm], (v, 3)."""
@@ -94,6 +111,11 @@ class Motion:
         ]
         turns = self.shape.rotation @ np.swapaxes(rest.rotation, 1, 2)
         self._bodies = turns, self.shape.position - _turned(turns, rest.position)
+
+    def of_body(self, number: int) -> tuple[Points, Points]:
+        """Return rotation and displacement of a body (0 is the base)."""
+        turns, moves = self._bodies
+        return turns[number], moves[number]
 
     def __call__(self, points: Points) -> Points:
         """Return points of the straight tube where they are in the state [mm], (v, 3)."""

@@ -9,15 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex import __version__
-from notchflex.errors import InputError
+from notchflex.export.cuts import cuts_of
 from notchflex.export.document import Subject
 from notchflex.export.options import SolidOptions
+from notchflex.export.solids.checks import check_one_piece
 from notchflex.export.tube_ends import tube_end
-from notchflex.robot.cuts import cuts_of
 from notchflex.robot.digest import robot_digest
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
+
+STRETCHED = (
+    "the model's strips overlap with the walls that they turn into; in the bent solid the material "
+    "between them is stretched, by about 1 % of the volume."
+)
 
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
 
@@ -70,11 +75,11 @@ def stl_solid(subject: Subject, options: SolidOptions) -> StlSolid:
     cuts = cuts_of(robot)
     end = tube_end(robot, cuts)
     solid = straight_solid(robot, cuts, end, options)
-    if len(solid.decompose()) != 1:
-        raise InputError.UNSUPPORTED(
-            "the cuts and channels divide the tube into pieces that do not hold together; give "
-            "the notches a larger uncut_length or a smaller depth, or a larger shank."
-        )
+    check_one_piece(len(solid.decompose()))
+    warnings = [end.warning] if end.warning else []
     if is_bent(subject):
-        solid = bent_solid(solid, Motion(subject, cuts))
-    return StlSolid(robot_digest(robot), solid, (end.warning,) if end.warning else ())
+        motion = Motion(subject, cuts)
+        solid = bent_solid(solid, motion)
+        if not all(zone.along_tube for zone in motion.zones):
+            warnings.append(STRETCHED)
+    return StlSolid(robot_digest(robot), solid, tuple(warnings))

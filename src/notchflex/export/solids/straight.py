@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from notchflex.errors import InputError
+from notchflex.export.cuts import RobotCuts
 from notchflex.export.options import SolidOptions
+from notchflex.export.solids.checks import check_channels, check_window
 from notchflex.export.tube_ends import TubeEnd
 from notchflex.plotting.shapes.prisms import fair_growth, prism, tube_wall
 from notchflex.robot import Robot
-from notchflex.robot.cuts import RobotCuts
 from notchflex.robot.notches.cut import NotchCut
 from notchflex.robot.notches.profile import outline
 
@@ -71,12 +71,7 @@ def _sector(cut: NotchCut, outer: float, sides: int) -> Manifold:
     """Return the sector of a window with radial walls."""
     from manifold3d import CrossSection, FillRule, Manifold
 
-    (start, _), (low, bottom), (high, also), (end, _) = cut.corners
-    if (start, end, bottom) != (low, high, also):
-        raise InputError.UNSUPPORTED(
-            "a radial cut that is no window with straight ends has no solid; export a flat pattern."
-        )
-    half = math.acos(bottom / outer)
+    start, end, half = check_window(cut, outer)
     middle = math.radians(cut.side_deg)
     # Its corners fall between those of the tube, far outside, so that it cuts at its two walls.
     angles = np.linspace(middle - half, middle + half, max(3, sides // 4))
@@ -102,26 +97,3 @@ def _channels(robot: Robot, end: TubeEnd, options: SolidOptions) -> list[Manifol
         drill = Manifold.cylinder(length, fair_growth(sides) * radius, circular_segments=sides)
         found.append(drill.translate((x, y, -options.shank)))
     return found
-
-
-def check_channels(robot: Robot, diameter: float) -> None:
-    """Raise if a channel would break through the outer surface, or would cut nothing.
-
-    Raises:
-        InputError: It does not fit.
-    """
-    tube = robot.tube
-    for number, tendon in enumerate(robot.tendon, start=1):
-        far = tendon.radius + 0.5 * diameter
-        if far >= tube.outer_radius:
-            raise InputError.OUT_OF_RANGE(
-                f"channels: {diameter:g} mm wide, the channel of tendon {number} reaches "
-                f"{far:.6g} mm from the axis and the wall ends at {tube.outer_radius:.6g} mm; give "
-                f"less than {2.0 * (tube.outer_radius - tendon.radius):.6g} mm."
-            )
-        if far <= tube.inner_radius:
-            raise InputError.OUT_OF_RANGE(
-                f"channels: {diameter:g} mm wide, the channel of tendon {number} lies within the "
-                f"bore, {tube.inner_radius:.6g} mm from the axis, and cuts nothing; leave channels "
-                "out."
-            )

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from notchflex.errors import InputError
+from notchflex.robot import Robot
 from notchflex.robot.notches.cut import NotchCut
-from notchflex.robot.robot import Robot
 
 
 class PlacedCut(NamedTuple):
