@@ -111,7 +111,7 @@ def test_the_file_states_the_error_that_is_measured(written, wrist, loop):
 def test_other_robots_up_and_down(name, top, tmp_path, margin):
     robot = nf.load_robot(name)
     nf.export_robot(robot, tmp_path / "a.xml", SimulatorOptions(top))
-    check_targets(pulled(tmp_path / "a.xml", robot, up_and_down(top, 14)), margin)
+    check_targets(pulled(tmp_path / "a.xml", robot, up_and_down(top, 10)), margin)
 
 
 def test_inner_loops_follow_the_chain(written, wrist):
