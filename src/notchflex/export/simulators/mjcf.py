@@ -124,7 +124,7 @@ def _bodies(root: ElementTree.Element, model: JointModel, drums: list[_Drum | No
         stiffness = METRE * spring.largest_stiffness
         resolved = (TIME_STEP / _RESOLVED) ** 2
         armature = stiffness * resolved
-        inertia = armature + yields * resolved * steepest**2
+        with_drum = armature + yields * resolved * steepest**2
         limit = {"range": [-np.pi, model.limit[j]]} if np.isfinite(model.limit[j]) else {}
         own = hinges.free_rotation[j].T
         add(
@@ -136,7 +136,7 @@ def _bodies(root: ElementTree.Element, model: JointModel, drums: list[_Drum | No
             axis=own @ hinges.axis[j],
             stiffness=METRE * spring.stiffness,
             armature=armature,
-            damping=2.0 * np.sqrt(stiffness * inertia),
+            damping=2.0 * np.sqrt(stiffness * with_drum),
             **limit,
             **(
                 {"solreflimit": [4 * TIME_STEP, 1], "solimplimit": [0.9995, 0.9995, 1e-4]}
