@@ -133,6 +133,14 @@ _HOME = {
         ),
         "notchflex.comparison",
     ),
+    **dict.fromkeys(
+        (
+            "SensedForce",
+            "SensorNoise",
+            "sense",
+        ),
+        "notchflex.sensing",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

@@ -29,6 +29,7 @@ ROOT_VERBS = (
     "compare",
     "calibrate",
     "friction-rig",
+    "sense",
     "bench",
     "doctor",
     "completion",

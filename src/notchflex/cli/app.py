@@ -94,6 +94,12 @@ VERBS = {
         "    echo 200,126.8,88,86 >> readings.csv\n"
         "    notchflex friction-rig readings.csv --plot friction.png",
     ),
+    "sense": (
+        "Find the force on a robot from tensions and strokes of its tendons.",
+        "notchflex simulate pacheco2021-a --tension 0.1:0.8:8 --tip-force 0.02,0,0 --csv read.csv\n"
+        "    notchflex sense pacheco2021-a read.csv --plot force.png\n"
+        "    notchflex sense pacheco2021-a read.csv --components xz --with tip --tip-noise 0.05",
+    ),
     "bench": (
         "Time the solver on this machine.",
         "notchflex bench --json bench.json\n    notchflex bench --only wrist",

@@ -10,6 +10,7 @@ from notchflex.plotting.fits.friction import friction_picture
 from notchflex.plotting.output import Picture
 from notchflex.plotting.path import path_figure, path_picture, state_picture
 from notchflex.plotting.picture import picture
+from notchflex.plotting.sensing.sensed import sensed_picture
 from notchflex.plotting.style import save
 
 __all__ = [
@@ -26,5 +27,6 @@ __all__ = [
     "picture",
     "save",
     "save_animation",
+    "sensed_picture",
     "state_picture",
 ]
