@@ -15,9 +15,12 @@ from notchflex.solver.programs.run import SolverRun
 # Lengths that are tried of a step.
 _FULL = np.array([1.0, 0.5, 0.2, 0.05, 0.01])
 _REACH = np.array([2.0, 1.4, 1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001])
-_MOST_STEPS, _MOST_REACHES = 20, 16
+_BETWEEN = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
+_MOST_STEPS, _MOST_REACHES, _MOST_HALVINGS = 20, 16, 6
 # The search ends where the misfit falls, or an extreme moves, by less than these parts.
 _SMALL_GAIN, _SMALL_MOVE = 1e-9, 1e-3
+# Ends of an interval are found to this part of the range.
+_NARROW = 1e-7
 # A force far outside the range, by which nothing is measured, weighs this little against readings.
 _WEAK = 1e-3
 
@@ -169,24 +172,41 @@ def extreme(
         The end of the connected part around `at`.
     """
     largest, origin = problem.model.largest, at.force
-    beyond = at.force
+    beyond = None
     for _ in range(_MOST_REACHES):
         move = _step_along(problem, at, direction, most)
-        tried = problem.clipped(at.force + np.outer(_REACH, move))
-        candidates = problem.candidates(tried)
-        fitting = [one for one in candidates if one.misfit <= most]
-        ahead = max(fitting, key=lambda one: float(direction @ one.force), default=at)
+        ahead, beyond = _farthest(problem, at, at.force + np.outer(_REACH, move), direction, most)
         gain = direction @ (ahead.force - at.force)
-        past = [one for one in candidates if direction @ one.force > direction @ ahead.force]
-        beyond = min((one.force for one in past), key=lambda one: direction @ one, default=None)
-        if gain <= 0.0:
-            break
         at = ahead
-        width = direction @ (at.force - origin)
-        if gain < _SMALL_MOVE * width or direction @ at.force >= largest * (1.0 - 1e-12):
+        if gain <= _SMALL_MOVE * (direction @ (at.force - origin)):
             break
+        if direction @ at.force >= largest * (1.0 - 1e-12):
+            break
+    for _ in range(_MOST_HALVINGS):
+        if beyond is None:
+            break
+        gap = direction @ (beyond - at.force)
+        if gap <= max(_SMALL_MOVE * (direction @ (at.force - origin)), _NARROW * largest):
+            break
+        between = at.force + np.outer(_BETWEEN, beyond - at.force)
+        at, beyond = _farthest(problem, at, between, direction, most)
     limited = bool(direction @ at.force >= largest * (1.0 - 1e-9))
     return Extreme(at, at.force if limited or beyond is None else beyond, limited)
+
+
+def _farthest(
+    problem: ReadingProblem,
+    at: Candidate,
+    forces: Float[np.ndarray, "k d"],
+    direction: Float[np.ndarray, " d"],
+    most: float,
+) -> tuple[Candidate, Float[np.ndarray, " d"] | None]:
+    """Return the farthest of some forces that fits, and the next beyond it, which does not."""
+    candidates = problem.candidates(problem.clipped(forces))
+    fitting = [one for one in candidates if one.misfit <= most]
+    ahead = max([at, *fitting], key=lambda one: float(direction @ one.force))
+    past = [one.force for one in candidates if direction @ one.force > direction @ ahead.force]
+    return ahead, min(past, key=lambda one: float(direction @ one), default=None)
 
 
 def _step_along(

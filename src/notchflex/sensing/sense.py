@@ -15,7 +15,7 @@ from notchflex.robot import Robot
 from notchflex.sensing.bounds import Bounds, bounds
 from notchflex.sensing.history import History, estimate, with_noise
 from notchflex.sensing.model import SensingModel
-from notchflex.sensing.observability import unobservable
+from notchflex.sensing.observability import LeftOpen
 from notchflex.sensing.readings import Readings, SensorNoise, readings_of
 from notchflex.sensing.search import Candidate
 from notchflex.sensing.sensed import SensedForce
@@ -146,10 +146,8 @@ def _result(
 ) -> SensedForce:
     count, size = len(model.readings), model.size
     found = history.best
-    hidden = [unobservable(one, model.largest) for one in history.information]
-    covariance = [
-        gain @ gain.T + model.largest**2 * rows.T @ rows
-        for gain, rows in zip(history.gain, hidden, strict=True)
+    left_open = [
+        LeftOpen.of(model, history, ends, number, LEVEL) for number in range(len(found))
     ]
     rest = count - len(found)
     return SensedForce(
@@ -157,14 +155,15 @@ def _result(
         components=model.unknown.names,
         directions=model.unknown.directions,
         force=_filled([one.force for one in found], (count, size)),
-        covariance=_filled(covariance, (count, size, size)),
+        covariance=_filled([one.covariance for one in left_open], (count, size, size)),
         low=_filled(ends.low, (count, size)),
         high=_filled(ends.high, (count, size)),
         limited=np.concatenate([ends.limited, np.zeros((rest, size), bool)]),
+        stuck=np.array([one.stuck for one in left_open] + [np.zeros(size, bool)] * rest),
         misfit=_filled([one.misfit for one in found], (count,)),
         read=np.array([len(model.step(number).entries) for number in range(count)]),
         no_force=_filled(ends.no_force, (count,)),
-        hidden=(*hidden, *[np.zeros((0, size))] * rest),
+        hidden=(*(one.hidden for one in left_open), *[np.zeros((0, size))] * rest),
         place=model.unknown.body,
         places=places,
         level=LEVEL,

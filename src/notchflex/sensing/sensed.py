@@ -15,9 +15,6 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.sensing.observability import direction_in_words
 
-# An interval this much wider than that of the noise alone is one that stuck friction leaves.
-_STUCK = 1.5
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SensedForce(Displayed):
@@ -30,12 +27,13 @@ class SensedForce(Displayed):
         components: Names of the components, such as ("x", "z"), axes of the world.
         directions: Their unit vectors in the world, (d, 3).
         force: The force that fits best, (s, d).
-        covariance: Its covariance by the noise of all readings up to it, to first order, N², with
-            the square of the range of the search along directions that are not observable,
-            (s, d, d).
+        covariance: Its covariance by the noise of all readings up to it, to first order, N²,
+            (s, d, d). Along a direction that changes no reading it is that of the interval.
         low: Smallest component that fits the readings: noise and stuck friction together, (s, d).
         high: Largest component that fits, (s, d).
         limited: Whether the range of the search ends the interval, not the readings, (s, d).
+        stuck: Whether friction widens the interval, (s, d): within it the tendons stick, and forces
+            give the same readings.
         misfit: Sum of squares of the deviations of each reading in units of its noise, (s,).
         read: How many numbers each reading has that depend on the force, (s,).
         no_force: How much larger the misfit is, at least, where no force acts, (s,).
@@ -57,6 +55,7 @@ class SensedForce(Displayed):
     low: Float[np.ndarray, "s d"]
     high: Float[np.ndarray, "s d"]
     limited: Bool[np.ndarray, "s d"]
+    stuck: Bool[np.ndarray, "s d"]
     misfit: Float[np.ndarray, " s"]
     read: Float[np.ndarray, " s"]
     no_force: Float[np.ndarray, " s"]
@@ -86,12 +85,6 @@ class SensedForce(Displayed):
     def deviation(self) -> Float[np.ndarray, "s d"]:
         """Standard deviation of each component by the noise of the sensors, N, (s, d)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
-
-    @property
-    def stuck(self) -> Bool[np.ndarray, "s d"]:
-        """Where the interval is clearly wider than noise makes it: friction holds the tendon."""
-        by_noise = 2.0 * np.sqrt(chi2.ppf(self.level, 1)) * self.deviation
-        return self.high - self.low > _STUCK * by_noise
 
     @cached_property
     def contact_probability(self) -> Float[np.ndarray, " s"]:
@@ -125,7 +118,8 @@ class SensedForce(Displayed):
         ]
         for which, name in enumerate(self.components):
             low, high = self.low[last, which], self.high[last, which]
-            if self.limited[last, which] and not len(self.hidden[last]):
+            unseen = (np.abs(self.hidden[last][:, which]) > 0.05).any()
+            if self.limited[last, which] and not unseen:
                 sentences.append(
                     f"the force along {name} may lie beyond the range of the search "
                     f"({self.largest:.3g} N)"
