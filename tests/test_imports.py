@@ -26,7 +26,7 @@ ORDER = (
     "design",
     "control",
     "sensing",
-    "workspace",
+    "workspaces",
     "learning",
     "sweep",
     "photographs",

@@ -141,6 +141,13 @@ _HOME = {
         ),
         "notchflex.sensing",
     ),
+    **dict.fromkeys(
+        (
+            "Workspace",
+            "workspace",
+        ),
+        "notchflex.workspaces",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

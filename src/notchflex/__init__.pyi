@@ -86,5 +86,7 @@ from notchflex.sensing import SensedForce as SensedForce
 from notchflex.sensing import SensorNoise as SensorNoise
 from notchflex.sensing import sense as sense
 from notchflex.solver.newton import Settings as Settings
+from notchflex.workspaces import Workspace as Workspace
+from notchflex.workspaces import workspace as workspace
 
 __version__: str

@@ -30,6 +30,7 @@ ROOT_VERBS = (
     "calibrate",
     "friction-rig",
     "sense",
+    "workspace",
     "bench",
     "doctor",
     "completion",

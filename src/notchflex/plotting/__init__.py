@@ -12,6 +12,7 @@ from notchflex.plotting.path import path_figure, path_picture, state_picture
 from notchflex.plotting.picture import picture
 from notchflex.plotting.sensing.sensed import sensed_picture
 from notchflex.plotting.style import save
+from notchflex.plotting.workspace.cloud import workspace_picture, workspaces_picture
 
 __all__ = [
     "Picture",
@@ -29,4 +30,6 @@ __all__ = [
     "save_animation",
     "sensed_picture",
     "state_picture",
+    "workspace_picture",
+    "workspaces_picture",
 ]

@@ -105,3 +105,16 @@ def all_hold(
     for limit in limits:
         good = good & limit.holds(outputs[limit.name])
     return good
+
+
+def in_python(
+    given: Mapping[str, tuple[float | None, float | None]],
+) -> dict[str, tuple[float | None, float | None]]:
+    """Return limits in the units of files (deg) in those inside Python (rad)."""
+    scaled: dict[str, tuple[float | None, float | None]] = {}
+    for name, bounds in given.items():
+        quantity = QUANTITIES.get(ALIASES.get(name, name))
+        scale = 1.0 if quantity is None else quantity.scale
+        low, high = (None if one is None else one / scale for one in bounds)
+        scaled[name] = low, high
+    return scaled

@@ -14,9 +14,9 @@ from notchflex.errors import InputError
 from notchflex.loads import ExternalLoad, LoadPath
 from notchflex.loads.validation import check_integer, check_is_robot, check_number, short_repr
 from notchflex.robot import Robot
-from notchflex.workspace.actuation import largest_tensions, rays
-from notchflex.workspace.cloud import Workspace
-from notchflex.workspace.limits import Limit, all_hold, limits_of
+from notchflex.workspaces.actuation import largest_tensions, rays
+from notchflex.workspaces.cloud import Workspace
+from notchflex.workspaces.limits import Limit, all_hold, limits_of
 
 Progress = Callable[[int, int], None]
 
@@ -100,7 +100,7 @@ def workspace(
         pieces.append(explorer.piece(every[start : start + _PIECE]))
         if progress is not None:
             progress(min(start + _PIECE, number), number)
-    return _joined(robot, checked, largest, pieces)
+    return _joined(explorer, largest, pieces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +161,7 @@ class _Explorer:
 
 
 def _joined(
-    robot: Robot, limits: tuple[Limit, ...], largest: np.ndarray, pieces: Sequence[_Piece]
+    explorer: _Explorer, largest: Float[np.ndarray, " t"], pieces: Sequence[_Piece]
 ) -> Workspace:
     """Return the states of all pieces that are kept, one after the other."""
     columns: dict[str, list[np.ndarray]] = {}
@@ -189,4 +189,5 @@ def _joined(
         for name, values in rows.items():
             columns.setdefault(name, []).append(np.asarray(values)[keeps])
     joined = {name: np.concatenate(parts) for name, parts in columns.items()}
-    return Workspace(robot, limits, largest, tried, failed, beyond, **joined)
+    robot, limits, load = explorer.robot, explorer.limits, explorer.load
+    return Workspace(robot, limits, load, largest, tried, failed, beyond, **joined)

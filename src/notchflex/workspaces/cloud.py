@@ -11,11 +11,12 @@ from jaxtyping import Bool, Float
 
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
+from notchflex.loads.external import ExternalLoad
 from notchflex.loads.validation import check_number
 from notchflex.robot import Robot
-from notchflex.workspace.limits import Limit
-from notchflex.workspace.shape import Hull, alpha_size, hull_of
-from notchflex.workspace.voxels import VoxelMap, voxel_map
+from notchflex.workspaces.limits import Limit
+from notchflex.workspaces.shape import Hull, alpha_size, hull_of
+from notchflex.workspaces.voxels import VoxelMap, voxel_map
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -34,6 +35,7 @@ class Workspace(Displayed):
     Attributes:
         robot: The robot.
         limits: Limits that all states keep.
+        load: External loads that act all the time.
         largest: Largest tension of every tendon, N, (t,).
         tried: How many states were solved.
         failed: How many of them did not converge, or were not tried after one that did not.
@@ -51,6 +53,7 @@ class Workspace(Displayed):
 
     robot: Robot
     limits: tuple[Limit, ...]
+    load: ExternalLoad
     largest: Float[np.ndarray, " t"]
     tried: int
     failed: int
@@ -143,7 +146,7 @@ class Workspace(Displayed):
         Raises:
             InputError: xarray is not installed.
         """
-        from notchflex.workspace.files import dataset_of
+        from notchflex.workspaces.files import dataset_of
 
         return dataset_of(self)
 
