@@ -49,6 +49,8 @@ class Workspace(Displayed):
         hysteresis: Distance of the tip from where it is at the same tensions on the other way, mm,
             (n,): the error of a controller that does not know the history. NaN where the limits
             leave one of the two out.
+        stiffness: Force per displacement of the tip in the direction where it is smallest, N/mm,
+            (n,); NaN where it was not computed.
     """
 
     robot: Robot
@@ -65,6 +67,7 @@ class Workspace(Displayed):
     strain: Float[np.ndarray, " n"]
     angle: Float[np.ndarray, " n"]
     hysteresis: Float[np.ndarray, " n"]
+    stiffness: Float[np.ndarray, " n"]
 
     def __len__(self) -> int:
         """Number of states."""
@@ -113,7 +116,7 @@ class Workspace(Displayed):
         return alpha_size(self._some[first], 2.0 * size if radius is None else radius)
 
     def voxels(self, size: float | None = None) -> VoxelMap:
-        """Return maps of dexterity, tension, strain and hysteresis.
+        """Return maps of dexterity, tension, strain, hysteresis and stiffness.
 
         Args:
             size: Edge of a voxel, mm; a 32nd of the longest side where not given.
@@ -133,6 +136,7 @@ class Workspace(Displayed):
             "tension": self.tension.max(axis=1),
             "strain": self.strain,
             "hysteresis": self.hysteresis,
+            "stiffness": self.stiffness,
         }
         return voxel_map(self._some, self.direction, values, size)
 
@@ -162,4 +166,4 @@ class Workspace(Displayed):
             if np.isfinite(self.hysteresis).any():
                 most = float(np.nanmax(self.hysteresis))
                 rows.append(("hysteresis", f"up to {short(most)} mm"))
-        return Summary(title, rows, ".voxels() maps dexterity, tension, strain, hysteresis")
+        return Summary(title, rows, ".voxels() maps dexterity, tension, strain, hysteresis, stiffness")

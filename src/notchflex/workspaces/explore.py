@@ -17,6 +17,7 @@ from notchflex.robot import Robot
 from notchflex.workspaces.actuation import largest_tensions, rays
 from notchflex.workspaces.cloud import Workspace
 from notchflex.workspaces.limits import Limit, all_hold, limits_of
+from notchflex.workspaces.stiffness import with_stiffness
 
 Progress = Callable[[int, int], None]
 
@@ -24,6 +25,8 @@ LEVELS = 16
 """Levels of tension on each way of a ray."""
 
 MOST_STATES = 20_000_000
+
+_MOST_STIFFNESS = 5000
 
 # Rays of a piece: its states and their quantities are in memory at a time.
 _PIECE = 4096
@@ -40,6 +43,7 @@ def workspace(
     states: int = 100_000,
     pretension: float = 0.0,
     load: ExternalLoad | None = None,
+    stiffness: int = 0,
     seed: int = 0,
     cores: int | None = None,
     progress: Progress | None = None,
@@ -56,6 +60,7 @@ def workspace(
         states: How many states are solved.
         pretension: Tension that every tendon has at least, N.
         load: External loads that act all the time.
+        stiffness: At how many states the stiffness of the tip is computed, about 10 ms each.
         seed: Of the sequence that draws the rays.
         cores: How many cores to use; all where not given.
         progress: Called with the rays done and the rays of the whole.
@@ -75,32 +80,41 @@ def workspace(
     """
     checked = limits_of(limits)
     largest = largest_tensions(check_is_robot(robot), tension)
-    count = check_integer(states, "states")
-    if not 2 * LEVELS <= count <= MOST_STATES:
-        raise InputError.OUT_OF_RANGE(
-            f"states must be from {2 * LEVELS} to {MOST_STATES:,}; got {count}"
-        )
-    least = check_number(pretension, "pretension")
-    if not 0.0 <= least < float(largest.max()):
-        raise InputError.OUT_OF_RANGE(
-            f"pretension must be 0 N or more and below the largest tension, {largest.max():g} N; "
-            f"got {least:g}"
-        )
+    _check_numbers(states, pretension, stiffness, seed, float(largest.max()))
     if load is not None and not isinstance(load, ExternalLoad):  # pyright: ignore
         raise InputError.WRONG_TYPE(
             f"load must be a notchflex.Load with external loads; got {short_repr(load)}"
         )
-    if check_integer(seed, "seed") < 0:
-        raise InputError.OUT_OF_RANGE(f"seed must be 0 or more; got {seed}")
     explorer = _Explorer(robot, checked, (load or ExternalLoad()).external, cores)
-    number = -(-count // (2 * LEVELS))
-    every = rays(robot, largest, number, LEVELS, least, seed)
+    number = -(-states // (2 * LEVELS))
+    every = rays(robot, largest, number, LEVELS, pretension, seed)
     pieces: list[_Piece] = []
     for start in range(0, number, _PIECE):
         pieces.append(explorer.piece(every[start : start + _PIECE]))
         if progress is not None:
             progress(min(start + _PIECE, number), number)
-    return _joined(explorer, largest, pieces)
+    found = _joined(explorer, largest, pieces)
+    return with_stiffness(found, stiffness) if stiffness and found.loading.any() else found
+
+
+def _check_numbers(
+    states: int, pretension: float, stiffness: int, seed: int, largest: float
+) -> None:
+    if not 2 * LEVELS <= check_integer(states, "states") <= MOST_STATES:
+        raise InputError.OUT_OF_RANGE(
+            f"states must be from {2 * LEVELS} to {MOST_STATES:,}; got {states}"
+        )
+    if not 0.0 <= check_number(pretension, "pretension") < largest:
+        raise InputError.OUT_OF_RANGE(
+            f"pretension must be 0 N or more and below the largest tension, {largest:g} N; "
+            f"got {pretension:g}"
+        )
+    if not 0 <= check_integer(stiffness, "stiffness") <= _MOST_STIFFNESS:
+        raise InputError.OUT_OF_RANGE(
+            f"stiffness is a number of states from 0 to {_MOST_STIFFNESS}; got {stiffness}"
+        )
+    if check_integer(seed, "seed") < 0:
+        raise InputError.OUT_OF_RANGE(f"seed must be 0 or more; got {seed}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +199,7 @@ def _joined(
             "strain": np.nanmax(np.abs(piece.outputs["peak_strain"]), axis=2),
             "angle": piece.outputs["total_angle"],
             "hysteresis": apart,
+            "stiffness": np.full(keeps.shape, np.nan),
         }
         for name, values in rows.items():
             columns.setdefault(name, []).append(np.asarray(values)[keeps])

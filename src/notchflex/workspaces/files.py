@@ -14,7 +14,6 @@ from notchflex.results.files.writing import replacing
 from notchflex.results.quantities.registry import AXES
 from notchflex.workspaces.cloud import Workspace
 from notchflex.workspaces.comparing import Overlap
-from notchflex.workspaces.stiffness import tip_stiffness
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -47,6 +46,7 @@ def workspace_document(found: Workspace) -> dict[str, Any]:
         "peak_strain": _spread(found.strain),
         "tension_N": _spread(found.tension.max(axis=1)),
         "hysteresis_mm": _spread(found.hysteresis),
+        "softest_stiffness_N_mm": _spread(found.stiffness),
         "voxels": {
             "edge_mm": voxels.size,
             "count": len(voxels),
@@ -63,18 +63,6 @@ def _spread(values: np.ndarray) -> dict[str, float | None]:
     parts = np.quantile(good, _PARTS)
     named = {f"p{100 * part:g}": float(one) for part, one in zip(_PARTS, parts, strict=True)}
     return named | {"largest": float(good.max())}
-
-
-def stiffness_document(found: Workspace, count: int) -> dict[str, Any]:
-    """Return the stiffness of the tip at some states: its spread, and where it was computed."""
-    states, stiffness = tip_stiffness(found, count)
-    return {
-        "softest_N_mm": _spread(stiffness),
-        "states": [
-            {"tip_mm": found.tip[state], "softest_N_mm": float(one)}
-            for state, one in zip(states, stiffness, strict=True)
-        ],
-    }
 
 
 def overlap_documents(found: Sequence[Overlap]) -> list[dict[str, Any]]:
@@ -95,6 +83,7 @@ def dataset_of(found: Workspace) -> Dataset:
         "peak_strain": ("state", found.strain, "1", "largest strain of any fibre"),
         "total_angle": ("state", found.angle, "rad", "total bending angle"),
         "hysteresis": ("state", found.hysteresis, "mm", "distance to the tip on the other way"),
+        "stiffness": ("state", found.stiffness, "N/mm", "of the tip where it is softest"),
     }
     return xarray.Dataset(
         {

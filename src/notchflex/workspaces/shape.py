@@ -86,18 +86,27 @@ def alpha_size(points: Float[np.ndarray, "n 3"], radius: float) -> float:
     return float(sizes[good][small].sum())
 
 
-def inside(hull: Hull, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-    """Return which points lie in a hull with a volume or an area."""
+def inside(
+    hull: Hull, points: Float[np.ndarray, "n 3"], slack: float = 1e-3
+) -> Bool[np.ndarray, " n"]:
+    """Return which points lie in a hull with a volume or an area.
+
+    Args:
+        hull: The hull.
+        points: Points, mm.
+        slack: How far outside a point may lie, as a part of the size of the hull: a hull of single
+            states misses the outermost ones of a thin workspace.
+    """
     if hull.dimension < 2:
         return np.zeros(len(points), bool)
+    near = slack * float(np.ptp(hull.corners, axis=0).max())
     flat = (points - hull.origin) @ hull.axes.T
     off = points - hull.origin - flat @ hull.axes
-    near = np.abs(off).max(axis=1) <= 1e-6 * np.ptp(hull.corners, axis=0).max()
+    within = np.abs(off).max(axis=1) <= near
     equations = ConvexHull((hull.corners - hull.origin) @ hull.axes.T).equations
-    within = np.ones(len(points), bool)
     for row in equations:  # few, while the points are many
-        within &= flat @ row[:-1] + row[-1] <= 1e-9
-    return near & within
+        within &= flat @ row[:-1] + row[-1] <= near
+    return within
 
 
 def _frame(

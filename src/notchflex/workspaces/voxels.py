@@ -71,13 +71,18 @@ def voxel_map(
     return VoxelMap(size, (found + 0.5) * size, states, dexterity, maps, of_state)
 
 
-def _nearest(directions: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    """Return the nearest of the directions of the dexterity, piece by piece."""
+def sphere_directions() -> Float[np.ndarray, "directions 3"]:
+    """Return the directions that the dexterity tells apart, as unit vectors."""
     # notation: a Fibonacci sphere, points at equal steps of height turned by the golden angle
     number = np.arange(DIRECTIONS)
     z = 1.0 - (2.0 * number + 1.0) / DIRECTIONS
     turn = number * np.pi * (3.0 - np.sqrt(5.0))
     flat = np.sqrt(1.0 - z**2)
-    sphere = np.stack([flat * np.cos(turn), flat * np.sin(turn), z])
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+
+
+def _nearest(directions: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+    """Return the nearest of the directions of the dexterity, piece by piece."""
+    sphere = sphere_directions().T
     pieces = [directions[start : start + 65536] for start in range(0, len(directions), 65536)]
     return np.concatenate([(one @ sphere).argmax(axis=1) for one in pieces])

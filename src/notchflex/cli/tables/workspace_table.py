@@ -15,6 +15,7 @@ _SPREADS = {
     "peak_strain": "peak strain",
     "tension_N": "largest tension [N]",
     "hysteresis_mm": "error by hysteresis [mm]",
+    "softest_stiffness_N_mm": "softest stiffness [N/mm]",
 }
 
 
@@ -38,7 +39,7 @@ def print_workspace(label: str, document: dict[str, Any]) -> None:
     for axis, (low, high) in document["extent_mm"].items():
         console.print(f"{axis}  {low:.3f} to {high:.3f} mm")
     hull, alpha, voxels = document["convex_hull"], document["alpha_shape"], document["voxels"]
-    console.print(f"convex hull {hull['size']:.5g} {hull['unit']}, alpha shape {alpha['size']:.4g}")
+    console.print(f"convex hull {hull['size']:.5g} {hull['unit']}, alpha shape {alpha['size']:.4g} {alpha['unit']}")
     console.print(
         f"dexterity {100 * voxels['dexterity_mean']:.2g} % of directions in a voxel of "
         f"{voxels['edge_mm']:.3g} mm, up to {100 * voxels['dexterity_largest']:.2g} %",
@@ -48,11 +49,8 @@ def print_workspace(label: str, document: dict[str, Any]) -> None:
     rows = [
         [title, *("" if one is None else f"{one:.4g}" for one in document[key].values())]
         for key, title in _SPREADS.items()
+        if document[key]["largest"] is not None
     ]
-    if "stiffness" in document:
-        spread = document["stiffness"]["softest_N_mm"]
-        values = ("" if one is None else f"{one:.4g}" for one in spread.values())
-        rows.append(["softest stiffness [N/mm]", *values])
     console.print(terminal.table(heads, rows, gap=2))
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, number, whole
+from notchflex.cli.arguments.conversion import converted, number, texts, whole
 from notchflex.cli.arguments.loads import ExternalLoads
 from notchflex.cli.arguments.robots import (
     RobotName,
@@ -20,7 +20,6 @@ from notchflex.cli.arguments.robots import (
     robot_files,
 )
 from notchflex.cli.outputs import JsonFile, Outputs, PlotFile, Quiet, output_file
-from notchflex.cli.arguments.conversion import texts
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
 
@@ -130,27 +129,23 @@ def workspace(
                 states=states,
                 pretension=pretension,
                 load=load,
+                stiffness=stiffness,
                 progress=None if show is None else partial(show, label),
             )
-    _write(found, stiffness, outputs)
+    _write(found, outputs)
     return _report(found)
 
 
-def _write(found: Mapping[str, Workspace], stiffness: int, outputs: Outputs) -> None:
+def _write(found: Mapping[str, Workspace], outputs: Outputs) -> None:
     from notchflex.workspaces.comparing import overlaps
     from notchflex.workspaces.files import (
         overlap_documents,
         save_netcdf,
-        stiffness_document,
         workspace_document,
     )
 
     compared = overlaps(found) if all(len(one) for one in found.values()) else []
     documents = {label: workspace_document(one) for label, one in found.items()}
-    if stiffness:
-        for label, one in found.items():
-            if len(one):
-                documents[label]["stiffness"] = stiffness_document(one, stiffness)
 
     def document() -> dict[str, Any]:
         first, *others = documents

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BELOW, BESIDE, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, sequence_colours
+from notchflex.workspaces.shape import hull_of
+from notchflex.workspaces.voxels import sphere_directions
 
 if TYPE_CHECKING:
     from notchflex.workspaces import Workspace
@@ -26,7 +28,8 @@ def workspace_picture(found: Workspace) -> Picture:
     """Describe a workspace.
 
     The convex hull and the tips in space, and below the voxels seen from the side (x or y, the
-    wider, over z), coloured by tension, peak strain, error by hysteresis and dexterity.
+    wider, over z), coloured by tension, peak strain, error by hysteresis, dexterity and, where it was
+    computed, stiffness.
 
     Args:
         found: The workspace.
@@ -51,6 +54,8 @@ def workspace_picture(found: Workspace) -> Picture:
         "largest error by hysteresis [mm]": voxels.values["hysteresis"],
         "dexterity [% of directions]": 100.0 * voxels.dexterity,
     }
+    if np.isfinite(found.stiffness).any():
+        maps["softest stiffness of the tip [N/mm]"] = voxels.values["stiffness"]
     first = _plane(found, across, title) if flat else _space(found, title)
     panels = [first]
     points = voxels.centre[:, [across, 2]]
@@ -67,16 +72,17 @@ def workspaces_picture(found: Mapping[str, Workspace]) -> Picture:
     """
     colours = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
     panels: list[Panel] = []
-    for across in (0, 1):
+    flat = all(np.ptp(one.extent[:, 1]) < 1e-9 for one in found.values())
+    for across in (0,) if flat else (0, 1):
         items: list[Mark] = []
         for (label, one), colour in zip(found.items(), colours, strict=False):
             points = _thinned(one)[:, [across, 2]]
             name = f"{label}: {one.hull.size:.3g} {one.hull.unit}"
             items.append(dots(points, colour, 2.0, name=name, group=label))
-        legend = BELOW if across else ""
+        legend = BELOW if across or flat else ""
         panels.append(Panel(items, _LABELS[across], _LABELS[2], equal=True, legend=legend))
     title = "Workspaces of " + " and ".join(found)
-    return Picture(title, 9.6, 5.2, grid(panels, 2))
+    return Picture(title, 5.2 * len(panels), 5.2, grid(panels, 2))
 
 
 def _thinned(found: Workspace) -> NDArray[np.float64]:
@@ -91,10 +97,13 @@ def _space(found: Workspace, title: str) -> Panel:
         dots(tips[rising], BLUE, 1.5, name="loading", group="loading"),
         dots(tips[~rising], ORANGE, 1.5, name="unloading", group="unloading"),
     ]
-    corners, faces = found.hull.corners, found.hull.faces
-    gap = np.full((len(faces), 1, 3), np.nan)
-    edges = np.concatenate([corners[faces], corners[faces[:, :1]], gap], axis=1).reshape(-1, 3)
-    items.append(Curve(edges, SKY, width=0.3, name="convex hull", group="hull"))
+    # The farthest corners alone: all of them are too many lines.
+    corners = found.hull.corners
+    some = corners[np.unique((corners @ sphere_directions().T).argmax(axis=0))]
+    few = hull_of(some)
+    gap = np.full((len(few.faces), 1, 3), np.nan)
+    edges = np.concatenate([few.corners[few.faces], gap], axis=1).reshape(-1, 3)
+    items.append(Curve(edges, SKY, width=0.5, name="convex hull", group="hull"))
     return Panel(items, *_LABELS, title=title, legend=BESIDE, equal=True)
 
 
