@@ -108,7 +108,7 @@ def test_the_standard_deviation_is_that_of_repeated_readings(wrist):
         drawn = (path.tension + noise[0], path.stroke + noise[1])
         readings = readings_of(wrist, *drawn, None, None, SensorNoise())
         model = SensingModel(wrist, readings, unknown_force(wrist, "x", "tip", None), 0.2, DEFAULT)
-        history = with_noise(model, estimate(model))
+        history = with_noise(estimate(model))
         found.append((history.best[-1].force[0], np.linalg.norm(history.gain[-1])))
     forces, deviations = np.transpose(found)
     # The deviation of 60 draws is itself known to a tenth: three of its deviations.

@@ -59,7 +59,7 @@ def bounds(history: History, level: float, progress: Progress | None = None) -> 
         for tracker in [_Tracker(before, found.force, None), *extremes]:
             covariance = history.covariance if tracker.direction is None else history.alone
             white = whitening_of(covariance[number])
-            problem = ReadingProblem(model, model.step(number), tracker.state, white)
+            problem = ReadingProblem(model, history.steps[number], tracker.state, white)
             at = best(problem, np.stack([tracker.force, found.force]))
             if not np.isfinite(at.misfit):
                 continue

@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from notchflex.analysis.derivatives.tangent import Change, PathTangents
 from notchflex.results.path import EquilibriumPath
-from notchflex.sensing.model import SensingModel
+from notchflex.sensing.model import SensingModel, Step
 from notchflex.sensing.search import Candidate, ReadingProblem, best
 from notchflex.solver.continuation import SolverState
 
@@ -32,6 +32,7 @@ class History:
 
     Attributes:
         model: The robot and its readings.
+        steps: The readings, as they are compared.
         best: What fits best, reading by reading, up to the first that does not converge.
         covariance: Of the deviations of each reading by the noise of all up to it, (m, m) each.
         alone: The same by the noise of this reading alone, (m, m) each.
@@ -40,6 +41,7 @@ class History:
     """
 
     model: SensingModel
+    steps: list[Step]
     best: list[Candidate]
     covariance: list[Float[np.ndarray, "m m"]]
     alone: list[Float[np.ndarray, "m m"]]
@@ -47,29 +49,30 @@ class History:
     gain: list[Float[np.ndarray, "d noises"]]
 
 
-def estimate(model: SensingModel, progress: Progress | None = None) -> list[Candidate]:
-    """Find the force of every reading, one after the other."""
-    found: list[Candidate] = []
+def estimate(model: SensingModel, progress: Progress | None = None) -> History:
+    """Find the force of every reading, one after the other; without their noise yet."""
+    history = History(model, [], [], [], [], [], [])
     state, force = None, np.zeros(model.size)
     for number in range(len(model.readings)):
-        candidate = _estimate_one(model, number, state, force)
+        step, candidate = _estimate_one(model, number, state, force)
         if not np.isfinite(candidate.misfit):
             break
-        found.append(candidate)
+        history.steps.append(step)
+        history.best.append(candidate)
         state, force = candidate.state, candidate.force
         if progress is not None:
             progress(number + 1, len(model.readings))
-    return found
+    return history
 
 
 def _estimate_one(
     model: SensingModel, number: int, state: SolverState | None, force: Float[np.ndarray, " d"]
-) -> Candidate:
+) -> tuple[Step, Candidate]:
     step = model.step(number)
     problem = ReadingProblem(model, step, state, np.diag(step.variance**-0.5))
     at = best(problem, force[None])
     if not len(step.entries):
-        return at
+        return step, at
     if np.isfinite(at.misfit):
         drives = model.slopes(at.alone, of_drives=True)[0][step.entries]
         noise = np.diag(step.variance) + (np.nan_to_num(drives) * step.driving) @ drives.T
@@ -78,7 +81,10 @@ def _estimate_one(
     if at.misfit > _BAD_FIT * len(step.entries):
         other = best(problem, _starts(model))
         at = min(at, other, key=lambda one: one.misfit)
-    return at
+    if state is not None and np.isfinite(at.misfit):
+        way = model.between_readings(state, number, np.stack([force, at.force]))
+        step = replace(step, variance=step.variance + way[step.entries] ** 2)
+    return step, at
 
 
 def _starts(model: SensingModel) -> Float[np.ndarray, "k d"]:
@@ -94,19 +100,19 @@ def whitening_of(covariance: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
-def with_noise(model: SensingModel, found: list[Candidate]) -> History:
-    """Carry the noise of all readings through the history, to first order.
+def with_noise(history: History) -> History:
+    """Carry the noise of all readings through a history, to first order.
 
     A noise is one number that was read in one reading. It changes the force of its own reading and,
     by what the contacts remember, those after it.
     """
-    history = History(model, found, [], [], [], [])
+    model, steps, found = history.model, history.steps, history.best
+    history = History(model, steps, found, [], [], [], [])
     if not found:
         return history
     forces = np.array([one.force for one in found])
     path = model.follow(forces)
     by_drive, by_force = _slopes_along(model, path)
-    steps = [model.step(number) for number in range(len(found))]
     sizes = [len(step.entries) for step in steps]
     tendons = by_drive.shape[2]
     first = np.cumsum([0, *sizes])

@@ -34,7 +34,7 @@ class Step:
         number: Which reading, from 0.
         measured: The numbers, (m,).
         entries: Which columns of the outputs these are, (m,).
-        variance: Of their noise, (m,).
+        variance: Of their noise, and of what may have happened since the reading before, (m,).
         driving: Variance of what drives the model, (t,).
     """
 
@@ -101,6 +101,41 @@ class SensingModel:
         """Solve a reading with some forces, each from the same state; rest where it is None."""
         load = self.load([number] * len(forces), forces)
         return self._each.solve(self.robot, load, start)
+
+    def between_readings(
+        self, start: SolverState, number: int, forces: Float[np.ndarray, "2 d"]
+    ) -> Float[np.ndarray, " outputs"]:
+        """Return by how much what is read depends on the way from the reading before.
+
+        The difference of a change in two halves from one at once, where the force and what drives
+        the model change in proportion; 0 where they can't, as from slack tendons.
+
+        Args:
+            start: The state at the reading before.
+            number: The reading.
+            forces: The force before and at it.
+        """
+        rows = [number - 1, number]
+        tension, stroke = (one[rows] for one in self.readings.commands)
+        driven = np.isnan(stroke)
+        if (driven[0] != driven[1]).any() or not np.nanmax(tension[0], initial=0.0) > 0.0:
+            return np.zeros(self._width)
+        at_once = self.load(rows, forces)
+        middle = self.unknown.load(forces.mean(axis=0))
+        halves = LoadPath.of_valid(
+            np.stack([at_once.tension.mean(axis=0), at_once.tension[1]]),
+            np.stack([at_once.stroke.mean(axis=0), at_once.stroke[1]]),
+            at_once.base_rotation,
+            (middle, at_once.external[1]),
+        )
+        ways = [self._along.solve(self.robot, halves, start), self.solve(start, number, forces[1:])]
+        first, second = (self.values(way)[-1] for way in ways)
+        return np.nan_to_num(first - second)
+
+    @property
+    def _width(self) -> int:
+        read = self.readings.read
+        return sum(read[name].shape[1] for name in self.outputs)
 
     def follow(self, forces: Float[np.ndarray, "s d"]) -> EquilibriumPath:
         """Follow the whole history with a force in every reading."""

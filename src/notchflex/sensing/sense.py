@@ -91,8 +91,7 @@ def sense(
     places: dict[int | None, float] = {}
     if place == "search":
         model, places = _best_place(model, progress)
-    found = estimate(model, _stage(progress, "finding the force"))
-    history = with_noise(model, found)
+    history = with_noise(estimate(model, _stage(progress, "finding the force")))
     ends = bounds(history, LEVEL, _stage(progress, "finding the interval"))
     return _result(model, history, ends, places)
 
@@ -130,7 +129,7 @@ def _best_place(
     report = _stage(progress, "trying places")
     misfits: dict[int | None, float] = {}
     for number, body in enumerate(bodies, 1):
-        found = estimate(replace(model, unknown=model.unknown.on(body)))
+        found = estimate(replace(model, unknown=model.unknown.on(body))).best
         whole = len(found) == len(model.readings)
         misfits[body] = sum(one.misfit for one in found) if whole else np.inf
         if report is not None:
