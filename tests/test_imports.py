@@ -27,7 +27,7 @@ ORDER = (
     "design",
     "control",
     "sensing",
-    "workspace",
+    "workspaces",
     "learning",
     "sweep",
     "photographs",

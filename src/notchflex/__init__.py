@@ -133,6 +133,21 @@ _HOME = {
         ),
         "notchflex.comparison",
     ),
+    **dict.fromkeys(
+        (
+            "SensedForce",
+            "SensorNoise",
+            "sense",
+        ),
+        "notchflex.sensing",
+    ),
+    **dict.fromkeys(
+        (
+            "Workspace",
+            "workspace",
+        ),
+        "notchflex.workspaces",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

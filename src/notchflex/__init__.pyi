@@ -82,6 +82,11 @@ from notchflex.robot import json_schema as json_schema
 from notchflex.robot import list_robots as list_robots
 from notchflex.robot import load_robot as load_robot
 from notchflex.robot import save_robot as save_robot
+from notchflex.sensing import SensedForce as SensedForce
+from notchflex.sensing import SensorNoise as SensorNoise
+from notchflex.sensing import sense as sense
 from notchflex.solver.newton import Settings as Settings
+from notchflex.workspaces import Workspace as Workspace
+from notchflex.workspaces import workspace as workspace
 
 __version__: str

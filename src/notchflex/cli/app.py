@@ -94,6 +94,18 @@ VERBS = {
         "    echo 200,126.8,88,86 >> readings.csv\n"
         "    notchflex friction-rig readings.csv --plot friction.png",
     ),
+    "sense": (
+        "Find the force on a robot from tensions and strokes of its tendons.",
+        "notchflex simulate pacheco2021-a --tension 0.1:0.8:8 --tip-force 0.02,0,0 --csv read.csv\n"
+        "    notchflex sense pacheco2021-a read.csv --plot force.png\n"
+        "    notchflex sense pacheco2021-a read.csv --components xz --with tip --tip-noise 0.05",
+    ),
+    "workspace": (
+        "Explore where the tip of a robot can go, while its tendons are pulled and let go.",
+        "notchflex workspace two-axis-wrist --states 20000 --plot workspace.png\n"
+        "    notchflex workspace pacheco2021-a --limit strain=0.04 --states 4000 --json -\n"
+        "    notchflex workspace pacheco2021-a --states 4000 --beside pacheco2021-b",
+    ),
     "bench": (
         "Time the solver on this machine.",
         "notchflex bench --json bench.json\n    notchflex bench --only wrist",

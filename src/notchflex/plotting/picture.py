@@ -24,8 +24,8 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
     Args:
         result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a
-            `Comparison`, a `Calibration`, a `FrictionRig`, or a dict of label to path for several
-            beside each other.
+            `Comparison`, a `Calibration`, a `FrictionRig`, a `SensedForce`, a `Workspace`, or a dict of label
+            to path for several beside each other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -69,11 +69,18 @@ def _picture(result: Any) -> Picture:
 
         kinds |= {Calibration: calibration_picture}
         kinds |= {FrictionRig: friction_picture}
+    if not isinstance(result, tuple(kinds)):
+        from notchflex.plotting.sensing.sensed import sensed_picture
+        from notchflex.plotting.workspace.cloud import workspace_picture
+        from notchflex.sensing import SensedForce
+        from notchflex.workspaces import Workspace
+
+        kinds |= {SensedForce: sensed_picture, Workspace: workspace_picture}
     for kind, describe in kinds.items():
         if isinstance(result, kind):
             return describe(result)
     raise InputError.WRONG_TYPE(
         "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, "
-        "Bands, a Comparison, a Calibration, a FrictionRig or a dict of paths; got "
+        "Bands, a Comparison, a Calibration, a FrictionRig, a SensedForce, a Workspace or a dict of paths; got "
         f"{type(result).__name__}."
     )

@@ -1,0 +1,166 @@
+"""Forces reading by reading along a history, and the noise that they inherit.
+
+The model is followed from reading to reading with the tensions that were measured, and the force of
+every reading is found in turn: what the contacts remember of it passes on to the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.results.path import EquilibriumPath
+from notchflex.sensing.model import SensingModel, Step
+from notchflex.sensing.search import Candidate, ReadingProblem, best
+from notchflex.solver.continuation import SolverState
+
+Progress = Callable[[int, int], None]
+
+# A fit that misses the readings by more than this, in squares of the noise for each number that
+# was read, is tried again from all over the range.
+_BAD_FIT = 12.0
+_STARTS = 9
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The best forces of a history.
+
+    Attributes:
+        model: The robot and its readings.
+        steps: The readings, as they are compared.
+        best: What fits best, reading by reading, up to the first that does not converge.
+        covariance: Of the deviations of each reading by the noise of all up to it, (m, m) each.
+        alone: The same by the noise of this reading alone, (m, m) each.
+        information: Whitened slopes of each reading by the force, (m, d) each.
+        gain: Change of each force by every unit of noise, (d, noises) each.
+    """
+
+    model: SensingModel
+    steps: list[Step]
+    best: list[Candidate]
+    covariance: list[Float[np.ndarray, "m m"]]
+    alone: list[Float[np.ndarray, "m m"]]
+    information: list[Float[np.ndarray, "m d"]]
+    gain: list[Float[np.ndarray, "d noises"]]
+
+
+def estimate(model: SensingModel, progress: Progress | None = None) -> History:
+    """Find the force of every reading, one after the other; without their noise yet."""
+    history = History(model, [], [], [], [], [], [])
+    state, force = None, np.zeros(model.size)
+    for number in range(len(model.readings)):
+        step, candidate = _estimate_one(model, number, state, force)
+        if not np.isfinite(candidate.misfit):
+            break
+        history.steps.append(step)
+        history.best.append(candidate)
+        state, force = candidate.state, candidate.force
+        if progress is not None:
+            progress(number + 1, len(model.readings))
+    return history
+
+
+def _estimate_one(
+    model: SensingModel, number: int, state: SolverState | None, force: Float[np.ndarray, " d"]
+) -> tuple[Step, Candidate]:
+    step = model.step(number)
+    problem = ReadingProblem(model, step, state, np.diag(step.variance**-0.5))
+    at = best(problem, force[None])
+    if not len(step.entries):
+        return step, at
+    if np.isfinite(at.misfit):
+        drives = model.slopes(at.alone, of_drives=True)[0][step.entries]
+        noise = np.diag(step.variance) + (np.nan_to_num(drives) * step.driving) @ drives.T
+        problem = replace(problem, whitening=whitening_of(noise))
+        at = best(problem, at.force[None])
+    if at.misfit > _BAD_FIT * len(step.entries):
+        other = best(problem, _starts(model))
+        at = min(at, other, key=lambda one: one.misfit)
+    if state is not None and np.isfinite(at.misfit):
+        way = model.between_readings(state, number, np.stack([force, at.force]))
+        step = replace(step, variance=step.variance + way[step.entries] ** 2)
+    return step, at
+
+
+def _starts(model: SensingModel) -> Float[np.ndarray, "k d"]:
+    """Forces from all over the range, along each component."""
+    steps = np.linspace(-model.largest, model.largest, _STARTS)
+    return np.concatenate([np.multiply.outer(steps, row) for row in np.eye(model.size)])
+
+
+def whitening_of(covariance: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
+    """Return the matrix that makes deviations of a covariance independent of unit variance."""
+    if not len(covariance):
+        return covariance
+    return np.linalg.inv(np.linalg.cholesky(covariance))
+
+
+def with_noise(history: History) -> History:
+    """Carry the noise of all readings through a history, to first order.
+
+    A noise is one number that was read in one reading. It changes the force of its own reading and,
+    by what the contacts remember, those after it.
+    """
+    model, steps, found = history.model, history.steps, history.best
+    history = History(model, steps, found, [], [], [], [])
+    if not found:
+        return history
+    forces = np.array([one.force for one in found])
+    path = model.follow(forces)
+    by_drive, by_force = _slopes_along(model, path)
+    sizes = [len(step.entries) for step in steps]
+    tendons = by_drive.shape[2]
+    first = np.cumsum([0, *sizes])
+    noises = int(first[-1]) + len(steps) * tendons
+    weak = (1e-3 / model.largest) ** 2 * np.eye(model.size)
+    before = np.zeros((model.size, noises))
+    for k, step in enumerate(steps):
+        rows = step.entries
+        read = np.zeros((len(rows), noises))
+        read[np.arange(len(rows)), first[k] + np.arange(len(rows))] = np.sqrt(step.variance)
+        for j in range(k, -1, -1):
+            columns = slice(int(first[-1]) + j * tendons, int(first[-1]) + (j + 1) * tendons)
+            read[:, columns] -= by_drive[j, k][:, rows].T * np.sqrt(steps[j].driving)
+            if j == k:
+                history.alone.append(read @ read.T)
+            else:
+                read -= by_force[j, k][:, rows].T @ history.gain[j]
+        covariance = read @ read.T
+        white = whitening_of(covariance)
+        slopes = white @ by_force[k, k][:, rows].T
+        gain = np.linalg.solve(slopes.T @ slopes + weak, slopes.T)
+        before = before + gain @ (white @ read - slopes @ before)
+        history.covariance.append(covariance)
+        history.information.append(slopes)
+        history.gain.append(before)
+    return history
+
+
+def _slopes_along(
+    model: SensingModel, path: EquilibriumPath
+) -> tuple[Float[np.ndarray, "s s t outputs"], Float[np.ndarray, "s s d outputs"]]:
+    """Change of each reading by the command of each tendon, and by the force, of each before."""
+    tangents = PathTangents(path, model.outputs)
+    shape = tangents.loads.shape
+    results = []
+    for changes in (model.drive_changes(path), model.force_changes(path)):
+        slopes = []
+        for step in range(len(path)):
+            row = []
+            for change in changes:
+                load = np.zeros(shape)
+                load[step] = change
+                along = tangents.along(Change(load, None))
+                parts = [along[name].reshape(len(path), -1) for name in model.outputs]
+                row.append(np.nan_to_num(np.concatenate(parts, axis=1)))
+            slopes.append(np.stack(row, axis=1))
+        results.append(np.array(slopes))
+    return results[0], results[1]
+
+
+__all__ = ["History", "Progress", "estimate", "whitening_of", "with_noise"]
