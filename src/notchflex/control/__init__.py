@@ -4,7 +4,7 @@ from notchflex.control.csv import read_targets
 from notchflex.control.follow import follow, reach
 from notchflex.control.following import Following, Reach
 from notchflex.control.limits import Limits
-from notchflex.control.search import TargetSearch
+from notchflex.control.problem import TargetSearch
 from notchflex.control.targets import Targets
 
 __all__ = [

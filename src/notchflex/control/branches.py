@@ -6,22 +6,31 @@ either branch: by pulling up to it, or by pulling beyond it and letting go.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import DriveModel, Response
-from notchflex.control.search import Attempt, Problem, find
+from notchflex.control.drive_model import Response
+from notchflex.control.problem import Attempt, Problem
+from notchflex.control.search import find
+from notchflex.control.walk import limit_rows
 from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]
 
 # An overshoot goes so far beyond what reverses all contacts.
 _BEYOND = 0.05
-# Where the search from the present drives fails, it starts again from these parts of them ...
+# Limits count as kept within this part of them.
+_KEPT = 1e-6
+# Where the search from the present drives fails, it starts again from these parts of them,
 _STARTS = (0.5, 0.1, 0.0)
-# ... and follows the target from the present values in so many parts.
+# from each tendon pulled alone by this part of what about closes a notch,
+_ALONE = 0.15
+# and from the best that it found without the drives that are smaller than this part of the largest,
+_SMALL = 0.2
+# and follows the target from the present values in so many parts.
 _PARTS = 6
 
 
@@ -62,19 +71,19 @@ def approach_target(
     ways = [Way(None, direct, direct.solves)]
     if approach == "direct" or not direct.response.converged:
         return ways[0]
-    rises = _rises(problem, start, direct.drive)
-    if (approach == "loading" and rises) or (approach == "unloading" and not rises):
+    change = _change(problem, start, direct.drive)
+    if (approach == "loading" and change > 0.0) or (approach == "unloading" and change < 0.0):
         return ways[0]
-    friction = total_friction(problem.model, direct.response.state)
+    friction = problem.model.friction(direct.response.state)
     for over in (True, False):
         if (over and approach == "loading") or (not over and approach == "unloading"):
             continue
-        via = _via(problem, direct.drive, friction, over, rises)
+        via = _via(problem, direct.drive, friction, over, change > 0.0)
         between = problem.model.solve(before, via)
-        if not between.converged:
+        if not between.converged or not _allowed(problem, between):
             continue
         last = find_anyhow(problem, between.state, via, goal, None)
-        right_way = _rises(problem, via, last.drive) is not over
+        right_way = (_change(problem, via, last.drive) < 0.0) is over
         if right_way or last.failure is not None:
             ways.append(Way(via, last, last.solves + 1))
     solves = sum(way.solves for way in ways)
@@ -82,14 +91,15 @@ def approach_target(
     return min(wanted, key=_rank)._replace(solves=solves)
 
 
-def _rank(way: Way) -> tuple[bool, float, float]:
+def _rank(way: Way) -> tuple[bool, bool, float, float]:
     failed = way.last.failure is not None
-    return failed, way.last.error if failed else 0.0, way.last.effort
+    broken = not _keeps_limits(way.last)
+    return failed, broken, way.last.error if failed else 0.0, way.last.effort
 
 
-def _rises(problem: Problem, start: np.ndarray, end: np.ndarray) -> bool:
-    """Whether the drives rise on the whole."""
-    return float(np.sum((end - start)[problem.driven])) >= 0.0
+def _change(problem: Problem, start: np.ndarray, end: np.ndarray) -> float:
+    """How far the drives rise, all together."""
+    return float(np.sum((end - start)[problem.driven]))
 
 
 def _via(
@@ -98,21 +108,12 @@ def _via(
     """Drives above or below those of the target, from which all contacts turn round on the way."""
     if not problem.by_tension:
         friction = np.zeros_like(friction)
-    # On the other branch the same shape needs a tension that is larger or smaller by twice the
-    # friction of all contacts (as a logarithm).
-    other = 0.0 if rises is over else 2.0 * friction
+    # The same shape needs a tension that is about the friction of all contacts (as a logarithm)
+    # smaller after unloading than after loading; to turn all contacts round takes twice that.
+    other = friction if rises is over else 2.0 * friction
     factor = np.exp(other) * (1.0 + _BEYOND) if over else np.exp(-other) * (1.0 - _BEYOND)
     via = np.where(problem.driven, drive * factor, drive)
     return np.clip(via, problem.low, problem.high)
-
-
-def total_friction(model: DriveModel, state: np.ndarray) -> Float[np.ndarray, " t"]:
-    """Return the logarithm of the largest tension ratio over all contacts of every tendon."""
-    chain, memory = model.prepared.chain, model.unpack(state).memory
-    total = np.zeros(chain.tendons)
-    for group, bound in zip(chain.groups, memory.bound, strict=True):
-        total[list(group.numbers)] = np.asarray(bound).sum(axis=(0, 2))
-    return total
 
 
 def find_anyhow(
@@ -129,22 +130,46 @@ def find_anyhow(
     """
     best = find(problem, before, start, goal, known)
     solves = best.solves
-    for part in _STARTS:
+    for other_start in _other_starts(problem, start):
         if best.failure is None:
-            break
-        other = find(problem, before, part * start, goal)
+            return best._replace(solves=solves)
+        other = find(problem, before, other_start, goal)
         solves += other.solves
         best = min(best, other, key=_quality)
     if best.failure is not None:
         other = _by_parts(problem, before, start, goal)
         solves += other.solves
         best = min(best, other, key=_quality)
+    if best.failure is not None and problem.driven.sum() > 1:
+        few = np.where(best.drive < _SMALL * best.drive.max(), problem.low, best.drive)
+        other = find(problem, before, few, goal)
+        solves += other.solves
+        best = min(best, other, key=_quality)
     return best._replace(solves=solves)
 
 
+def _other_starts(problem: Problem, start: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield parts of some drives, and then each tendon pulled alone."""
+    for part in _STARTS:
+        yield part * start
+    for tendon in np.flatnonzero(problem.driven):
+        alone = np.maximum(problem.low, 0.0)
+        alone[tendon] += _ALONE * problem.unit
+        yield alone
+
+
 def _quality(attempt: Attempt) -> tuple[bool, bool, float]:
-    broken = not attempt.response.converged or attempt.excess > 1e-6
-    return attempt.failure is not None, broken, attempt.error
+    return attempt.failure is not None, not _keeps_limits(attempt), attempt.error
+
+
+def _allowed(problem: Problem, response: Response) -> bool:
+    """Whether a state keeps the limits."""
+    room = limit_rows(problem, response.values, response.jacobian)[1]
+    return not room.size or float(room.min()) >= -_KEPT
+
+
+def _keeps_limits(attempt: Attempt) -> bool:
+    return attempt.response.converged and attempt.excess <= _KEPT
 
 
 def _by_parts(problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray) -> Attempt:

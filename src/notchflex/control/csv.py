@@ -10,7 +10,7 @@ import numpy as np
 from notchflex._quantity import DEGREES
 from notchflex.control.targets import DIRECTION, Targets, make_targets, sizes_of, target_shapes
 from notchflex.errors import InputError
-from notchflex.results.files.csv_reading import Table, read_table
+from notchflex.results.files.csv_reading import read_table
 from notchflex.results.quantities.registry import AXES, QUANTITIES
 from notchflex.robot import Robot
 
@@ -59,16 +59,7 @@ def read_targets(source: str | os.PathLike[str], robot: Robot) -> Targets:
         values.setdefault(name, empty)[(slice(None), *index)] = (
             table.numbers(header, may_miss=True) / scale
         )
-    _check_rows(table, values)
     return make_targets(Targets(values), robot, several=True)
-
-
-def _check_rows(table: Table, values: dict[str, np.ndarray]) -> None:
-    """Raise with the line of a row that has no number."""
-    flat = np.concatenate([v.reshape(len(table), -1) for v in values.values()], axis=1)
-    empty = np.isnan(flat).all(axis=1)
-    if empty.any():
-        raise InputError.NO_DATA(f"{table.at(int(np.argmax(empty)))}: the row has no number")
 
 
 def _columns(robot: Robot) -> Iterator[tuple[str, tuple[str, tuple[int, ...]]]]:

@@ -17,7 +17,6 @@ from jaxtyping import Array, Float
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.derivatives.tangent import StepLayouts, lanes_of, step_function
-from notchflex.analysis.outputs import report_quantities
 from notchflex.analysis.solve import prepare_for
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import LoadPath
@@ -28,7 +27,7 @@ from notchflex.solver.continuation import SolverState, solve_load_step
 from notchflex.solver.derived.quantities import believable, unpad_quantity
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import DEFAULT, Settings
-from notchflex.solver.programs.capacity import pad_rows, padded_indices
+from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
 
@@ -50,6 +49,24 @@ class Response(NamedTuple):
     jacobian: Float[np.ndarray, "m t"]
     converged: bool
     whole: bool
+
+
+class _Places(NamedTuple):
+    """Where a packed state holds what control needs of it.
+
+    Attributes:
+        tension: Base tension of every tendon, (t,).
+        stroke: Its stroke, (t,).
+        first_ratio: Log ratio of its first contact, (t,).
+        first_bound: Largest of that, (t,).
+        bounds: Of all its contacts, one array per tendon.
+    """
+
+    tension: np.ndarray
+    stroke: np.ndarray
+    first_ratio: np.ndarray
+    first_bound: np.ndarray
+    bounds: tuple[np.ndarray, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +117,48 @@ class DriveModel:
         own = self.prepared.state.pack(fitted(self.start, self.prepared.chain))
         return pad_rows(np.asarray(own), self.prepared.state, self.prepared.long.state)
 
-    def unpack(self, state: Float[np.ndarray, " state"]) -> SolverState:
-        """Return a packed state as arrays of the robot."""
-        own, long = self.prepared.state, self.prepared.long.state
-        return own.unpack(state[padded_indices(own, long)])
+    def drives(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
+        """Return tensions (N), of tendons driven by stroke strokes (mm), of a packed state."""
+        places = self._places
+        by_stroke = ~np.isnan(self.load.stroke[0])
+        return np.where(by_stroke, state[places.stroke], state[places.tension])
+
+    def dead_band(
+        self, state: Float[np.ndarray, " state"]
+    ) -> tuple[Float[np.ndarray, " t"], Float[np.ndarray, " t"]]:
+        """Return between which drives nothing moves, as the first contact of a tendon sticks.
+
+        Exactly so while the other tendons stay as they are. A stroke always moves something.
+        """
+        drive, places = self.drives(state), self._places
+        by_stroke = ~np.isnan(self.load.stroke[0])
+        ratio, bound = state[places.first_ratio], state[places.first_bound]
+        low, high = (drive * np.exp(-ratio + side * bound) for side in (-1.0, 1.0))
+        still = by_stroke | (np.abs(ratio) > bound)
+        low = np.where(still, drive, np.minimum(low, drive))
+        return low, np.where(still, drive, np.maximum(high, drive))
+
+    def friction(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
+        """Return the logarithm of the largest tension ratio over all contacts of every tendon."""
+        return np.array([state[places].sum() for places in self._places.bounds])
+
+    @cached_property
+    def _places(self) -> _Places:
+        long = self.prepared.long
+        numbers: SolverState = jax.tree.unflatten(long.state.structure, long.state.indices)
+        chain = self.prepared.chain
+        ratios, bounds = ([np.zeros(0, int)] * chain.tendons for _ in range(2))
+        memory: Any = numbers.memory
+        for group, ratio, bound in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
+            for column, tendon in enumerate(group.numbers):
+                edges = np.asarray(chain.contacts)[tendon]
+                edges = edges[edges >= 0]
+                ratios[tendon] = ratio[edges // 2, column, edges % 2]
+                bounds[tendon] = bound[edges // 2, column, edges % 2]
+        point: Any = numbers.point
+        ratio, bound = (np.array([one[0] for one in every]) for every in (ratios, bounds))
+        drawn: Any = numbers.stroke
+        return _Places(point.base_tension, drawn, ratio, bound, tuple(bounds))
 
     @cached_property
     def slices(self) -> dict[str, slice]:
@@ -120,18 +175,15 @@ class DriveModel:
     def _selected(self) -> dict[str, tuple[tuple[int, ...], np.ndarray]]:
         """Shape of each output of the robot itself, and where its numbers are in the padded one."""
         long, begin = self.prepared.long.chain, 0
+        sizes = {"tendon": long.tendons, "notch": long.flexures, "body": long.flexures + 1}
         found: dict[str, tuple[tuple[int, ...], np.ndarray]] = {}
-        shapes = jax.eval_shape(self._report, long, self.prepared.long.rest)
-        for name in self.outputs:  # JAX sorts dictionaries
-            shape = shapes[name].shape
+        for name in self.outputs:
+            shape = [sizes.get(axis, 3) for axis in REGISTERED[name].per]
             places = begin + np.arange(int(np.prod(shape))).reshape(shape)
             begin += places.size
             own = unpad_quantity(self.prepared.chain, name, places.astype(float))
             found[name] = (own.shape, own.ravel().astype(int))
         return found
-
-    def _report(self, chain: Any, state: SolverState) -> dict[str, Array]:
-        return report_quantities(chain, state, self.outputs)
 
     @cached_property
     def _own(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
 import numpy as np
@@ -11,7 +11,7 @@ from notchflex.control.branches import Approach, approach_target
 from notchflex.control.drive_model import DriveModel
 from notchflex.control.following import Following, Reach
 from notchflex.control.limits import Drive, Limits, bounds_of_robot
-from notchflex.control.search import Attempt, Problem, TargetSearch
+from notchflex.control.problem import Attempt, Problem, TargetSearch
 from notchflex.control.targets import Aim, Targets, aim_at, make_targets
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
@@ -22,6 +22,11 @@ from notchflex.robot import Robot
 
 # Drives are sought up to so many times what about closes a notch, where no limit is given.
 _MOST = {"tension": 4.0, "stroke": 2.0}
+# A program is compiled for every set of quantities; those of a group cost little beside each other.
+_ASKED_TOGETHER = (
+    ("tip_position", "tip_rotation", "total_angle"),
+    ("tension", "stroke", "peak_strain", "gap"),
+)
 
 
 def reach(
@@ -152,7 +157,8 @@ def _follow(
     for goal in aim.goals:
         low = np.maximum(problem.low, np.where(problem.driven, present - rate, -np.inf))
         high = np.minimum(problem.high, np.where(problem.driven, present + rate, np.inf))
-        near = problem._replace(low=np.minimum(low, high), high=high)
+        chosen = problem.chosen | np.isfinite(rate)
+        near = problem._replace(low=np.minimum(low, high), high=high, chosen=chosen)
         way = approach_target(near, before, present, goal, approach, known)
         if way.via is not None:
             drives.append(way.via)
@@ -205,8 +211,8 @@ def make_problem(
     low, high = limits.bounds(drive, tendons)
     fixed = np.where(np.isnan(given.stroke[0]), given.tension[0], given.stroke[0])
     bounds = tuple(bounds_of_robot(limits, drive, tendons, robot.number_of_notches))
-    outputs = tuple(dict.fromkeys([*targets.outputs, *(one.quantity for one in bounds)]))
-    model = DriveModel(robot, _driven(given, drive, held), outputs, state)
+    outputs = [*targets.outputs, *(one.quantity for one in bounds)]
+    model = DriveModel(robot, _driven(given, drive, held), _together(outputs), state)
     chain = model.prepared.chain
     unit = float(chain.closing_force)
     if drive == "stroke":
@@ -232,11 +238,16 @@ def make_problem(
     return problem, aim
 
 
+def _together(outputs: Sequence[str]) -> tuple[str, ...]:
+    """Quantities that are asked, with those usually asked beside them: fewer programs."""
+    groups = [group for group in _ASKED_TOGETHER if set(group) & set(outputs)]
+    usual = [name for group in groups for name in group]
+    return tuple(dict.fromkeys([*usual, *sorted(set(outputs))]))
+
+
 def present_drives(problem: Problem, state: np.ndarray) -> np.ndarray:
     """Return the drives of a packed state; of held tendons what they are held at."""
-    solved = problem.model.unpack(state)
-    values = solved.point.base_tension if problem.by_tension else solved.stroke
-    return np.where(problem.driven, np.asarray(values), problem.low)
+    return np.where(problem.driven, problem.model.drives(state), problem.low)
 
 
 def _driven(given: LoadPath, drive: Drive, held: np.ndarray) -> LoadPath:

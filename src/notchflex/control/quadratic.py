@@ -13,39 +13,53 @@ _VIOLATION = 1e6
 def least_step(
     hessian: Float[np.ndarray, "t t"],
     gradient: Float[np.ndarray, " t"],
+    low: Float[np.ndarray, " t"],
+    high: Float[np.ndarray, " t"],
     limits: Float[np.ndarray, "c t"],
     room: Float[np.ndarray, " c"],
 ) -> Float[np.ndarray, " t"]:
-    r"""Minimise $d^T H d / 2 + g^T d$ where $C d \le b$.
+    r"""Minimise $d^T H d / 2 + g^T d$ where $l \le d \le h$ and $C d \le b$.
 
     The problem is turned into one of least distance and that into non-negative least squares
-    (Lawson and Hanson 1974, *Solving Least Squares Problems*, ch. 23): exact, and a few
+    (Lawson and Hanson 1974, *Solving Least Squares Problems*, ch. 23): exact, and some ten
     microseconds for few drives.
 
     Args:
         hessian: H, positive definite.
         gradient: g.
+        low: l.
+        high: h.
         limits: C.
         room: b.
 
     Returns:
-        The step. Where the limits contradict each other, the one that violates them least.
+        The step. Where the limits contradict each other it is within l and h, and violates the
+        others little.
     """
-    free = np.linalg.solve(hessian, -gradient)
-    excess = limits @ free - room
-    if not (excess > 0.0).any():
+    one = len(gradient) == 1
+    free = -gradient / hessian[0, 0] if one else np.linalg.solve(hessian, -gradient)
+    inside = (free >= low).all() and (free <= high).all()
+    if inside and (not room.size or (limits @ free <= room).all()):
         return free
+    if one and not room.size:
+        return np.minimum(np.maximum(free, low), high)
+    eye = np.eye(len(gradient))
+    every = np.concatenate([eye, -eye, limits])
+    excess = np.concatenate([free - high, low - free, limits @ free - room])
     factor = np.linalg.cholesky(hessian)
-    inward = -np.linalg.solve(factor, limits.T)  # columns: limits in the metric of the Hessian
-    size = np.linalg.norm(inward, axis=0)
+    inward = -np.linalg.solve(factor, every.T)  # columns: limits in the metric of the Hessian
+    size = np.sqrt((inward**2).sum(axis=0))
     size[size == 0.0] = 1.0
     least = _least_distance(inward / size, excess / size)
     if least is None:
-        broken = limits[excess > 0.0]
+        broken = every[excess > 0.0]
         weight = _VIOLATION * np.trace(hessian) / max(float(np.sum(broken**2)), 1e-300)
         stiffer = hessian + weight * broken.T @ broken
-        return np.linalg.solve(stiffer, weight * broken.T @ room[excess > 0.0] - gradient)
-    return free + np.linalg.solve(factor.T, least)
+        pull = weight * broken.T @ (broken @ free - excess[excess > 0.0])
+        step = np.linalg.solve(stiffer, pull - gradient)
+    else:
+        step = free + np.linalg.solve(factor.T, least)
+    return np.minimum(np.maximum(step, low), high)
 
 
 def _least_distance(
