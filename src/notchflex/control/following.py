@@ -139,7 +139,7 @@ class Reach(Displayed):
         >>> from notchflex import load_robot, reach
         >>> found = reach(load_robot("pacheco2021-a"), {"total_angle": 1.0}, approach="direct")
         >>> f"{found.tension[0]:.4f} N", found.code
-        ('1.1085 N', '')
+        ('1.0601 N', '')
     """
 
     def __init__(self, following: Following, target: int) -> None:

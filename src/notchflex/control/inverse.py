@@ -125,7 +125,7 @@ def follow(
         >>> forward = simulate(wrist, pull(0.5, 1.0, steps=6).release())
         >>> found = follow(wrist, forward.tip_position)
         >>> bool(found.reached.all()), bool(abs(found.tension - forward.tension).max() < 1e-6)
-        (True, False)
+        (True, True)
     """
     checked = make_targets(targets, check_is_robot(robot), several=True)
     return _follow(robot, checked, state, load, drive, limits, approach, weights, search)
