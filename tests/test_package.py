@@ -27,6 +27,7 @@ NAMES = [
     "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus", "Kink",
     "ConvergenceError", "ErrorCode", "Failure", "Settings",
     "BodyForce", "save_path", "read_path", "read_table",
+    "reach", "follow", "read_targets", "Reach", "Following", "Limits", "TargetSearch", "Targets",
     "StripNotch", "ULink", "Corner",
     "Elastica", "elastica", "modulus_from_single_notch",
     "FrictionReadings", "FrictionRig", "friction_rig", "read_friction_rig",

@@ -148,6 +148,19 @@ _HOME = {
         ),
         "notchflex.workspaces",
     ),
+    **dict.fromkeys(
+        (
+            "Following",
+            "Limits",
+            "Reach",
+            "TargetSearch",
+            "Targets",
+            "follow",
+            "reach",
+            "read_targets",
+        ),
+        "notchflex.control",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

@@ -22,6 +22,14 @@ from notchflex.analysis import tip_response as tip_response
 from notchflex.analysis import uncertain as uncertain
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
+from notchflex.control import Following as Following
+from notchflex.control import Limits as Limits
+from notchflex.control import Reach as Reach
+from notchflex.control import Targets as Targets
+from notchflex.control import TargetSearch as TargetSearch
+from notchflex.control import follow as follow
+from notchflex.control import reach as reach
+from notchflex.control import read_targets as read_targets
 from notchflex.errors import ConvergenceError as ConvergenceError
 from notchflex.errors import ErrorCode as ErrorCode
 from notchflex.errors import Failure as Failure

@@ -72,6 +72,13 @@ VERBS = {
         "Show a robot in the browser, with sliders for its tendons and loads.",
         "notchflex view pacheco2021-a --open\n    notchflex view two-axis-wrist --port 9000",
     ),
+    "follow": (
+        "Find the tensions or strokes that bring the tip to one target after the other.",
+        "notchflex simulate pacheco2021-a --tension 0.5:1:6,1:0.5:6 --csv loop.csv\n"
+        "    cut -d, -f4-6 loop.csv > targets.csv\n"
+        "    notchflex follow pacheco2021-a targets.csv --plot follow.png\n"
+        "    notchflex follow pacheco2021-a targets.csv --approach unloading --most-tension 2",
+    ),
     "compare": (
         "Compare a robot with measured angles and tip positions.",
         "notchflex simulate pacheco2021-a --tension 0:2:9,2:0:9 --csv loop.csv\n"

@@ -3,6 +3,7 @@
 from notchflex.plotting.animation import save_animation
 from notchflex.plotting.batch import batch_picture
 from notchflex.plotting.beside import beside_picture
+from notchflex.plotting.control.following import following_picture
 from notchflex.plotting.drawings.dimensioned import dimensioned_figure
 from notchflex.plotting.fits.calibration import calibration_picture
 from notchflex.plotting.fits.comparison import comparison_figure, comparison_picture
@@ -22,6 +23,7 @@ __all__ = [
     "comparison_figure",
     "comparison_picture",
     "dimensioned_figure",
+    "following_picture",
     "friction_picture",
     "path_figure",
     "path_picture",

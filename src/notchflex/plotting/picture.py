@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 from notchflex.errors import InputError
 from notchflex.plotting.batch import batch_picture
 from notchflex.plotting.beside import beside_picture
+from notchflex.plotting.control.following import following_picture
 from notchflex.plotting.fits.calibration import calibration_picture
 from notchflex.plotting.fits.comparison import comparison_picture
 from notchflex.plotting.fits.friction import friction_picture
@@ -24,8 +25,8 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
     Args:
         result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a
-            `Comparison`, a `Calibration`, a `FrictionRig`, a `SensedForce`, a `Workspace`, or a dict of label
-            to path for several beside each other.
+            `Comparison`, a `Calibration`, a `FrictionRig`, a `SensedForce`, a `Workspace`, a
+            `Following`, or a dict of label to path for several beside each other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -50,6 +51,7 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 def _picture(result: Any) -> Picture:
     from notchflex.analysis import Bands, Batch
     from notchflex.comparison import Comparison
+    from notchflex.control import Following
     from notchflex.results import Equilibrium, EquilibriumPath
     from notchflex.robot import Robot
 
@@ -58,6 +60,7 @@ def _picture(result: Any) -> Picture:
         EquilibriumPath: path_picture,
         Equilibrium: lambda state: state_picture(state.path, state.step),
         Batch: batch_picture,
+        Following: following_picture,
         Bands: lambda bands: path_picture(bands.path, bands=bands),
         Comparison: comparison_picture,
     }
