@@ -83,5 +83,10 @@ from notchflex.robot import list_robots as list_robots
 from notchflex.robot import load_robot as load_robot
 from notchflex.robot import save_robot as save_robot
 from notchflex.solver.newton import Settings as Settings
+from notchflex.tolerancing import AcceptanceLimit as AcceptanceLimit
+from notchflex.tolerancing import ToleranceAnalysis as ToleranceAnalysis
+from notchflex.tolerancing import ToleranceSpec as ToleranceSpec
+from notchflex.tolerancing import read_tolerance_spec as read_tolerance_spec
+from notchflex.tolerancing import tolerance_analysis as tolerance_analysis
 
 __version__: str
