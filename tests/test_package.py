@@ -34,6 +34,8 @@ NAMES = [
     "Calibration", "Constant", "LeastSquares", "SumOfDistances", "SumOfRobotErrors", "leave_out",
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
+    "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
+    "read_tolerance_spec",
 ]
 # fmt: on
 

@@ -11,6 +11,7 @@ from notchflex.plotting.output import Picture
 from notchflex.plotting.path import path_figure, path_picture, state_picture
 from notchflex.plotting.picture import picture
 from notchflex.plotting.style import save
+from notchflex.plotting.tolerances.tolerances import tolerance_picture
 
 __all__ = [
     "Picture",
@@ -27,4 +28,5 @@ __all__ = [
     "save",
     "save_animation",
     "state_picture",
+    "tolerance_picture",
 ]

@@ -14,6 +14,7 @@ from notchflex.plotting.fits.comparison import comparison_picture
 from notchflex.plotting.fits.friction import friction_picture
 from notchflex.plotting.output import Picture
 from notchflex.plotting.path import path_picture, robot_picture, state_picture
+from notchflex.plotting.tolerances.tolerances import tolerance_picture
 
 if TYPE_CHECKING:
     from notchflex.results import EquilibriumPath
@@ -24,8 +25,8 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
     Args:
         result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a
-            `Comparison`, a `Calibration`, a `FrictionRig`, or a dict of label to path for several
-            beside each other.
+            `Comparison`, a `Calibration`, a `FrictionRig`, a `ToleranceAnalysis`, or a dict of
+            label to path for several beside each other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -66,14 +67,18 @@ def _picture(result: Any) -> Picture:
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
     if not isinstance(result, tuple(kinds)):
         from notchflex.fit import Calibration, FrictionRig  # takes a second
+        from notchflex.tolerancing import ToleranceAnalysis
 
         kinds |= {Calibration: calibration_picture}
+
         kinds |= {FrictionRig: friction_picture}
+        kinds |= {ToleranceAnalysis: tolerance_picture}
     for kind, describe in kinds.items():
         if isinstance(result, kind):
             return describe(result)
     raise InputError.WRONG_TYPE(
         "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, "
-        "Bands, a Comparison, a Calibration, a FrictionRig or a dict of paths; got "
+        "Bands, a Comparison, a Calibration, a FrictionRig, a ToleranceAnalysis or a dict of "
+        "paths; got "
         f"{type(result).__name__}."
     )
