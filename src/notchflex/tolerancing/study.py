@@ -13,11 +13,11 @@ from jaxtyping import Bool, Float, Int
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.batch import simulate_batch
 from notchflex.analysis.uncertainty.draws import Source, sources_of, values_at
-from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
+from notchflex.robot.varied import VariedRobots
 from notchflex.solver.newton import Settings
 from notchflex.tolerancing.criteria import Criterion
 
@@ -110,18 +110,12 @@ class Study:
             progress: Called with the robots done and all of them.
         """
         values = np.full((count, len(self.criteria)), np.nan)
-        robots: list[Robot] = []
-        rows: list[int] = []
-        for row in range(count):
-            try:
-                robots.append(self.exact.with_values({k: float(v[row]) for k, v in drawn.items()}))
-            except InputError:
-                continue
-            rows.append(row)
-        codes = np.full(count, INVALID)
-        codes[rows] = ACCEPTED
+        every = VariedRobots(self.exact, drawn)
+        valid = every.valid()
+        robots, rows = every.take(valid), np.flatnonzero(valid)
+        codes = np.where(valid, ACCEPTED, INVALID)
         for number, (name, load) in enumerate(self.loads.items()):
-            if not rows:
+            if not len(rows):
                 break
             own = [index for index, one in enumerate(self.criteria) if one.load == name]
             outputs = tuple(dict.fromkeys(self.criteria[index].quantity.name for index in own))
@@ -142,7 +136,7 @@ class Study:
                     there, criterion.of(turned[criterion.quantity.name]), np.nan
                 )
             failed = ~good.all(axis=1)
-            codes[np.asarray(rows)[failed]] = FAILED
+            codes[rows[failed]] = FAILED
         codes[(codes == ACCEPTED) & ~self.within(values).all(axis=1)] = REJECTED
         return Outcomes(values, codes)
 
