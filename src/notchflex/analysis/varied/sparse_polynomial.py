@@ -121,8 +121,10 @@ def fit_polynomial(
     high: Float[np.ndarray, " d"],
     cliques: Iterable[Sequence[int]],
     scale_of: VectorOf,
+    parts: Sequence[Int[np.ndarray, ...]],
     *,
     tolerance: float,
+    aim: float,
     most: int,
     checks: Float[np.ndarray, "k d"],
 ) -> SparsePolynomial | None:
@@ -134,7 +136,10 @@ def fit_polynomial(
         high: Upper ends, above the lower ones.
         cliques: Places of variables that act together.
         scale_of: From the largest size of every entry to what errors are measured in.
+        parts: Places of entries that answer the numbers alike; of each it is found by itself which
+            products of powers it needs.
         tolerance: Largest error in parts of the scale.
+        aim: Terms that are smaller are left out at first, in parts of the scale.
         most: How many exact vectors may be evaluated.
         checks: Numbers at which the error is measured.
 
@@ -151,12 +156,15 @@ def fit_polynomial(
 
     count = len(middle)
     scale = scale_of(np.abs(at((0,) * count)))
-    changes = [_changes(at, variable, count, scale, tolerance) for variable in range(count)]
-    if any(one is None for one in changes) or len(known) > most:
-        return None
+    changes: list[np.ndarray] = []
+    for variable in range(count):
+        found = _changes(at, variable, count, scale, parts, aim)
+        if found is None or len(known) > most:
+            return None
+        changes.append(found)
     for share in (1.0, 0.1, 0.01):
-        wanted = share * tolerance
-        indices = _indices([one for one in changes if one is not None], cliques, wanted, most)
+        wanted = share * aim
+        indices = _indices(changes, cliques, wanted, most)
         if indices is None:
             return None
         terms = _Terms.of(indices)
@@ -174,53 +182,52 @@ def _changes(
     variable: int,
     count: int,
     scale: np.ndarray,
-    tolerance: float,
-) -> Float[np.ndarray, " degrees"] | None:
-    """How much each further point along a variable changes, in parts of the scale; not rising."""
+    parts: Sequence[np.ndarray],
+    aim: float,
+) -> Float[np.ndarray, "parts degrees"] | None:
+    """How much each further point along a variable changes each part, in parts of the scale."""
     points = leja_points()
     values: list[np.ndarray] = []
-    sizes: list[float] = []
+    sizes: list[np.ndarray] = []
     for degree in range(_DEGREE + 1):
         index = [0] * count
         index[variable] = degree
         value = at(tuple(index))
-        before = 0.0
-        if values:
+        if degree:
             basis = _Terms.of([(power,) for power in range(degree)]).at(points[: degree + 1, None])
             before = basis[:, degree] @ np.linalg.solve(basis[:, :degree].T, np.stack(values))
+            change = np.abs(value - before) / scale
+            sizes.append(np.array([np.max(change[part], initial=0.0) for part in parts]))
         values.append(value)
-        sizes.append(float(np.max(np.abs(value - before) / scale)) if degree else 1.0)
-        small = 1e-2 * tolerance
-        if degree > 1 and sizes[-1] < small and sizes[-2] < small:
-            return np.minimum(np.maximum.accumulate(np.array(sizes[:-2])[::-1])[::-1], 1.0)
+        if degree > 1 and max(sizes[-1].max(), sizes[-2].max()) < 0.1 * aim:
+            kept = np.stack([np.ones(len(parts)), *sizes[:-2]], axis=-1)
+            # None smaller than a later one, so that no term comes without those that divide it.
+            return np.minimum(np.maximum.accumulate(kept[:, ::-1], axis=1)[:, ::-1], 1.0)
     return None
 
 
 def _indices(
-    changes: Sequence[Float[np.ndarray, " degrees"]],
+    changes: Sequence[Float[np.ndarray, "parts degrees"]],
     cliques: Iterable[Sequence[int]],
     wanted: float,
     most: int,
 ) -> list[tuple[int, ...]] | None:
     """Products of powers that matter, none without those that divide it; None if too many."""
-    found: dict[tuple[int, ...], None] = {}
+    found: dict[tuple[int, ...], None] = {(0,) * len(changes): None}
     for clique in cliques:
-        partial: list[tuple[tuple[int, ...], float]] = [((), 1.0)]
-        for variable in clique:
-            sizes = changes[variable]
-            partial = [
-                ((*powers, degree), size * float(own))
-                for powers, size in partial
-                for degree, own in enumerate(sizes)
-                if degree == 0 or size * own >= wanted
-            ]
-            if len(partial) > most:
-                return None
-        for powers, _ in partial:
-            index = [0] * len(changes)
-            for variable, power in zip(clique, powers, strict=True):
-                index[variable] = power
-            found[tuple(index)] = None
+        for part in range(len(changes[0])):
+            partial = [(next(iter(found)), 1.0)]
+            for variable in clique:
+                further = changes[variable][part, 1:]
+                partial += [
+                    ((*powers[:variable], degree, *powers[variable + 1 :]), size * float(own))
+                    for powers, size in partial
+                    for degree, own in enumerate(further, start=1)
+                    if size * own >= wanted
+                ]
+                if len(partial) > most:
+                    return None
+            found |= dict.fromkeys(powers for powers, _ in partial)
     return list(found) if len(found) <= most else None
 
 

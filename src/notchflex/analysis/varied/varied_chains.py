@@ -27,10 +27,13 @@ from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.static_structure import StaticStructure
 
-TOLERANCE = 1e-6
-"""Largest error of an entry, in parts of its own size or, if larger, 1e-6 of that of its array."""
+TOLERANCE = 1e-5
+"""Largest error of an entry, in parts of its own size or, if larger, 1 % of that of its array."""
 
-_FLOOR = 1e-6
+_AIM = 1e-6
+"""Terms of a polynomial that are smaller are left out, of the same parts."""
+
+_FLOOR = 1e-2
 _CHECKS = 8
 _MOST_NODES = 2000
 _WIDER = 1.05
@@ -43,6 +46,12 @@ class _Form(NamedTuple):
     chain: PytreeLayout
     command: PytreeLayout
     steps: int
+
+    @property
+    def parts(self) -> list[np.ndarray]:
+        """Places of the arrays of the chain, and last of the commands."""
+        own = [part.ravel() for part in self.chain.indices if part.size]
+        return [*own, self.chain.size + np.arange(self.steps * self.command.size)]
 
 
 class _AnotherFormError(Exception):
@@ -163,7 +172,9 @@ def _fitted(
                 middle + wider * half,
                 list(robots.cliques()),
                 lambda sizes: _scale(sizes, form),
+                form.parts,
                 tolerance=TOLERANCE,
+                aim=_AIM,
                 most=min(_MOST_NODES, len(table) // 3),
                 checks=table[rows],
             )
@@ -181,8 +192,7 @@ def _fitted(
 def _scale(sizes: Float[np.ndarray, " m"], form: _Form) -> Float[np.ndarray, " m"]:
     """Return the size of every entry, and at least a small part of the largest of its array."""
     scale = np.array(sizes)
-    parts = [*form.chain.indices, np.arange(form.chain.size, len(sizes))]
-    for part in parts:
+    for part in form.parts:
         own = sizes[part]
         finite = own[np.isfinite(own)]
         scale[part] = np.maximum(own, _FLOOR * max(finite.max(initial=0.0), 1e-12))
