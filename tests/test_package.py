@@ -36,6 +36,8 @@ NAMES = [
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
     "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
+    "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
+    "read_tolerance_spec",
 ]
 # fmt: on
 

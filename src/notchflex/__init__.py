@@ -161,6 +161,16 @@ _HOME = {
         ),
         "notchflex.control",
     ),
+    **dict.fromkeys(
+        (
+            "AcceptanceLimit",
+            "ToleranceAnalysis",
+            "ToleranceSpec",
+            "read_tolerance_spec",
+            "tolerance_analysis",
+        ),
+        "notchflex.tolerancing",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

@@ -94,6 +94,11 @@ from notchflex.sensing import SensedForce as SensedForce
 from notchflex.sensing import SensorNoise as SensorNoise
 from notchflex.sensing import sense as sense
 from notchflex.solver.newton import Settings as Settings
+from notchflex.tolerancing import AcceptanceLimit as AcceptanceLimit
+from notchflex.tolerancing import ToleranceAnalysis as ToleranceAnalysis
+from notchflex.tolerancing import ToleranceSpec as ToleranceSpec
+from notchflex.tolerancing import read_tolerance_spec as read_tolerance_spec
+from notchflex.tolerancing import tolerance_analysis as tolerance_analysis
 from notchflex.workspaces import Workspace as Workspace
 from notchflex.workspaces import workspace as workspace
 

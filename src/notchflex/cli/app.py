@@ -94,6 +94,12 @@ VERBS = {
         "    notchflex calibrate pacheco2021-a=a.csv pacheco2021-b=b.csv --leave-out robot \\\n"
         "        --fit material.elastic_modulus,friction.coefficient --plot fit.png",
     ),
+    "tolerance": (
+        "Find out what tolerances do: worst case, yield, which dimension to control.",
+        "notchflex tolerance pacheco2021-a limits.toml\n"
+        "    notchflex tolerance pacheco2021-a limits.toml --draws 10000 --plot tolerances.png \\\n"
+        "        --csv robots.csv --json -",
+    ),
     "friction-rig": (
         "Find the coefficient of friction from two hanging weights.",
         "echo weight_1_g,weight_2_g,turn_1_deg,turn_2_deg > readings.csv\n"

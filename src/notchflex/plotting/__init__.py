@@ -13,6 +13,7 @@ from notchflex.plotting.path import path_figure, path_picture, state_picture
 from notchflex.plotting.picture import picture
 from notchflex.plotting.sensing.sensed import sensed_picture
 from notchflex.plotting.style import save
+from notchflex.plotting.tolerances.tolerances import tolerance_picture
 from notchflex.plotting.workspace.cloud import workspace_picture, workspaces_picture
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "save_animation",
     "sensed_picture",
     "state_picture",
+    "tolerance_picture",
     "workspace_picture",
     "workspaces_picture",
 ]

@@ -34,7 +34,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
     path = _find(name_or_path)
     shown = path.stem if path.parent == READY else str(path)
     text = _read_text(path, shown)
-    table = _parse(text, shown)
+    table = parse_toml(text, shown)
     try:
         robot = from_table(table)
     except InputError as error:
@@ -55,7 +55,7 @@ def robot_from_text(text: str, shown: str = "robot file") -> Robot:
     Raises:
         InputError: The text is no TOML, or a value in it is not allowed.
     """
-    return remember_source(from_table(_parse(text, shown)), text)
+    return remember_source(from_table(parse_toml(text, shown)), text)
 
 
 def _find(name_or_path: str | os.PathLike[str]) -> Path:
@@ -100,7 +100,16 @@ def _read_text(path: Path, shown: str) -> str:
         raise RobotFileError.FILE_UNREADABLE(f"{shown} cannot be read: {reason}.") from None
 
 
-def _parse(text: str, shown: str) -> dict[str, Any]:
+def parse_toml(text: str, shown: str) -> dict[str, Any]:
+    """Read the text of a TOML file.
+
+    Args:
+        text: The text.
+        shown: What messages call it.
+
+    Raises:
+        InputError: The text is no TOML; the message names the line.
+    """
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -120,6 +129,4 @@ def _parse(text: str, shown: str) -> dict[str, Any]:
             f"{shown} holds a number that cannot be read: {error}."
         ) from None
     except RecursionError:
-        raise RobotFileError.FILE_UNREADABLE(
-            f"{shown} is nested too deeply for a robot file."
-        ) from None
+        raise RobotFileError.FILE_UNREADABLE(f"{shown} is nested too deeply.") from None

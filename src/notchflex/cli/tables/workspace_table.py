@@ -39,7 +39,9 @@ def print_workspace(label: str, document: dict[str, Any]) -> None:
     for axis, (low, high) in document["extent_mm"].items():
         console.print(f"{axis}  {low:.3f} to {high:.3f} mm")
     hull, alpha, voxels = document["convex_hull"], document["alpha_shape"], document["voxels"]
-    console.print(f"convex hull {hull['size']:.5g} {hull['unit']}, alpha shape {alpha['size']:.4g} {alpha['unit']}")
+    console.print(
+        f"convex hull {hull['size']:.5g} {hull['unit']}, alpha shape {alpha['size']:.4g} {alpha['unit']}"
+    )
     console.print(
         f"dexterity {100 * voxels['dexterity_mean']:.2g} % of directions in a voxel of "
         f"{voxels['edge_mm']:.3g} mm, up to {100 * voxels['dexterity_largest']:.2g} %",

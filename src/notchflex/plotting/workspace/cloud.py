@@ -121,9 +121,7 @@ def _plane(found: Workspace, across: int, title: str) -> Panel:
     return Panel(items, *labels, title=title, legend=BESIDE, equal=True)
 
 
-def _map(
-    points: NDArray[np.float64], values: NDArray[np.float64], name: str, across: int
-) -> Panel:
+def _map(points: NDArray[np.float64], values: NDArray[np.float64], name: str, across: int) -> Panel:
     """Return voxels by value, in a few classes of equal width."""
     good = np.isfinite(values)
     items: list[Mark] = []
