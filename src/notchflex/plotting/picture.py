@@ -37,8 +37,8 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
     """Describe the picture of a result, whatever its kind.
 
     Args:
-        result: A robot, a path, a state, a batch, bands, a comparison, a calibration or whatever else
-            the library returns and can draw, or a dict of label to path for several beside each
+        result: A robot, a path, a state, a batch, bands, a comparison, a calibration or any other
+            result that the library can draw, or a dict of label to path for several beside each
             other.
         title: Heading; that of its kind if None.
 
