@@ -87,6 +87,12 @@ VERBS = {
         "    notchflex calibrate pacheco2021-a=a.csv pacheco2021-b=b.csv --leave-out robot \\\n"
         "        --fit material.elastic_modulus,friction.coefficient --plot fit.png",
     ),
+    "design": (
+        "Choose dimensions so that a robot does what is asked.",
+        "notchflex new wish --design\n"
+        "    notchflex design wish.toml -o designed\n"
+        "    notchflex design wish.toml --json - --quiet",
+    ),
     "friction-rig": (
         "Find the coefficient of friction from two hanging weights.",
         "echo weight_1_g,weight_2_g,turn_1_deg,turn_2_deg > readings.csv\n"

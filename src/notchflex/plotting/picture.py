@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 from notchflex.errors import InputError
 from notchflex.plotting.batch import batch_picture
 from notchflex.plotting.beside import beside_picture
+from notchflex.plotting.designs.design import design_picture
 from notchflex.plotting.fits.calibration import calibration_picture
 from notchflex.plotting.fits.comparison import comparison_picture
 from notchflex.plotting.fits.friction import friction_picture
@@ -24,8 +25,8 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
     Args:
         result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a
-            `Comparison`, a `Calibration`, a `FrictionRig`, or a dict of label to path for several
-            beside each other.
+            `Comparison`, a `Calibration`, a `FrictionRig`, a `Design`, or a dict of label to path
+            for several beside each other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -65,15 +66,16 @@ def _picture(result: Any) -> Picture:
     if is_dict and all(isinstance(one, EquilibriumPath) for one in result.values()):
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
     if not isinstance(result, tuple(kinds)):
+        from notchflex.designing import Design
         from notchflex.fit import Calibration, FrictionRig  # takes a second
 
         kinds |= {Calibration: calibration_picture}
-        kinds |= {FrictionRig: friction_picture}
+        kinds |= {FrictionRig: friction_picture, Design: design_picture}
     for kind, describe in kinds.items():
         if isinstance(result, kind):
             return describe(result)
     raise InputError.WRONG_TYPE(
         "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, "
-        "Bands, a Comparison, a Calibration, a FrictionRig or a dict of paths; got "
+        "Bands, a Comparison, a Calibration, a FrictionRig, a Design or a dict of paths; got "
         f"{type(result).__name__}."
     )
