@@ -128,6 +128,14 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "Design",
+            "DesignSpec",
+            "design",
+        ),
+        "notchflex.designing",
+    ),
+    **dict.fromkeys(
+        (
             "Comparison",
             "compare",
         ),

@@ -100,6 +100,12 @@ VERBS = {
         "    notchflex tolerance pacheco2021-a limits.toml --draws 10000 --plot tolerances.png \\\n"
         "        --csv robots.csv --json -",
     ),
+    "design": (
+        "Choose dimensions so that a robot does what is asked.",
+        "notchflex new wish --design\n"
+        "    notchflex design wish.toml -o designed\n"
+        "    notchflex design wish.toml --json - --quiet",
+    ),
     "friction-rig": (
         "Find the coefficient of friction from two hanging weights.",
         "echo weight_1_g,weight_2_g,turn_1_deg,turn_2_deg > readings.csv\n"

@@ -26,6 +26,7 @@ _KINDS = {
     "Comparison": "fits.comparison:comparison_picture",
     "Calibration": "fits.calibration:calibration_picture",
     "FrictionRig": "fits.friction:friction_picture",
+    "Design": "designs.design:design_picture",
     "ToleranceAnalysis": "tolerances.tolerances:tolerance_picture",
     "Following": "control.following:following_picture",
     "SensedForce": "sensing.sensed:sensed_picture",

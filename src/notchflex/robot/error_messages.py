@@ -230,4 +230,6 @@ _RULES = {
     "whole_number_wanted": "it must be a whole number",
     "string_type": "it must be text in quotes",
     "string_too_short": "it must not be empty",
+    "string_too_long": "it is too long",
+    "string_pattern_mismatch": "it must be a word of letters, digits, - and _",
 }

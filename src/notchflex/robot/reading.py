@@ -100,12 +100,19 @@ def _read_text(path: Path, shown: str) -> str:
         raise RobotFileError.FILE_UNREADABLE(f"{shown} cannot be read: {reason}.") from None
 
 
-def parse_toml(text: str, shown: str) -> dict[str, Any]:
+def parse_toml(
+    text: str,
+    shown: str,
+    kind: str = "robot file",
+    error_class: type[InputError] = RobotFileError,
+) -> dict[str, Any]:
     """Read the text of a TOML file.
 
     Args:
         text: The text.
         shown: What messages call it.
+        kind: What kind of file it is, for messages.
+        error_class: The class of the error.
 
     Raises:
         InputError: The text is no TOML; the message names the line.
@@ -120,13 +127,13 @@ def parse_toml(text: str, shown: str) -> dict[str, Any]:
         # "end of document" is the last line that has something on it
         line = line or len(text.rstrip().splitlines())
         at = f", column {column}" if column else ""
-        raise RobotFileError.FILE_UNREADABLE(
+        raise error_class.FILE_UNREADABLE(
             f"{shown}, line {line}{at}: this is not TOML ({what[:1].lower()}{what[1:]}); "
             "write one `key = value` a line, text in quotes."
         ) from None
     except ValueError as error:  # a whole number of thousands of digits
-        raise RobotFileError.FILE_UNREADABLE(
+        raise error_class.FILE_UNREADABLE(
             f"{shown} holds a number that cannot be read: {error}."
         ) from None
     except RecursionError:
-        raise RobotFileError.FILE_UNREADABLE(f"{shown} is nested too deeply.") from None
+        raise error_class.FILE_UNREADABLE(f"{shown} is nested too deeply for a {kind}.") from None

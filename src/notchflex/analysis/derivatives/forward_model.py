@@ -102,14 +102,33 @@ class ForwardModel:
             chain[self._places[section]] = slope(of_laws, getattr(part, key), order=2)
             return Change(None, chain)
 
+        return self.change_along(
+            lambda value: robot.with_value(name, value), number_at(robot, name), load
+        )
+
+    def change_along(
+        self, robot_at: Callable[[float], Robot], at: float, load: LoadPath, *, order: int = 6
+    ) -> Change:
+        """Differentiate arrays and loads along a family of robots.
+
+        Args:
+            robot_at: The robot of a number; only its geometry and loads on its mass may vary.
+            at: The number where.
+            load: The loads.
+            order: Order of accuracy, as for `slope`.
+
+        Raises:
+            InputError: The number cannot be varied.
+        """
+
         def packed(value: float) -> np.ndarray:
-            varied = robot.with_value(name, value)
+            varied = robot_at(value)
             ready = self._prepared(varied)
             loads, _ = ready.padded_commands(make_commands(load, varied, ready.chain))
             return np.concatenate([ready.long.vector, loads.ravel()])
 
         size = self.ready.long.chain_layout.size
-        by_number = slope(packed, number_at(robot, name))
+        by_number = slope(packed, at, order=order)
         return Change(by_number[size:].reshape(len(load), -1), by_number[:size])
 
     def load_change(
