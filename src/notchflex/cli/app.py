@@ -10,6 +10,7 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentError
 
@@ -161,11 +162,14 @@ def build() -> App:
         suppress_keyboard_interrupt=False,  # `run` reports it
         print_error=False,
     )
+    here = Path(__file__).parent
+    files = {file.stem: file.relative_to(here) for file in (here / "verbs").rglob("*.py")}
     for order, (verb, (text, examples)) in enumerate(VERBS.items()):
         name = verb.replace("-", "_")
+        module = ".".join(files[name].with_suffix("").parts)
         plural = "s" if examples.count("notchflex ") > 1 else ""
         app.command(
-            f"notchflex.cli.verbs.{name}:{name}",
+            f"notchflex.cli.{module}:{name}",
             name=verb,
             help=text,
             sort_key=order,
