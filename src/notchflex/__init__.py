@@ -179,6 +179,13 @@ _HOME = {
         ),
         "notchflex.tolerancing",
     ),
+    **dict.fromkeys(
+        (
+            "Exported",
+            "export_robot",
+        ),
+        "notchflex.export",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

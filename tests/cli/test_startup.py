@@ -31,6 +31,7 @@ ROOT_VERBS = (
     "friction-rig",
     "sense",
     "workspace",
+    "export",
     "bench",
     "doctor",
     "completion",

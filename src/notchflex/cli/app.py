@@ -126,6 +126,11 @@ VERBS = {
         "    notchflex workspace pacheco2021-a --limit strain=0.04 --states 4000 --json -\n"
         "    notchflex workspace pacheco2021-a --states 4000 --beside pacheco2021-b",
     ),
+    "export": (
+        "Write files for the laser, for CAD and for simulators.",
+        "notchflex export pacheco2021-a --dxf wrist.dxf --two-axis\n"
+        "    notchflex export two-axis-wrist --svg wrist.svg --kerf 0.025 --seam split",
+    ),
     "bench": (
         "Time the solver on this machine.",
         "notchflex bench --json bench.json\n    notchflex bench --only wrist",
