@@ -34,7 +34,7 @@ NAMES = [
     "Measurements", "read_measurements", "write_measurements",
     "Calibration", "Constant", "LeastSquares", "SumOfDistances", "SumOfRobotErrors", "leave_out",
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
-    "Exported", "export_robot",
+    "DeckOptions", "Exported", "SimulatorOptions", "export_robot",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
     "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
     "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",

@@ -181,7 +181,9 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "DeckOptions",
             "Exported",
+            "SimulatorOptions",
             "export_robot",
         ),
         "notchflex.export",

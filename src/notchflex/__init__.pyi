@@ -38,7 +38,9 @@ from notchflex.errors import ErrorCode as ErrorCode
 from notchflex.errors import Failure as Failure
 from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
+from notchflex.export import DeckOptions as DeckOptions
 from notchflex.export import Exported as Exported
+from notchflex.export import SimulatorOptions as SimulatorOptions
 from notchflex.export import export_robot as export_robot
 from notchflex.fit import Calibration as Calibration
 from notchflex.fit import Constant as Constant

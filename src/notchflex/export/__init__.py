@@ -1,5 +1,7 @@
 """Files for other programs: cut patterns, drawings, solids and models of simulators."""
 
 from notchflex.export.export import Exported, export_robot
+from notchflex.export.finite_elements.options import DeckOptions
+from notchflex.export.simulators.options import SimulatorOptions
 
-__all__ = ["Exported", "export_robot"]
+__all__ = ["DeckOptions", "Exported", "SimulatorOptions", "export_robot"]

@@ -14,7 +14,9 @@ from typing import Any
 from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.export.document import Document, Subject
+from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.options import PatternOptions, SolidOptions
+from notchflex.export.simulators.options import SimulatorOptions
 
 Builder = Callable[[Subject, Any], Document]
 
@@ -88,6 +90,34 @@ FORMATS: dict[str, Format] = {
         "notchflex.export.solids.step:step_solid",
         SolidOptions,
         (("build123d", "cad"), ("matplotlib", "plot")),
+        bends=True,
+    ),
+    "mjcf": Format(
+        "MuJoCo model",
+        (".xml", ".mjcf"),
+        "notchflex.export.simulators.document:mjcf_document",
+        SimulatorOptions,
+        bends=True,
+    ),
+    "urdf": Format(
+        "URDF model",
+        (".urdf",),
+        "notchflex.export.simulators.document:urdf_document",
+        SimulatorOptions,
+        bends=True,
+    ),
+    "transmission": Format(
+        "table of levers and joint moments, for a URDF model,",
+        (".csv",),
+        "notchflex.export.simulators.document:transmission_document",
+        SimulatorOptions,
+        bends=True,
+    ),
+    "inp": Format(
+        "deck of finite elements for CalculiX",
+        (".inp",),
+        "notchflex.export.finite_elements.document:deck_document",
+        DeckOptions,
         bends=True,
     ),
 }

@@ -16,8 +16,10 @@ from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
 from notchflex.export.export import Exported, build, write
+from notchflex.export.finite_elements.options import DeckOptions, Mesh
 from notchflex.export.formats import FORMATS, check_suffix
 from notchflex.export.options import PatternOptions, SolidOptions
+from notchflex.export.simulators.options import SimulatorOptions
 
 if TYPE_CHECKING:
     from notchflex.export.document import Subject
@@ -47,14 +49,23 @@ def export(
             help="Diameter of the channels of the tendons through the wall [mm]; 0 for none.",
         ),
     ] = 0.0,
+    mjcf: Annotated[str | None, _file("mjcf")] = None,
+    urdf: Annotated[str | None, _file("urdf")] = None,
+    transmission: Annotated[str | None, _file("transmission")] = None,
+    inp: Annotated[str | None, _file("inp")] = None,
     pattern: PatternArguments = PatternArguments(),  # noqa: B008 - frozen
+    mesh: Annotated[
+        Mesh,
+        Parameter(help="How fine the mesh of `--inp` is."),
+    ] = "medium",
     tension: Annotated[
         tuple[TendonCommand, ...],
         tendon_command("--tension"),
         Parameter(
             group=SOLIDS,
             help="Bend a solid by this tension at the base of a tendon [N], written as for "
-            "`simulate`; its last step counts.",
+            "`simulate`; its last step counts. It is the load of a deck, and the largest tension "
+            "that the joints of a simulator are fitted to.",
         ),
     ] = (),
     stroke: Annotated[
@@ -74,11 +85,24 @@ def export(
     All files are made before the first one is written. A file that is already there is replaced.
     """
     outputs = Outputs(
-        robot_files(robot), quiet=quiet, json=json, dxf=dxf, svg=svg, pdf=pdf, stl=stl, step=step
+        robot_files(robot),
+        quiet=quiet,
+        json=json,
+        dxf=dxf,
+        svg=svg,
+        pdf=pdf,
+        stl=stl,
+        step=step,
+        mjcf=mjcf,
+        urdf=urdf,
+        transmission=transmission,
+        inp=inp,
     )
     options: dict[type, Any] = {
         PatternOptions: pattern.options(),
         SolidOptions: SolidOptions(channels=channels, shank=pattern.shank, chord=pattern.chord),
+        SimulatorOptions: SimulatorOptions(),
+        DeckOptions: DeckOptions.of_mesh(mesh),
     }
     files = {name: file for name, file in outputs.targets.items() if name in FORMATS}
     if not files:
