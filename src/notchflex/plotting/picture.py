@@ -24,8 +24,8 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
     Args:
         result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a
-            `Comparison`, a `Calibration`, a `FrictionRig`, a `SensedForce`, a `Workspace`, or a dict of label
-            to path for several beside each other.
+            `Comparison`, a `Calibration`, a `FrictionRig`, a `SensedForce`, a `Workspace`, or a
+            dict of label to path for several beside each other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -81,6 +81,7 @@ def _picture(result: Any) -> Picture:
             return describe(result)
     raise InputError.WRONG_TYPE(
         "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, "
-        "Bands, a Comparison, a Calibration, a FrictionRig, a SensedForce, a Workspace or a dict of paths; got "
+        "Bands, a Comparison, a Calibration, a FrictionRig, a SensedForce, a Workspace or a "
+        "dict of paths; got "
         f"{type(result).__name__}."
     )

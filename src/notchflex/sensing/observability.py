@@ -13,7 +13,6 @@ from notchflex.sensing.bounds import Bounds
 from notchflex.sensing.history import History
 from notchflex.sensing.model import SensingModel
 
-
 # An interval this much wider than that of the noise alone is one that stuck friction leaves.
 _STUCK = 1.5
 # Components of a unit direction below this are not counted as part of it.

@@ -53,7 +53,9 @@ class Candidate:
         """The path of this candidate alone, for its derivatives."""
         if len(self.path) == 1:
             return self.path
-        return replace(self.path, load=self.path.load.part(self.row, 1), run=self.run.only(self.row))
+        return replace(
+            self.path, load=self.path.load.part(self.row, 1), run=self.run.only(self.row)
+        )
 
     @property
     def run(self) -> SolverRun:

@@ -145,9 +145,7 @@ def _result(
 ) -> SensedForce:
     count, size = len(model.readings), model.size
     found = history.best
-    left_open = [
-        LeftOpen.of(model, history, ends, number, LEVEL) for number in range(len(found))
-    ]
+    left_open = [LeftOpen.of(model, history, ends, number, LEVEL) for number in range(len(found))]
     rest = count - len(found)
     return SensedForce(
         robot=model.robot,

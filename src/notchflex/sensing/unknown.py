@@ -81,7 +81,9 @@ def _default_axes(robot: Robot) -> str:
     normal = bending_normal(robot)
     if normal is None:
         return "xy"
-    across: Sequence[str] = [axis for axis, part in zip("yx", normal, strict=False) if abs(part) > 1e-9]
+    across: Sequence[str] = [
+        axis for axis, part in zip("yx", normal, strict=False) if abs(part) > 1e-9
+    ]
     return "".join(sorted(across))
 
 

@@ -166,4 +166,6 @@ class Workspace(Displayed):
             if np.isfinite(self.hysteresis).any():
                 most = float(np.nanmax(self.hysteresis))
                 rows.append(("hysteresis", f"up to {short(most)} mm"))
-        return Summary(title, rows, ".voxels() maps dexterity, tension, strain, hysteresis, stiffness")
+        return Summary(
+            title, rows, ".voxels() maps dexterity, tension, strain, hysteresis, stiffness"
+        )

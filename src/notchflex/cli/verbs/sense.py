@@ -75,9 +75,7 @@ def sense(
     tension_noise: Annotated[
         float, *_deviation("--tension-noise", "the tensions [N]", 0.01)
     ] = 0.01,
-    stroke_noise: Annotated[
-        float, *_deviation("--stroke-noise", "the strokes [mm]", 0.01)
-    ] = 0.01,
+    stroke_noise: Annotated[float, *_deviation("--stroke-noise", "the strokes [mm]", 0.01)] = 0.01,
     tip_noise: Annotated[
         float, *_deviation("--tip-noise", "each coordinate of the tip [mm]", 0.1)
     ] = 0.1,

@@ -28,8 +28,8 @@ def workspace_picture(found: Workspace) -> Picture:
     """Describe a workspace.
 
     The convex hull and the tips in space, and below the voxels seen from the side (x or y, the
-    wider, over z), coloured by tension, peak strain, error by hysteresis, dexterity and, where it was
-    computed, stiffness.
+    wider, over z), coloured by tension, peak strain, error by hysteresis, dexterity and, where it
+    was computed, stiffness.
 
     Args:
         found: The workspace.
@@ -121,9 +121,7 @@ def _plane(found: Workspace, across: int, title: str) -> Panel:
     return Panel(items, *labels, title=title, legend=BESIDE, equal=True)
 
 
-def _map(
-    points: NDArray[np.float64], values: NDArray[np.float64], name: str, across: int
-) -> Panel:
+def _map(points: NDArray[np.float64], values: NDArray[np.float64], name: str, across: int) -> Panel:
     """Return voxels by value, in a few classes of equal width."""
     good = np.isfinite(values)
     items: list[Mark] = []
