@@ -128,10 +128,13 @@ def report(name, rows, seconds, cpu):
     before = sum(row["readings_without"] for row in rows)
     false = sum(row["false_contacts"] for row in rows)
     print(f"  false contacts                   {100 * false / before:.1f} % of {before} readings")
-    print(f"  contact shown at the end         {100 * np.mean([r['found_at_end'] for r in rows]):.0f} %")
-    print(f"  RMS error at the end             {np.sqrt(np.mean([r['error']**2 for r in rows])):.4f} N")
+    shown = 100 * np.mean([row["found_at_end"] for row in rows])
+    print(f"  contact shown at the end         {shown:.0f} %")
+    error = np.sqrt(np.mean([row["error"] ** 2 for row in rows]))
+    print(f"  RMS error at the end             {error:.4f} N")
     missed = [row for row in rows if not row["exact_holds"]]
-    print(f"  without noise: truth outside in  {len(missed)} trials {[r['number'] for r in missed][:9]}")
+    numbers = [row["number"] for row in missed][:9]
+    print(f"  without noise: truth outside in  {len(missed)} trials {numbers}")
     print(f"    widest interval                {max(row['exact_widest'] for row in rows):.4f} N")
     if missed:
         print(f"    largest miss                   {max(row['exact_miss'] for row in rows):.3g} N")

@@ -40,7 +40,8 @@ def test_a_force_that_comes_changes_and_goes_is_found_reading_by_reading(wrist, 
 
 
 def test_it_is_wrong_to_take_the_history_for_one_load_from_rest(wrist):
-    # What the contacts remember is part of the answer: a reading of the way back alone gives another force.
+    # What the contacts remember is part of the answer: a reading of the way back alone gives
+    # another force.
     path = read(wrist, TENSIONS, COMES)
     alone = sense(wrist, path.tension[5:6], path.stroke[5:6], noise=EXACT)
     assert abs(alone.force[0, 0] - COMES[5]) > 1e-3

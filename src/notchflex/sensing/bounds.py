@@ -82,7 +82,7 @@ def bounds(history: History, level: float, progress: Progress | None = None) -> 
 
 @dataclass(eq=False)
 class _Tracker:
-    """A history that is followed: its last state and force, and what it keeps extreme if it does."""
+    """A history that is followed: its last state and force, and what it keeps extreme if any."""
 
     state: SolverState | None
     force: Float[np.ndarray, " d"]

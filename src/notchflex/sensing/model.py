@@ -167,8 +167,10 @@ class SensingModel:
         if kind not in self._changes:
             forces = np.concatenate([np.zeros((1, self.size)), np.eye(self.size)])
             external = tuple(map(self.unknown.load, forces))
-            rows = (np.tile(one[:1], (len(forces), 1)) for one in (load.tension, load.stroke))
-            probe = LoadPath.of_valid(*rows, load.base_rotation, external)
+            tension, stroke = (
+                np.tile(one[:1], (len(forces), 1)) for one in (load.tension, load.stroke)
+            )
+            probe = LoadPath.of_valid(tension, stroke, load.base_rotation, external)
             packed, _ = ready.padded_commands(make_commands(probe, self.robot, ready.chain))
             self._changes[kind] = list(packed[1:] - packed[0])
         return self._changes[kind]

@@ -74,7 +74,7 @@ class SensedForce(Displayed):
     @property
     def converged(self) -> Bool[np.ndarray, " s"]:
         """Whether a force was found for each reading, (s,)."""
-        return np.isfinite(self.force).all(axis=1)
+        return np.asarray(np.isfinite(self.force).all(axis=1))
 
     @property
     def vector(self) -> Float[np.ndarray, "s 3"]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -69,9 +69,9 @@ def _columns(table: Table, columns: dict[int, str], width: int) -> np.ndarray:
     return values
 
 
-def sensed_columns(sensed: SensedForce) -> dict[str, Sequence[Any]]:
+def sensed_columns(sensed: SensedForce) -> dict[str, Any]:
     """Return columns of a table: force, interval and standard deviation of every reading."""
-    columns: dict[str, Sequence[Any]] = {"reading": range(1, len(sensed) + 1)}
+    columns: dict[str, Any] = {"reading": range(1, len(sensed) + 1)}
     for which, name in enumerate(sensed.components):
         columns |= {
             f"force_{name}_N": sensed.force[:, which],

@@ -82,7 +82,8 @@ def rays(
         seed: Of the sequence.
     """
     groups = _groups(robot, largest)
-    drawn = qmc.Sobol(2 * len(groups) + 2, seed=seed).random(2 ** int(np.ceil(np.log2(count))))
+    sequence = qmc.Sobol(2 * len(groups) + 2, rng=seed)  # pyright: ignore[reportCallIssue]
+    drawn = sequence.random(2 ** int(np.ceil(np.log2(count))))
     drawn = drawn[:count]
     directions = np.zeros((count, robot.number_of_tendons))
     for number, group in enumerate(groups):
@@ -103,8 +104,9 @@ def _groups(robot: Robot, largest: Float[np.ndarray, " t"]) -> list[list[int]]:
     """Return the tendons that are pulled, by the body where they end, in order around the tube."""
     groups: dict[int, list[int]] = {}
     for number, tendon in enumerate(robot.tendon):
+        end = robot.number_of_notches if tendon.end_body is None else tendon.end_body
         if largest[number] > 0.0:
-            groups.setdefault(tendon.end_body, []).append(number)
+            groups.setdefault(end, []).append(number)
     turn = [tendon.direction_deg % 360.0 for tendon in robot.tendon]
     return [sorted(group, key=lambda one: turn[one]) for group in groups.values()]
 

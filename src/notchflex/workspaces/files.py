@@ -61,7 +61,9 @@ def _spread(values: np.ndarray) -> dict[str, float | None]:
     if not len(good):
         return {"p5": None, "p50": None, "p95": None, "largest": None}
     parts = np.quantile(good, _PARTS)
-    named = {f"p{100 * part:g}": float(one) for part, one in zip(_PARTS, parts, strict=True)}
+    named: dict[str, float | None] = {
+        f"p{100 * part:g}": float(one) for part, one in zip(_PARTS, parts, strict=True)
+    }
     return named | {"largest": float(good.max())}
 
 

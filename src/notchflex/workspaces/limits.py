@@ -35,7 +35,7 @@ class Limit:
     def holds(self, values: Float[np.ndarray, "*k entries"]) -> Bool[np.ndarray, " *k"]:
         """Return whether all entries are within; NaN stands for an entry that is not there."""
         outside = (values < self.low) | (values > self.high)
-        return ~outside.reshape(*values.shape[:2], -1).any(axis=-1)
+        return np.asarray(~outside.reshape(*values.shape[:2], -1).any(axis=-1))
 
     @property
     def text(self) -> str:
@@ -75,8 +75,8 @@ def _limit(name: object, bounds: object) -> Limit:
     allowed = [one for one in OUTPUTS if one in QUANTITIES and QUANTITIES[one].kind is float]
     if full not in allowed:
         raise InputError.UNKNOWN_NAME(
-            f"there is no quantity {short_repr(name)} to limit; there are {', '.join(allowed)} and, "
-            f"for short, {', '.join(ALIASES)}"
+            f"there is no quantity {short_repr(name)} to limit; there are {', '.join(allowed)} "
+            f"and, for short, {', '.join(ALIASES)}"
         )
     pair = tuple(bounds) if isinstance(bounds, tuple | list) else (None, bounds)
     if len(pair) != 2 or pair == (None, None):

@@ -40,7 +40,9 @@ def print_workspace(label: str, document: dict[str, Any]) -> None:
         console.print(f"{axis}  {low:.3f} to {high:.3f} mm")
     hull, alpha, voxels = document["convex_hull"], document["alpha_shape"], document["voxels"]
     console.print(
-        f"convex hull {hull['size']:.5g} {hull['unit']}, alpha shape {alpha['size']:.4g} {alpha['unit']}"
+        f"convex hull {hull['size']:.5g} {hull['unit']}, alpha shape {alpha['size']:.4g} "
+        f"{alpha['unit']}",
+        soft_wrap=True,
     )
     console.print(
         f"dexterity {100 * voxels['dexterity_mean']:.2g} % of directions in a voxel of "
@@ -61,8 +63,8 @@ def print_overlaps(found: Sequence[Overlap]) -> None:
     console = terminal.output()
     for one in found:
         console.print(
-            f"{one.first} and {one.second}: of voxels of {one.voxel:.3g} mm {one.both} hold tips of "
-            f"both, {one.first_alone} of {one.first} alone, {one.second_alone} of {one.second} "
+            f"{one.first} and {one.second}: of voxels of {one.voxel:.3g} mm {one.both} hold tips "
+            f"of both, {one.first_alone} of {one.first} alone, {one.second_alone} of {one.second} "
             f"alone; {100 * one.first_in_second:.0f} % of {one.first} lie in the hull of "
             f"{one.second}, {100 * one.second_in_first:.0f} % of {one.second} in that of "
             f"{one.first}",

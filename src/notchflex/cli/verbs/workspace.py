@@ -109,6 +109,10 @@ def workspace(
     histories. Prints extent, convex hull, alpha shape, dexterity, and how far the tip is off at the
     same tensions by hysteresis.
     """
+    if twice := [name for name, _ in limit if [one for one, _ in limit].count(name) > 1]:
+        raise InputError.CONFLICT(
+            f"--limit {twice[0]} is given twice; give both bounds at once, as {twice[0]}=LOW:HIGH."
+        )
     inputs = [*robot_files(robot), *beside_files(beside)]
     outputs = Outputs(inputs, quiet=quiet, json=json, nc=nc, plot=plot)
     robots = beside_robots(chosen_robot(robot, settings), robot, beside)

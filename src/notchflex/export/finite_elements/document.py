@@ -12,8 +12,8 @@ from notchflex.export.finite_elements.half_tube import half_tube
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.tendon_spans import TendonSpan, tendon_spans
 from notchflex.export.simulators.document import TextDocument
+from notchflex.results.same_robot import robot_digest
 from notchflex.robot import ArcNotch, Linear
-from notchflex.robot.digest import robot_digest
 
 
 def deck_document(subject: Subject, options: DeckOptions) -> TextDocument:

@@ -28,8 +28,8 @@ def workspace_picture(found: Workspace) -> Picture:
     """Describe a workspace.
 
     The convex hull and the tips in space, and below the voxels seen from the side (x or y, the
-    wider, over z), coloured by tension, peak strain, error by hysteresis, dexterity and, where it was
-    computed, stiffness.
+    wider, over z), coloured by tension, peak strain, error by hysteresis, dexterity and, where it
+    was computed, stiffness.
 
     Args:
         found: The workspace.
