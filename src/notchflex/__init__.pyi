@@ -23,8 +23,10 @@ from notchflex.analysis import uncertain as uncertain
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
 from notchflex.designing import Design as Design
+from notchflex.designing import DesignFront as DesignFront
 from notchflex.designing import DesignSpec as DesignSpec
 from notchflex.designing import design as design
+from notchflex.designing import design_front as design_front
 from notchflex.errors import ConvergenceError as ConvergenceError
 from notchflex.errors import ErrorCode as ErrorCode
 from notchflex.errors import Failure as Failure

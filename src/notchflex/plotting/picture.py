@@ -10,6 +10,7 @@ from notchflex.errors import InputError
 from notchflex.plotting.batch import batch_picture
 from notchflex.plotting.beside import beside_picture
 from notchflex.plotting.designs.design import design_picture
+from notchflex.plotting.designs.front import front_picture
 from notchflex.plotting.fits.calibration import calibration_picture
 from notchflex.plotting.fits.comparison import comparison_picture
 from notchflex.plotting.fits.friction import friction_picture
@@ -66,11 +67,12 @@ def _picture(result: Any) -> Picture:
     if is_dict and all(isinstance(one, EquilibriumPath) for one in result.values()):
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
     if not isinstance(result, tuple(kinds)):
-        from notchflex.designing import Design
+        from notchflex.designing import Design, DesignFront
         from notchflex.fit import Calibration, FrictionRig  # takes a second
 
         kinds |= {Calibration: calibration_picture}
         kinds |= {FrictionRig: friction_picture, Design: design_picture}
+        kinds |= {DesignFront: front_picture}
     for kind, describe in kinds.items():
         if isinstance(result, kind):
             return describe(result)
