@@ -65,6 +65,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("results.quantities.path_formulas", "results.path"): _TYPE,
     ("fit.estimation.calibration", "fit.documents"): _SHOWN,
     ("designing.result", "designing.files"): "a design writes its files by a method",
+    ("designing.files", "designing.front"): _TYPE,
     ("comparison.comparison", "comparison.tables"): _SHOWN,
     ("viewer.viewer", "viewer.page.page"): "the viewer makes its page; the page acts on the viewer",
 }

@@ -129,8 +129,10 @@ _HOME = {
     **dict.fromkeys(
         (
             "Design",
+            "DesignFront",
             "DesignSpec",
             "design",
+            "design_front",
         ),
         "notchflex.designing",
     ),

@@ -31,8 +31,10 @@ from notchflex.control import follow as follow
 from notchflex.control import reach as reach
 from notchflex.control import read_targets as read_targets
 from notchflex.designing import Design as Design
+from notchflex.designing import DesignFront as DesignFront
 from notchflex.designing import DesignSpec as DesignSpec
 from notchflex.designing import design as design
+from notchflex.designing import design_front as design_front
 from notchflex.errors import ConvergenceError as ConvergenceError
 from notchflex.errors import ErrorCode as ErrorCode
 from notchflex.errors import Failure as Failure

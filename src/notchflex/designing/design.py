@@ -59,13 +59,18 @@ def design(
         >>> f"{made.robot.notches[0].height:.4f} mm"
         '0.6268 mm'
     """
-    asked, first = _given(spec, robot)
+    asked, first = given(spec, robot)
     problems = problems_of(asked, first)
     searches = search(problems, asked.search, progress)
     return made_of(asked, first, problems, searches)
 
 
-def _given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
+def given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
+    """Return a specification given in any form, and the robot to begin with.
+
+    Raises:
+        InputError: It is not allowed, or its robot cannot be read.
+    """
     if isinstance(spec, str | os.PathLike):
         asked, named = read_design(spec)
         return asked, robot or named

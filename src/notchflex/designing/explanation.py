@@ -101,6 +101,8 @@ def _objective_name(problem: Problem) -> tuple[str, str, float] | None:
     assert isinstance(asked, DesignObjective)
     if asked.target is not None:
         return f"the squared distance of {wish.title} from {asked.target:g}", "", 1.0
+    if wish.take == "rms":
+        return f"the square of {wish.title}", f"{wish.unit}²" if wish.unit else "", 1.0
     return wish.title, wish.unit, 1.0 if asked.goal == "minimise" else -1.0
 
 

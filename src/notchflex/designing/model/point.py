@@ -91,7 +91,11 @@ class Point:
 
     def value(self, path: str) -> Reading:
         """Values of the robot file."""
-        return self._of_robot(lambda robot: np.array(list(numbers_at(robot, path).values())))
+        found = numbers_at(self.robot, path)
+        values = np.array(list(found.values()))
+        if self.slopes_of is None:
+            return Reading(values, None)
+        return Reading(values, np.stack([self.variables.parts_of(one) for one in found]))
 
     def _of_robot(self, formula: Callable[[Robot], np.ndarray]) -> Reading:
         values = formula(self.robot)
@@ -131,7 +135,7 @@ class Point:
         """Return the robot with a variable moved by a part of its span."""
         x = self.x.copy()
         x[number] += part * self.variables.columns[number].span
-        return self.variables.robot_at(x)
+        return self._once(("robot", number, part), lambda: self.variables.robot_at(x))
 
     def _changes(self, model: ForwardModel, load: LoadPath) -> list[Change]:
         """Directions of all variables for a model whose loads do not depend on them."""
