@@ -13,7 +13,7 @@ from scipy.stats import qmc
 from notchflex.tolerancing.study import Study
 
 _POINTS = 4096
-_WIDEST = 8.0
+_WIDEST = 2.0
 """A tolerance is widened so many times at most."""
 _EXACT = 0.01
 """How exactly the factor on a tolerance is found."""
@@ -26,7 +26,7 @@ class Control(NamedTuple):
         exact: Yield if the source had no deviation at all, (d,).
         factor: Factor on the deviations of the source that gives the wanted yield, (d,): below 1
             they must be smaller, above 1 they may be larger. 0 where even no deviation is not
-            enough; infinite where 8 times the deviations are not too many. None where no yield is
+            enough; infinite where twice the deviations are not too many. None where no yield is
             wanted.
         robots: How many robots each yield is of.
     """
@@ -54,7 +54,7 @@ def control(
     """
     points = min(2 ** int(np.log2(max(draws, 64))), _POINTS)
     sampler = qmc.Sobol(len(study.sources), scramble=True, rng=np.random.default_rng(seed))
-    levels = np.clip(sampler.random(points), 1e-12, 1.0 - 1e-12)
+    levels = sampler.random(points)
     exact, factors = [], []
     for index in range(len(study.sources)):
         yields: dict[float, float] = {}

@@ -48,8 +48,8 @@ def tolerance_picture(found: ToleranceAnalysis) -> Picture:
     rows = -(-len(panels) // columns)
     low, high = (100.0 * end for end in found.interval)
     title = (
-        f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.4g} % "
-        f"({low:.4g} to {high:.4g} %) of {found.draws} robots"
+        f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.1f} % "
+        f"({low:.1f} to {high:.1f} %) of {found.draws} robots"
     )
     cells, size = grid(panels, columns), (0.8 + 4.2 * columns, 1.0 + 3.0 * rows)
     return Picture(title, *size, cells, _legend(found))
