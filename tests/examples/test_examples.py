@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import notchflex as nf
 from balance import left_over
 from oracles import frames
 from oracles.wrist import A, Wrist
@@ -37,15 +38,17 @@ def ran(number: int) -> tuple[dict[str, Any], str]:
     return names, printed.getvalue()
 
 
-def test_there_are_ten_and_each_asks_a_question():
-    assert [file.name[:3] for file in FILES] == [f"{number:02d}_" for number in range(1, 11)]
+def test_they_are_numbered_and_each_asks_a_question():
+    assert [file.name[:3] for file in FILES] == [
+        f"{number:02d}_" for number in range(1, len(FILES) + 1)
+    ]
     for file in FILES:
         text = file.read_text(encoding="utf-8")
         assert re.match(r'"""[^"]*\?"""\n', text), f"{file.name} begins with no question"
         assert 13 <= len(text.splitlines()) <= 50, file.name
 
 
-@pytest.mark.parametrize("number", range(1, 11))
+@pytest.mark.parametrize("number", range(1, len(FILES) + 1))
 def test_page_shows_the_example_and_what_it_prints(number):
     page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
     _, printed = ran(number)
@@ -206,3 +209,18 @@ def test_what_friction_does(margin):
         angle = np.degrees([state.angle.sum() for state in states])
         margin.within(f"bend at mu {mu}", bend - angle[30], 1e-6, "deg")
         margin.within("loop", loop - (angle[::-1] - angle)[:31].max(), 1e-6, "deg")
+
+
+def test_which_dimension_to_control():
+    names, printed = ran(11)
+    found = names["found"]
+    # Steeper than any other: a deviation of 5 % of the modulus, by its own difference.
+    bends = [
+        nf.solve(names["wrist"].with_value("material.elastic_modulus", modulus), nf.Load(0.9))
+        for modulus in (9990.0, 10010.0)
+    ]
+    spread = 500.0 * abs(bends[1].total_angle - bends[0].total_angle) / 20.0
+    index = found.sources.index("material.elastic_modulus")
+    assert abs(found.linear.spread[0, index]) == pytest.approx(spread, rel=1e-4)
+    assert found.order[0] == index
+    assert "check material.elastic_modulus" in printed

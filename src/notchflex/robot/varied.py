@@ -9,6 +9,7 @@ from typing import overload
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
 from notchflex.robot.robot import Robot
@@ -33,7 +34,7 @@ class VariedRobots(Sequence[Robot]):
     def __init__(
         self,
         robot: Robot,
-        values: Mapping[str, Sequence[float]],
+        values: Mapping[str, ArrayLike],
         ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         """Hold a robot and, by name, the numbers of every robot.

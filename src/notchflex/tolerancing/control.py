@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +15,7 @@ from notchflex.tolerancing.study import Study
 _POINTS = 4096
 _WIDEST = 2.0
 """A tolerance is widened so many times at most."""
-_EXACT = 0.01
+_EXACT = 0.02
 """How exactly the factor on a tolerance is found."""
 
 
@@ -52,7 +52,7 @@ def control(
         seed: Of the points.
         progress: Called with the sources done and all of them.
     """
-    points = min(2 ** int(np.log2(max(draws, 64))), _POINTS)
+    points = min(2 ** int(np.log2(draws)), _POINTS)
     sampler = qmc.Sobol(len(study.sources), scramble=True, rng=np.random.default_rng(seed))
     levels = sampler.random(points)
     exact, factors = [], []
@@ -88,5 +88,5 @@ def _factor(yield_at: Callable[[float], float], wanted: float) -> float:
             return np.inf
         low, high = high, 2.0 * high
     # The yield is a staircase: a root of the difference lies on a step.
-    root = brentq(lambda factor: yield_at(factor) - wanted, low, high, xtol=_EXACT * high)
+    root: Any = brentq(lambda factor: yield_at(factor) - wanted, low, high, xtol=_EXACT * high)
     return float(root)

@@ -12,7 +12,7 @@ from scipy.stats import qmc, sobol_indices
 
 from notchflex.tolerancing.study import Study
 
-_MOST, _LEAST = 2048, 64
+_MOST, _LEAST = 2048, 16
 """Points of each of the two sets; all indices need d + 2 times as many robots."""
 
 

@@ -76,7 +76,7 @@ def _source_rows(found: ToleranceAnalysis) -> list[list[str]]:
             found.sources[index], f"{100.0 * share[index]:.1f}", f"{first[index]:.2f}",
             f"{total[index]:.2f}", f"{100.0 * found.control.exact[index]:.1f}",
         ]  # fmt: skip
-        rows.append(row if factor is None else [*row, _factor(factor[index])])
+        rows.append(row if factor is None else [*row, _factor(float(factor[index]))])
     return rows
 
 

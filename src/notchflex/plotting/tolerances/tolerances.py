@@ -89,8 +89,7 @@ def _histogram(found: ToleranceAnalysis, index: int) -> Panel:
             items.append(Area(_steps(edges, tops, part), colour, colour, width=0.0, name=name))
     for end in (lower, upper):
         if np.isfinite(end):
-            look = {"width": 1.4, "layer": 4, "group": "limit"}
-            items.append(Span("x", end, end, VERMILLION, name="limit", **look))
+            items.append(Span("x", end, end, VERMILLION, width=1.4, layer=4, name="limit"))
     nominal = found.linear.nominal[index] * scale
     items.append(Span("x", nominal, nominal, GREEN, width=1.4, layer=4, name="drawing"))
     for end in found.linear.worst_case[index] * scale:
