@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from notchflex.tolerancing.study import Study
 
-_POINTS = 4096
+_POINTS = 2048
 _WIDEST = 2.0
 """A tolerance is widened so many times at most."""
 _EXACT = 0.02

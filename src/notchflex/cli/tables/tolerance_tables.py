@@ -57,7 +57,9 @@ def _limit_rows(found: ToleranceAnalysis) -> list[list[str]]:
         ends = [linear.nominal[index], *(worst / scale), linear.sd[index], low[index], high[index]]
         cells = [_number(one.lower * scale), _number(one.upper * scale)]
         cells += [_number(end * scale) for end in ends]
-        name = f"{one.name} [{unit}]" if unit else one.name
+        entry, _, place = one.name.partition(" ")
+        more = " ".join([place, f"[{unit}]" if unit else ""]).strip()
+        name = f"{entry}\n  {more}" if more else entry
         rows.append([name, *cells, f"{100.0 * outside[index]:.1f}"])
     return rows
 
@@ -133,4 +135,4 @@ def advice(found: ToleranceAnalysis) -> list[str]:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "-"
+    return f"{value:.3g}" if math.isfinite(value) else "-"
