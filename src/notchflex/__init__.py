@@ -185,7 +185,9 @@ _HOME = {
         (
             "DeckOptions",
             "Exported",
+            "PatternOptions",
             "SimulatorOptions",
+            "SolidOptions",
             "export_robot",
         ),
         "notchflex.export",

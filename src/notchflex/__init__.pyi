@@ -42,7 +42,9 @@ from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.export import DeckOptions as DeckOptions
 from notchflex.export import Exported as Exported
+from notchflex.export import PatternOptions as PatternOptions
 from notchflex.export import SimulatorOptions as SimulatorOptions
+from notchflex.export import SolidOptions as SolidOptions
 from notchflex.export import export_robot as export_robot
 from notchflex.fit import Calibration as Calibration
 from notchflex.fit import Constant as Constant

@@ -210,6 +210,22 @@ def test_what_friction_does(margin):
         margin.within("loop", loop - (angle[::-1] - angle)[:31].max(), 1e-6, "deg")
 
 
+def test_from_robot_to_cut_file(margin):
+    pytest.importorskip("ezdxf", reason="needs the extra export")
+    names = ran(12)[0]
+    half = np.arccos(1.0 - 1.4 / 0.81)
+    wanted = np.array([0.8, 2.0 * 0.81 * half]) - names["kerf"]
+    margin.within("path of the beam", names["window"] - wanted, 1e-9, "mm")
+    wide = half + 0.5 * names["kerf"] / 0.81
+    larger = A.with_(
+        depth=(0.81 * (1.0 - np.cos(wide)),) * 5,
+        height=(0.8 + names["kerf"],) * 5,
+        uncut=(1.2 - names["kerf"],) * 5,
+    )
+    expected = [np.degrees(one.pull(1.0)[0].sum()) for one in (A, larger)]
+    margin.within("bends", names["bends"] - np.array(expected), 1e-6, "deg")
+
+
 def test_run_it_in_mujoco(margin):
     """MuJoCo shares no code with the chain."""
     pytest.importorskip("mujoco", reason="needs the extra robotics")
