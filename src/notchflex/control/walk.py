@@ -75,7 +75,8 @@ class Walk:
     """One search: its points one after the other.
 
     Within a dead band, between turning round and the first slip of a contact, a tendon moves
-    nothing. The search leaves these bands out: its variables are what the drives move beyond.
+    nothing, if the others stay as they are. A search can leave these bands out: its variables are
+    what the drives move beyond.
 
     Args:
         problem: What is aimed at, and the limits.
@@ -83,6 +84,7 @@ class Walk:
         entries: Which numbers of a response are aimed at.
         weights: What an error of each counts.
         goal: What they are to become.
+        over_bands: Whether dead bands are left out.
     """
 
     point: SearchPoint
@@ -94,6 +96,7 @@ class Walk:
         entries: Int[np.ndarray, " m"],
         weights: Float[np.ndarray, " m"],
         goal: Float[np.ndarray, " m"],
+        over_bands: bool,
     ) -> None:
         """Take the target; nothing is solved."""
         self.problem, self.before, self.goal = problem, before, goal
@@ -103,8 +106,10 @@ class Walk:
         self._sliding: np.ndarray | None = None
         model, driven = problem.model, problem.driven
         self._present = np.where(driven, model.drives(before), problem.low)
-        low, high = model.dead_band(before)
-        self._band = np.where(driven, low, self._present), np.where(driven, high, self._present)
+        self._band = self._present, self._present
+        if over_bands:
+            low, high = model.dead_band(before)
+            self._band = np.where(driven, low, self._present), np.where(driven, high, self._present)
         self._low, self._high = self._outside(problem.low), self._outside(problem.high)
         self._eye = np.eye(len(self.free))
         self._usual = 1.0 + size_of(weights * goal)
