@@ -135,8 +135,11 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "ControlStatus",
+            "Controller",
             "Following",
             "Limits",
+            "Observer",
             "Reach",
             "TargetSearch",
             "Targets",
