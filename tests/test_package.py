@@ -28,6 +28,7 @@ NAMES = [
     "ConvergenceError", "ErrorCode", "Failure", "Settings",
     "BodyForce", "save_path", "read_path", "read_table",
     "reach", "follow", "read_targets", "Reach", "Following", "Limits", "TargetSearch", "Targets",
+    "Controller", "ControlStatus", "Observer",
     "StripNotch", "ULink", "Corner",
     "Elastica", "elastica", "modulus_from_single_notch",
     "FrictionReadings", "FrictionRig", "friction_rig", "read_friction_rig",

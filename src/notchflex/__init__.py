@@ -160,8 +160,11 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "ControlStatus",
+            "Controller",
             "Following",
             "Limits",
+            "Observer",
             "Reach",
             "TargetSearch",
             "Targets",

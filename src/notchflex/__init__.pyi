@@ -22,8 +22,11 @@ from notchflex.analysis import tip_response as tip_response
 from notchflex.analysis import uncertain as uncertain
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
+from notchflex.control import Controller as Controller
+from notchflex.control import ControlStatus as ControlStatus
 from notchflex.control import Following as Following
 from notchflex.control import Limits as Limits
+from notchflex.control import Observer as Observer
 from notchflex.control import Reach as Reach
 from notchflex.control import Targets as Targets
 from notchflex.control import TargetSearch as TargetSearch
