@@ -20,6 +20,9 @@ from notchflex.solver.continuation import SolverState
 
 Progress = Callable[[int, int], None]
 
+# A deviation beyond this part of the range of the search is none of first order.
+_LINEAR = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class History:
@@ -103,7 +106,6 @@ def with_noise(history: History) -> History:
     tendons = by_drive.shape[2]
     first = np.cumsum([0, *sizes])
     noises = int(first[-1]) + len(steps) * tendons
-    weak = (1e-3 / model.largest) ** 2 * np.eye(model.size)
     before = np.zeros((model.size, noises))
     for k, step in enumerate(steps):
         rows = step.entries
@@ -119,12 +121,24 @@ def with_noise(history: History) -> History:
         covariance = read @ read.T
         white = whitening_of(covariance)
         slopes = white @ by_force[k, k][:, rows].T
-        gain = np.linalg.solve(slopes.T @ slopes + weak, slopes.T)
+        gain = _known(slopes, _LINEAR * model.largest)
         before = before + gain @ (white @ read - slopes @ before)
         history.covariance.append(covariance)
         history.information.append(slopes)
         history.gain.append(before)
     return history
+
+
+def _known(slopes: Float[np.ndarray, "m d"], most: float) -> Float[np.ndarray, "d m"]:
+    """Return the least-squares solution, without directions whose deviation exceeds `most`.
+
+    There the tendons stick, or nothing is read: to first order the noise would move the force by
+    any amount, while what the contacts remember of it stays within the interval.
+    """
+    left, values, right = np.linalg.svd(slopes, full_matrices=False)
+    kept = values * most > 1.0
+    inverse = np.where(kept, 1.0 / np.where(kept, values, 1.0), 0.0)
+    return (right.T * inverse) @ left.T
 
 
 def _slopes_along(
