@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 from acting import State, Stop
-from arcs import Arcs, about_z, left_by
+from arcs import Arcs, about_z
+from moments import arc_law
 
 import notchflex as nf
 
@@ -42,14 +43,14 @@ def _on_wall(state: State, arcs: Arcs, number: int) -> tuple[np.ndarray, np.ndar
     place = state.tendon_place(number)
     shorter, turning, lengths = [], [], [tube.base_length]
     # It ends at the far edge of the wall on its side, as a straight one does.
-    stops = state.way(state.robot.tendon[number].direction_deg)
+    tendon = state.robot.tendon[number]
+    stops = state.way(tendon.direction_deg, tendon.radius)
     for k, i in enumerate(arcs.notches):
         if i >= state.end_body(number):
             break
         notch, modes = notches[i], arcs.modes[k]
-        left = left_by(notch, tube)
         side, free = np.radians(notch.direction_deg), np.radians(notch.precurvature_deg)
-        toward = place @ [np.cos(side), np.sin(side), 0.0] + float(left.centroid)
+        toward = place @ [np.cos(side), np.sin(side), 0.0] + arcs.laws[k].centroid
         beside = place @ [-np.sin(side), np.cos(side), 0.0]
         shorter.append(toward * modes[0] - beside * modes[2])
         turning += [0.5 * np.hypot(free + modes[0], modes[2])] * 2
@@ -59,8 +60,7 @@ def _on_wall(state: State, arcs: Arcs, number: int) -> tuple[np.ndarray, np.ndar
 
 def _straight(state: State, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Straight tendon: the same, its lengths at rest from the free robot."""
-    tendon, spans = state.robot.tendon[number], state.spans[number]
-    stops = [one for one in state.way(tendon.direction_deg) if one.body <= state.end_body(number)]
+    spans, stops = state.spans[number], state.stops(number)
     free = _free_lengths(state, number, stops)
     turning = [angle for span in spans for angle in (span.exit_turning, span.entry_turning)]
     lengths = [stops[0].leaves]
@@ -78,9 +78,10 @@ def _free_lengths(state: State, number: int, stops: list[Stop]) -> list[float]:
         origin, rotation = bodies[-1]
         # The origin of the next body lies a notch's height beyond this one: of a strip level with
         # its middle, of a link at its proximal face.
-        over, turn = np.array([0.0, 0.0, notch.height]), np.eye(3)
+        rise = getattr(notch, "rise", 0.0)
+        over, turn = np.array([0.0, 0.0, notch.height + rise]), np.eye(3)
         if notch.precurvature_deg:
-            over, turn = _free_arc(notch, state.robot.tube)
+            over, turn = _free_arc(notch, arc_law(state, len(bodies) - 1).centroid)
         bodies.append((origin + rotation @ (over + length * _Z), rotation @ turn))
     leaves, enters = (
         [
@@ -94,9 +95,9 @@ def _free_lengths(state: State, number: int, stops: list[Stop]) -> list[float]:
     ]
 
 
-def _free_arc(notch: nf.ArcNotch, tube: nf.Tube) -> tuple[np.ndarray, np.ndarray]:
+def _free_arc(notch: nf.ArcNotch, off: float) -> tuple[np.ndarray, np.ndarray]:
     """From the near face of a free arc notch, whose neutral axis is a circle, to its far one."""
-    off, frame = float(left_by(notch, tube).centroid), about_z(notch.direction_deg)
+    frame = about_z(notch.direction_deg)
     angle = np.radians(notch.precurvature_deg)
     cosine, sine = np.cos(angle), np.sin(angle)
     turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import notchflex as nf
 from balance import left_over
 from oracles import frames
 from oracles.wrist import A, Wrist
@@ -232,3 +233,18 @@ def test_run_it_in_mujoco(margin):
     chain, angle = names["chain"], names["angle"]
     margin.within("total angle, part of its range", (angle - chain) / np.ptp(chain), 0.02)
     assert "area of the loop: 1.0" in printed
+
+
+def test_which_dimension_to_control():
+    names, printed = ran(11)
+    found = names["found"]
+    # Steeper than any other: a deviation of 5 % of the modulus, by its own difference.
+    bends = [
+        nf.solve(names["wrist"].with_value("material.elastic_modulus", modulus), nf.Load(0.9))
+        for modulus in (9990.0, 10010.0)
+    ]
+    spread = 500.0 * abs(bends[1].total_angle - bends[0].total_angle) / 20.0
+    index = found.sources.index("material.elastic_modulus")
+    assert abs(found.linear.spread[0, index]) == pytest.approx(spread, rel=1e-4)
+    assert found.order[0] == index
+    assert "check material.elastic_modulus" in printed

@@ -198,7 +198,8 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
             return "it must be a number"
         if kind == "greater_than_equal" and got <= 0.0 < limit < 1.0:
             return f"it must be greater than 0{unit}"  # a negative length is no small length
-        return f"it must be {_BOUNDS[kind][0]} {limit:g}{unit}"
+        percent = "; 0.04 is 4 %" if kind == "less_than_equal" and "strain" in place.name else ""
+        return f"it must be {_BOUNDS[kind][0]} {limit:g}{unit}{percent}"
     if kind == "number_wanted":
         return f"it must be a number{' in' if unit else ''}{unit}, without quotes"
     if kind == "literal_error":
@@ -229,4 +230,6 @@ _RULES = {
     "whole_number_wanted": "it must be a whole number",
     "string_type": "it must be text in quotes",
     "string_too_short": "it must not be empty",
+    "string_too_long": "it is too long",
+    "string_pattern_mismatch": "it must be a word of letters, digits, - and _",
 }

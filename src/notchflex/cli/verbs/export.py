@@ -164,7 +164,7 @@ def _report(robot: Robot, written: list[Exported], outputs: Outputs) -> int:
 
     def document() -> dict[str, Any]:
         from notchflex.results.files.json import document_head
-        from notchflex.robot.digest import robot_digest
+        from notchflex.results.same_robot import robot_digest
 
         files = [{"file": one.file, "warnings": list(one.warnings), **one.facts} for one in written]
         return {**document_head(robot), "robot_hash": robot_digest(robot), "files": files}

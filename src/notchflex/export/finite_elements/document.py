@@ -14,8 +14,8 @@ from notchflex.export.finite_elements.tendon_spans import TendonSpan, tendon_spa
 from notchflex.export.simulators.document import TextDocument
 from notchflex.loads.external import NOTHING
 from notchflex.results import EquilibriumPath
+from notchflex.results.same_robot import robot_digest
 from notchflex.robot import ArcNotch, Linear
-from notchflex.robot.digest import robot_digest
 
 
 def deck_document(subject: Subject, options: DeckOptions) -> TextDocument:

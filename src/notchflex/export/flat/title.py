@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from notchflex import __version__
 from notchflex.export.flat.pattern import FlatPattern
-from notchflex.robot.digest import robot_digest
+from notchflex.results.same_robot import robot_digest
 
 
 def title_lines(pattern: FlatPattern) -> list[str]:

@@ -18,8 +18,8 @@ from notchflex.export.simulators.mujoco_run import SimulatorError, has_mujoco, m
 from notchflex.export.simulators.options import SimulatorOptions
 from notchflex.export.simulators.transmission import transmission_table
 from notchflex.export.simulators.urdf import urdf
+from notchflex.results.same_robot import robot_digest
 from notchflex.robot import Robot
-from notchflex.robot.digest import robot_digest
 
 
 @dataclass(frozen=True)
