@@ -4,7 +4,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.export.formats import FORMATS, format_of
-from notchflex.robot.digest import robot_digest
+from notchflex.results.same_robot import robot_digest
 from refusals import refused
 
 
