@@ -34,6 +34,7 @@ NAMES = [
     "Calibration", "Constant", "LeastSquares", "SumOfDistances", "SumOfRobotErrors", "leave_out",
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
+    "design", "Design", "DesignSpec", "design_front", "DesignFront",
 ]
 # fmt: on
 

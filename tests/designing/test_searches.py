@@ -30,6 +30,7 @@ def test_constant_curvature_synthesis():
                 {"quantity": "closing_angle", "notch": 1, "equal": float(angle)},
                 {"quantity": "closed_length", "equal": length},
             ],
+            "search": {"starts": 1},
         }
     )
     assert made.converged, made.reason
@@ -132,6 +133,7 @@ def test_target_curves(spec, robot):
     assert np.sqrt(np.mean(np.square(far))) <= 0.2
 
 
+@pytest.mark.nightly
 def test_points_out_of_reach_are_named():
     spec = bend()
     spec["variable"] = spec["variable"][3:]
@@ -139,3 +141,33 @@ def test_points_out_of_reach_are_named():
     made = nf.design(spec | {"search": {"starts": 1}})
     assert not made.converged
     assert "curve.bend is not reached at" in made.explanation[0]
+
+
+@pytest.mark.nightly
+def test_front(tmp_path):
+    spec = {
+        "robot": "pacheco2021-a",
+        "variable": [
+            {"value": "notch.depth", "lower": 1.2, "upper": 1.38},
+            {"value": "notch.height", "lower": 0.5, "upper": 1.0},
+        ],
+        "state": [{"name": "pulled", "tension": 1.5}],
+        "objective": [
+            {"quantity": "total_angle", "state": "pulled", "goal": "maximise"},
+            {"quantity": "peak_strain", "state": "pulled", "take": "largest", "goal": "minimise"},
+        ],
+        "constraint": [{"quantity": "total_angle", "state": "pulled", "lower": 20.0}],
+    }
+    front = nf.design_front(spec, points=5, generations=4)
+    values = front.objectives
+    assert len(front.points) >= 3
+    # More angle costs more strain, from point to point.
+    order = np.argsort(values[:, 0])
+    assert (np.diff(values[order, 1]) > 0.0).all()
+    for point, (angle, strain) in zip(front.points, values, strict=True):
+        state = nf.solve(point.robot, nf.Load(tension=1.5))
+        assert np.degrees(state.total_angle) == pytest.approx(angle, abs=1e-4)
+        assert state.peak_strain.max() == pytest.approx(strain, abs=1e-6)
+    files = front.save(tmp_path / "front")
+    assert [file.name for file in files][0] == "point_01.toml"
+    assert nf.load_robot(files[0]) == front.points[0].robot
