@@ -41,6 +41,7 @@ NAMES = [
     "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
     "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
     "read_tolerance_spec",
+    "design", "Design", "DesignSpec", "design_front", "DesignFront",
 ]
 # fmt: on
 

@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from notchflex._extras import need
 from notchflex._summary import Displayed, Summary, short
-from notchflex.designing.design import given, made_of
+from notchflex.designing.design_robot import given, made_of
 from notchflex.designing.forms import problems_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.result import Design

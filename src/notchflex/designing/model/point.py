@@ -16,7 +16,7 @@ from notchflex.analysis.derivatives.forward_model import ForwardModel
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.derivatives.tangent import Change
 from notchflex.designing.model.closings import closing_slopes
-from notchflex.designing.model.curves import Bodies, distances, target_points
+from notchflex.designing.model.curves import Bodies, distances, offsets, target_points
 from notchflex.designing.model.load_states import PROBE, Direction, Probe, StatePaths
 from notchflex.designing.model.quantities import OF_ROBOTS, edge_unit
 from notchflex.designing.model.reading import Reading
@@ -120,16 +120,18 @@ class Point:
 
     def curve(self, curve: TargetCurve) -> Reading:
         """Distances of the points of a curve, mm."""
-        step = self.paths.step[curve.state]
+        return distances(self.offsets(curve))
+
+    def offsets(self, curve: TargetCurve) -> Reading:
+        """Vectors from the points of a curve to the axis, mm."""
+        step, points = self.paths.step[curve.state], target_points(curve)
         poses = [self.arrays[name][step] for name in ("body_position", "body_rotation")]
         if self.slopes_of is None:
-            return distances(self.robot, Bodies(*poses), target_points(curve), None)
+            return offsets(self.robot, Bodies(*poses), points, None)
         lengths = self._of_robot(lambda one: body_lengths(one.tube, one.notches)).slopes
         assert lengths is not None
         changes = [self.slopes_of(name)[:, step] for name in ("body_position", "body_rotation")]
-        return distances(
-            self.robot, Bodies(*poses, *changes), target_points(curve), list(lengths.T)
-        )
+        return offsets(self.robot, Bodies(*poses, *changes), points, list(lengths.T))
 
     def moved(self, number: int, part: float) -> Robot:
         """Return the robot with a variable moved by a part of its span."""

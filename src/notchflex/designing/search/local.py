@@ -64,7 +64,8 @@ def search_from(problem: Problem, z: Vector, iterations: int) -> Found:
         return Found(z, None, False, 0)
     stationary = False
     if is_sum_of_squares(problem):
-        z, first = nearest_squares(problem, z, first)
+        z, first, settled = nearest_squares(problem, z, first)
+        return Found(z, first, settled or is_stationary(problem, z, first), 0)
     z, one, done = approach(problem, z, first, iterations)
     best = z, one
     if problem.worst(one) > _FAR:  # limits that contradict each other here

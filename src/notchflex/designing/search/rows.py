@@ -96,10 +96,10 @@ def squared(wish: Wish, source: Source) -> Reading:
     """Return the numbers whose squares an objective adds up: distances from a target or curve."""
     asked = wish.asked
     assert isinstance(asked, DesignObjective)
-    every = wish.every(source)
     if asked.target is None:  # the mean square, which is smooth where it is 0
-        return every.scaled(float(np.sqrt(asked.weight / len(every.values))))
-    made = taken(every, wish.take)
+        every = wish.every(source) if wish.curve is None else source.offsets(wish.curve)
+        return every.scaled(float(np.sqrt(asked.weight / len(wish.rows))))
+    made = taken(wish.every(source), wish.take)
     return Reading(made.values - asked.target, made.slopes).scaled(float(np.sqrt(asked.weight)))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.designing.explanation import explain
+from notchflex.designing.explanation import curves_missed, explain
 from notchflex.designing.forms import problems_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.result import (
@@ -102,6 +102,8 @@ def made_of(spec: DesignSpec, first: Robot, problems: list[Problem], searches: S
         reason = "interrupted; this is the best robot so far"
     elif not met:
         reason = "not all constraints can be met; this is the robot that comes nearest"
+    elif far := curves_missed(best):
+        reason = far[0].rstrip(".")
     elif not found.stationary:
         reason = "the search ended before it settled; try more starts or iterations"
     solves, gradients = total_counts(problems)
