@@ -24,7 +24,7 @@ from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VER
 if TYPE_CHECKING:
     from notchflex.tolerancing import ToleranceAnalysis
 
-MOST_LIMITS, MOST_BARS = 5, 12
+MOST_LIMITS, MOST_BARS = 4, 12
 _BINS = 60
 
 
