@@ -248,3 +248,27 @@ def test_which_dimension_to_control():
     assert abs(found.linear.spread[0, index]) == pytest.approx(spread, rel=1e-4)
     assert found.order[0] == index
     assert "check material.elastic_modulus" in printed
+
+
+def test_what_pushes_at_the_tip():
+    names, printed = ran(15)
+    sensed, push = names["sensed"], np.array(names["push"])
+    assert ((sensed.low[:, 0] <= push) & (sensed.high[:, 0] >= push)).all()
+    assert sensed.contact.tolist() == (push > 0.0).tolist()
+    # Where the tendon sticks another force, solved by itself, gives the same stroke.
+    other = names["read"].load.part(0, 5)
+    moved = (nf.Load(tip_force=(0.0165, 0.0, 0.0)).external,)
+    changed = nf.LoadPath(other.tension, other.stroke, external=(*other.external[:4], *moved))
+    stroke = nf.simulate(names["wrist"], changed).stroke[-1, 0]
+    assert abs(stroke - names["read"].stroke[4, 0]) < 1e-5
+    assert "sticks" in printed.splitlines()[4]
+
+
+def test_workspace_within_limits():
+    names, _ = ran(16)
+    careful, wrist = names["careful"], names["wrist"]
+    assert careful.strain.max() <= 0.04
+    # The last robot, pulled as far by itself, is at the limit.
+    state = nf.solve(wrist, nf.Load(tension=float(careful.tension.max())))
+    assert state.peak_strain.max() == pytest.approx(0.04, rel=2e-3)
+    assert careful.angle.max() == pytest.approx(state.total_angle, abs=1e-6)
