@@ -74,3 +74,32 @@ def test_random_wrists_return_to_rest():
         path = nf.simulate(robot, loads)
         assert path.converged.all(), path.reason
         assert np.abs(path.notch_angle[-1]).max() < 1e-9
+
+
+def test_strokes_pass_limit_points_and_return():
+    random = np.random.default_rng(0)
+    for _ in range(8):
+        robot = wrist(
+            random.uniform(0.0, 0.3),
+            plateau_stress=random.uniform(200.0, 500.0),
+            plateau_modulus=random.uniform(2000.0, 9000.0),
+        )
+        most, steps = random.uniform(1.5, 3.4), int(random.integers(3, 30))
+        strokes = most * np.append(np.arange(1, steps + 1), np.arange(steps)[::-1]) / steps
+        path = nf.simulate(robot, [nf.Load(stroke=float(stroke)) for stroke in strokes])
+        assert path.converged.all(), path.reason
+        assert np.abs(path.notch_angle[-1]).max() < 1e-6
+
+
+def test_friction_opposes_what_slides_through_a_closed_notch():
+    # The closed first notch is rigid: where the history were lost on the way, the tension before it
+    # could be anything that friction holds there.
+    robot = wrist(
+        0.27, plateau_stress=PLATEAU, plateau_modulus=SLOPE
+    )
+    strokes = np.linspace(0.0, 3.0, 7)[1:]
+    path = nf.simulate(robot, [nf.Load(stroke=float(stroke)) for stroke in strokes])
+    assert path.converged.all(), path.reason
+    slid = np.diff(path.contact_slid[:, 0, :2], axis=0)
+    assert (slid > 0.0).all()
+    assert path.contact_log_ratio[1:, 0, :2] == pytest.approx(path.contact_bound[1:, 0, :2])
