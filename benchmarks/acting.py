@@ -55,6 +55,8 @@ class State:
     Attributes:
         forces: Force by force, but for tendons on the wall and lips opposite a spine.
         gap: Narrowest opening between edges of pieces at every notch, mm; inf where there is none.
+        node_length: Length that each node of every notch stands for, mm; 0 for none.
+        fibres: Those that the solver sums up, of every notch and node; None without.
         undecided: Whether a contact force is reported that may stand on either of two edges.
     """
 
@@ -62,6 +64,8 @@ class State:
         self.robot, self.step = robot, step
         self.origin, self.rotation = path.body_position[step], path.body_rotation[step]
         self.load = path.load.external[step]
+        self.node_length = path.chain.rods.length
+        self.fibres = path.chain.rods.section.fibres
         self.tension = path.span_tension[step]
         around = [*robot.notches[1:], None]
         behind = [one.spacing(after) for one, after in zip(robot.notches, around, strict=True)]

@@ -118,8 +118,13 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
         problems += found
         floor = _SMALL * robot.material.elastic_modulus * float(law.section.second_moment_weak)
         scale += floor / height[k]
-        forces = np.stack([law.push[1] * modes[k, 1] + across[:, 0], # of the rings' shear
-                           law.sway[1] * modes[k, 3] - across[:, 1]], axis=-1)
+        forces = np.stack(
+            [
+                law.push[1] * modes[k, 1] + across[:, 0],  # of the rings' shear
+                law.sway[1] * modes[k, 3] - across[:, 1],
+            ],
+            axis=-1,
+        )
         sheared = [law.push[0] * (_WEIGHTS @ forces[:, 0]), law.sway[0] * (_WEIGHTS @ forces[:, 1])]
         problems += _out_of_balance(i, modes[k], inside - local, sheared, scale)
         problems += _disagreeing(state, path, i, modes[k], precurved[k], law)

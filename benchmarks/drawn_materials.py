@@ -29,9 +29,7 @@ def drawn_material(numbers: Numbers, kind: str, density: float) -> nf.Nitinol | 
     )
 
 
-def _table(
-    numbers: Numbers, modulus: float, begin: float, density: float
-) -> nf.StressStrain:
+def _table(numbers: Numbers, modulus: float, begin: float, density: float) -> nf.StressStrain:
     """Draw a curve of two to seven pieces that may stiffen again, at times one for each sign."""
 
     def curve(first: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

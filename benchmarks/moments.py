@@ -2,17 +2,18 @@
 
 Equations of docs/from_the_drawing.md. What the fibres of a material with hysteresis remember is
 read from the path and judged: it must be a state that its strains allow, and follow from that of
-the step before where the solver went there in one stride.
+the last state that entered the history.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from acting import State
-from numpy.polynomial.legendre import leggauss, legvander
+from numpy.polynomial.legendre import leggauss
 from shells import ends_of, outer_depth, rings
 
 import notchflex as nf
@@ -21,9 +22,10 @@ _SECTIONS = {"on-axis": nf.annular_sector, "off-axis": nf.annular_segment}
 _SHARE = 0.25  # of the end compliance that follows the material
 _CLOSING, _CLOSED = {"on-axis": 1.0248, "off-axis": 1.0203}, 0.354
 _EDGE = 0.086
-_FIBRES, _FINE = 20, 400
-# Bisections for a curvature or a strain: to 1e-15 of where they begin.
-_HALVINGS = 55
+# Pieces of a section, and the powers of the distance that fibres are held to, and how well.
+_FINE, _POWERS, _OF_SECTION = 400, 13, 1e-6
+# Tries for a curvature or a strain: to 1e-15 of where they begin.
+_TRIES = 60
 # What a strain may be off for one that is on a curve, over the strain of the notch when closed: the
 # strains are fitted to poses.
 _ON_CURVE = 1e-6
@@ -148,7 +150,7 @@ class Bent(NamedTuple):
     problems: list[str]
 
 
-def bending(state: State, i: int, law: ArcLaw, angle: np.ndarray, memory: "Memory | None") -> Bent:
+def bending(state: State, i: int, law: ArcLaw, angle: np.ndarray, memory: Memory | None) -> Bent:
     """Moments of notch i at elastic angles, as if the notch were bent so all along, rad."""
     q = 1.0 + law.odd * angle + law.even * angle**2
     reduced = angle / (q * law.height)
@@ -166,16 +168,17 @@ def bending(state: State, i: int, law: ArcLaw, angle: np.ndarray, memory: "Memor
 
         curvature = _bisected(lambda k: own * k + soft * moment(k) - reduced, np.abs(reduced))
         return Bent(moment(curvature) / q, [])
-    arm, area = fibres(state.robot.notches[i], state.robot.tube)
+    arm, area, off = fibres(state, i, section)
     if memory is not None:
-        past, now = memory.before[i], memory.after[i]
+        used = np.asarray(state.node_length)[i] > 0.0  # the rods of other kinds have more nodes
+        past, now = memory.before[i][used], memory.after[i][used]
         moved = now @ (area * arm) / second
         curvature = (reduced + soft * modulus * second * moved) / law.weak
         strain = (now @ area / area.sum())[..., None] + curvature[..., None] * arm
         closed = law.closure / law.height
         near = _ON_CURVE * np.abs(arm).max() / closed / law.height
         problems = _remembered(i, material, strain, past, now, near)
-        return Bent(modulus * second * (curvature - moved) / q, problems)
+        return Bent(modulus * second * (curvature - moved) / q, [*off, *problems])
     curve = _Curve(material)
 
     def sums(curvature: np.ndarray) -> np.ndarray:
@@ -186,25 +189,30 @@ def bending(state: State, i: int, law: ArcLaw, angle: np.ndarray, memory: "Memor
         return curve(middle[..., None] + bent) @ (area * arm)
 
     curvature = _bisected(lambda k: own * k + soft * sums(k) - reduced, np.abs(reduced))
-    return Bent(sums(curvature) / q, [])
+    return Bent(sums(curvature) / q, off)
 
 
 def _bisected(rising, most: np.ndarray) -> np.ndarray:
-    """Where a rising function is nil, between -most and most; the last step is a secant's."""
+    """Where a rising function is nil, between -most and most: false position (Illinois)."""
     low, high = -most, most.copy()
     at_low, at_high = rising(low), rising(high)
-    for turn in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if turn % 2:  # a secant's step settles where the function is straight
-            steep = np.where(at_high > at_low, at_high - at_low, 1.0)
-            middle = np.clip(low - at_low * (high - low) / steep, low, high)
-        value = rising(middle)
+    enough = 1e-15 * np.maximum(np.abs(at_low), np.abs(at_high))
+    best = low
+    side = np.zeros(np.shape(most))
+    for _ in range(_TRIES):
+        steep = np.where(at_high > at_low, at_high - at_low, 1.0)
+        best = np.clip(low - at_low * (high - low) / steep, low, high)
+        value = rising(best)
         under = value < 0.0
-        low, at_low = np.where(under, middle, low), np.where(under, value, at_low)
-        high, at_high = np.where(under, high, middle), np.where(under, at_high, value)
-        if np.all(high - low <= 1e-15 * most) or np.all(value == 0.0):
+        # An end that stays twice counts half.
+        at_high = np.where(under & (side < 0.0), 0.5 * at_high, at_high)
+        at_low = np.where(~under & (side > 0.0), 0.5 * at_low, at_low)
+        low, at_low = np.where(under, best, low), np.where(under, value, at_low)
+        high, at_high = np.where(under, high, best), np.where(under, at_high, value)
+        side = np.where(under, -1.0, 1.0)
+        if np.all(np.abs(value) <= enough) or np.all(high - low <= 1e-16 * most):
             break
-    return np.where(np.abs(at_low) < np.abs(at_high), low, high)
+    return best
 
 
 class _Curve:
@@ -244,9 +252,28 @@ def _plateau(material: nf.Nitinol, ratio: float) -> tuple[list[float], list[floa
     return strains, stresses
 
 
-@lru_cache(maxsize=256)
-def fibres(notch: nf.ArcNotch, tube: nf.Tube) -> tuple[np.ndarray, np.ndarray]:
-    """Arms (mm, toward the spine) and areas of Gauss's fibres of a section, from many pieces."""
+def fibres(state: State, i: int, section: nf.Section) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Arms (mm, toward the spine) and areas of the solver's fibres of notch i, and problems.
+
+    Which places stand for a section is the solver's choice; they must sum up powers of the distance
+    as the section does.
+    """
+    held = state.fibres
+    arm, area = (np.asarray(part)[i, 0] for part in (held.arm, held.area))
+    place, size = _pieces(state.robot.notches[i], state.robot.tube, section)
+    reach = np.abs(place).max()
+    off = max(
+        abs(area @ (arm / reach) ** power - size @ (place / reach) ** power) / size.sum()
+        for power in range(_POWERS)
+    )
+    found = [f"notch {i + 1}: fibres are off the section by {off:.1e}"] if off > _OF_SECTION else []
+    return arm, area, found
+
+
+def _pieces(
+    notch: nf.ArcNotch, tube: nf.Tube, section: nf.Section
+) -> tuple[np.ndarray, np.ndarray]:
+    """Places from the neutral axis and areas of many pieces of a section."""
     outer, inner, depth = tube.outer_radius, tube.inner_radius, outer_depth(notch, tube)
     points, weights = leggauss(_FINE)
     if notch.cut == "on-axis":
@@ -256,29 +283,19 @@ def fibres(notch: nf.ArcNotch, tube: nf.Tube) -> tuple[np.ndarray, np.ndarray]:
         place = np.outer(radius, np.cos(0.5 * half * (1.0 + points))).ravel()
         size = np.outer(radius * weighs, weights).ravel()
     else:
-        # Across the height as cosines of the outer circle; cut where the bore begins and ends.
-        plane = depth - outer
-        stops = [plane, *[at for at in (-inner, inner) if at > plane], outer]
-        place, size = [], []
-        for low, high in zip(stops, stops[1:], strict=False):
+        # Across the height, cut where the bore begins and ends.
+        stops = [depth - outer, *[at for at in (-inner, inner) if at > depth - outer], outer]
+        places, sizes = [], []
+        for low, high in pairwise(stops):
             turn = 0.5 * np.pi * (1.0 + points)
             at = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(turn)
             chord = np.sqrt(np.maximum(outer**2 - at**2, 0.0))
             chord = chord - np.sqrt(np.maximum(inner**2 - at**2, 0.0))
-            place.append(at)
-            size.append((high - low) * chord * np.sin(turn) * weights)
-        place, size = np.concatenate(place), np.concatenate(size)
-    section = left_by(notch, tube)
+            places.append(at)
+            sizes.append((high - low) * chord * np.sin(turn) * weights)
+        place, size = np.concatenate(places), np.concatenate(sizes)
     size = size * float(section.area) / size.sum()
-    place = place - place @ size / size.sum()
-    reach = np.abs(place).max()
-    # Orthonormal polynomials over the pieces; multiplying by the place couples neighbours.
-    every = legvander(place / reach, _FIBRES - 1) * np.sqrt(size)[:, None]
-    normal = np.linalg.qr(every)[0]
-    arm, vectors = np.linalg.eigh(normal.T @ (place[:, None] * normal))
-    first = normal.T @ np.sqrt(size)
-    area = (vectors.T @ first) ** 2
-    return arm * np.sqrt(float(section.second_moment_weak) / (area @ arm**2)), area
+    return place - float(section.centroid), size
 
 
 class Memory(NamedTuple):
@@ -286,11 +303,11 @@ class Memory(NamedTuple):
 
     Attributes:
         after: After the step.
-        before: Before it; None where the solver went there in more than one stride.
+        before: In the last state before that entered the history.
     """
 
     after: np.ndarray
-    before: np.ndarray | list[None]
+    before: np.ndarray
 
 
 def memory_of(path: nf.EquilibriumPath, step: int) -> Memory | None:
@@ -298,19 +315,15 @@ def memory_of(path: nf.EquilibriumPath, step: int) -> Memory | None:
     every = path.run.solved.memory.material
     if isinstance(every, tuple):
         return None
-    strides = int(path.run.parts[step])
-    before: np.ndarray | list[None] = [None] * every.shape[1]
-    if strides == 1:
-        first = path.prepared.state.unpack(path.run.first).memory.material
-        before = np.asarray(every[step - 1] if step else first)
-    return Memory(np.asarray(every[step]), before)
+    last = path.prepared.state.unpack(path.run.between).memory.material
+    return Memory(np.asarray(every[step]), np.asarray(last[step]))
 
 
 def _remembered(
     i: int,
     material: nf.Nitinol,
     strain: np.ndarray,
-    past: np.ndarray | None,
+    past: np.ndarray,
     now: np.ndarray,
     near: float,
 ) -> list[str]:
@@ -331,8 +344,7 @@ def _remembered(
     if (now < least - near).any() or (now > largest + near).any():
         off = max((least - now).max(), (now - largest).max())
         found.append(f"notch {i + 1}: fibres remember strains off their curves by {off:.1e}")
-    if past is not None:
-        off = np.abs(np.clip(past, least, largest) - now).max()
-        if off > near:
-            found.append(f"notch {i + 1}: the memory of its fibres is off by {off:.1e}")
+    off = np.abs(np.clip(past, least, largest) - now).max()
+    if off > near:
+        found.append(f"notch {i + 1}: the memory of its fibres is off by {off:.1e}")
     return found

@@ -7,7 +7,7 @@ balance when it is added up outside the solver (judge.py).
 
     python benchmarks/robustness.py [--count 640] [--seed 1] [--drawn] [--json FILE] [--shape NAME]
 
-With `--drawn` the shapes are those of a drawing (elastic ends, fibres), without those of the papers.
+With `--drawn` the shapes are those of a drawing: elastic ends, fibres, memory of the material.
 
 Draw i of a seed is the same whatever the count; `--first I --count 1` runs it alone if the shape
 is left to its number. Exit code 1: something silent or wrong. The first robot of a shape compiles

@@ -15,6 +15,8 @@ EXACT = 1e-8  # relative, of tensions; of log ratios
 # Relative, of what all gaps are shorter or longer by: strains are fitted to poses (arcs.py). And
 # rounding, of lengths.
 STROKE, LENGTH = 1e-6, 1e-11
+# A slip, of the height of a notch, that must bring friction to its bound, and how near.
+_SLIDES, _OPPOSES = 1e-7, 1e-6
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -34,6 +36,24 @@ def judge_ropes(state: State, path: nf.EquilibriumPath, arcs: Arcs) -> list[str]
             shortening, turning, lengths = _straight(state, number)
         found += _stroke(state, path, number, shortening, lengths)
         found += _friction(state, path, number, turning)
+    return [*found, *_opposed(state, path)]
+
+
+def _opposed(state: State, path: nf.EquilibriumPath) -> list[str]:
+    """Friction opposes what a tendon slides: from the last state that entered the history on."""
+    run, step, found = path.run, state.step, []
+    last = path.prepared.state.unpack(run.between).memory
+    now, groups = run.solved.memory, path.chain.groups
+    height = np.array([notch.height for notch in state.robot.notches])[:, None, None]
+    for k, group in enumerate(groups):
+        slip = (np.asarray(now.slid[k][step]) - np.asarray(last.slid[k][step])) / height
+        ratio, bound = (np.asarray(part[k][step]) for part in (now.log_ratio, now.bound))
+        taut = path.tension[step, list(group.numbers)] > 1e6 * state.rounding
+        slides = (np.abs(slip) > _SLIDES) & (bound > 0.0) & taut[None, :, None]
+        against = slides & (np.sign(slip) * ratio < bound - _OPPOSES)
+        for notch, tendon, _ in np.argwhere(against)[:1]:
+            name = f"tendon {group.numbers[tendon] + 1} at notch {notch + 1}"
+            found.append(f"{name}: friction does not oppose its sliding")
     return found
 
 

@@ -105,7 +105,9 @@ SHAPES = (
 )
 
 DRAWN = (
-    Shape("drawn wrist", "ooooo", "one", _straight(0), "geometric", "nitinol", "tendons", "elastic"),
+    Shape(
+        "drawn wrist", "ooooo", "one", _straight(0), "geometric", "nitinol", "tendons", "elastic"
+    ),
     Shape(
         "with hysteresis",
         "ooooo",

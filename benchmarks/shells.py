@@ -67,9 +67,7 @@ def rings(robot: nf.Robot, length: np.ndarray, i: int) -> tuple[Ring, Ring]:
 
 
 @lru_cache(maxsize=512)
-def ends_of(
-    notch: nf.ArcNotch, tube: nf.Tube, poisson: float, sides: tuple[Ring, Ring]
-) -> Ends:
+def ends_of(notch: nf.ArcNotch, tube: nf.Tube, poisson: float, sides: tuple[Ring, Ring]) -> Ends:
     """Compute the ends of an arc notch."""
     outer, inner, depth = tube.outer_radius, tube.inner_radius, outer_depth(notch, tube)
     section = _SECTIONS[notch.cut](outer, inner, depth)
@@ -84,7 +82,7 @@ def ends_of(
         if side.length:
             energy += _energy(loads, radius, wall, side, poisson)
             bends += (0.5 if side.held == "between" else 1.0) * side.length
-    moment, area = 0.25 * pi * (outer**4 - inner**4), float(arc.area)
+    moment = 0.25 * pi * (outer**4 - inner**4)
     bends /= moment
     centroid = float(arc.centroid)
     weak = height + float(arc.second_moment_weak) * (energy[0, 0] - bends)
