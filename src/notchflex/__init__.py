@@ -143,6 +143,58 @@ _HOME = {
         ),
         "notchflex.comparison",
     ),
+    **dict.fromkeys(
+        (
+            "SensedForce",
+            "SensorNoise",
+            "sense",
+        ),
+        "notchflex.sensing",
+    ),
+    **dict.fromkeys(
+        (
+            "Workspace",
+            "workspace",
+        ),
+        "notchflex.workspaces",
+    ),
+    **dict.fromkeys(
+        (
+            "ControlStatus",
+            "Controller",
+            "Following",
+            "Limits",
+            "Observer",
+            "Reach",
+            "TargetSearch",
+            "Targets",
+            "follow",
+            "reach",
+            "read_targets",
+        ),
+        "notchflex.control",
+    ),
+    **dict.fromkeys(
+        (
+            "AcceptanceLimit",
+            "ToleranceAnalysis",
+            "ToleranceSpec",
+            "read_tolerance_spec",
+            "tolerance_analysis",
+        ),
+        "notchflex.tolerancing",
+    ),
+    **dict.fromkeys(
+        (
+            "DeckOptions",
+            "Exported",
+            "PatternOptions",
+            "SimulatorOptions",
+            "SolidOptions",
+            "export_robot",
+        ),
+        "notchflex.export",
+    ),
 }
 
 # Old name -> the name that replaces it. They still work, with a warning, and are not listed.

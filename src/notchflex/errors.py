@@ -65,6 +65,19 @@ class Failure(_Coded):
         "{residual:.2g})",
         "take smaller steps, or the robot has no equilibrium there",
     )
+    TARGET_OUT_OF_REACH = (
+        "the target is out of reach; the nearest that was found misses it by {error:.3g}",
+        "choose a target nearer to what the robot can do, or leave some of its entries free",
+    )
+    LIMITS_PREVENT = (
+        "the limits do not allow the target; the nearest within them misses it by {error:.3g}",
+        "widen the limits, or choose another target",
+    )
+    SEARCH_STOPPED = (
+        "the search for the target stopped before its end; the best that was found misses it by "
+        "{error:.3g}",
+        "take smaller steps between targets, or allow more solves",
+    )
 
 
 class ErrorCode(_Coded):

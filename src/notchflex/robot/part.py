@@ -105,6 +105,9 @@ Int = Annotated[int, BeforeValidator(_as_int)]
 _SMALLEST = {"mm": 1e-6, "MPa": 1e-6, "N": 1e-6, "kg/m3": 1e-6, "": 1e-9}
 _LARGEST = {"mm": 1e6, "MPa": 1e9, "kg/m3": 1e6, "deg": 3600.0, "": 1e3}
 
+MOST_STRAIN = 0.5
+"""Beyond every material of a robot; a strain above it was meant in percent."""
+
 
 def quantity(
     unit: str,

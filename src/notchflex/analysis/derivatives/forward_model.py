@@ -26,6 +26,7 @@ from notchflex.mechanics.chain import Shaped, laws, shape_of
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
+from notchflex.solver.continuation import SolverState
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain, flat, prepare
 from notchflex.solver.programs.run import run
@@ -61,19 +62,22 @@ class ForwardModel:
         """The robot as it is, as arrays."""
         return self._assembled(self.robot)
 
-    def solve(self, robot: Robot, load: LoadPath) -> EquilibriumPath:
+    def solve(
+        self, robot: Robot, load: LoadPath, start: SolverState | None = None
+    ) -> EquilibriumPath:
         """Follow loads with the robot that has some other numbers.
 
         Args:
             robot: The robot.
             load: Loads of the same kind as those of the model.
+            start: The state to start from, in the place of rest.
 
         Raises:
             InputError: The arrays of the robot have another form than those of the model's.
         """
         ready = self._prepared(robot)
         commands = make_commands(load, robot, ready.chain)
-        came = run(ready, commands, None, self.settings, each_from_start=self.from_rest)
+        came = run(ready, commands, start, self.settings, each_from_start=self.from_rest)
         return EquilibriumPath(robot, load, ready, came, settings=self.settings)
 
     def change(self, robot: Robot, load: LoadPath, name: str) -> Change:
