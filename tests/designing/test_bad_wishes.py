@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 import notchflex as nf
 from notchflex.cli import run
+from notchflex.designing import read_design
 
 TEMPLATE = Path(nf.__file__).parent / "designing" / "specification" / "template.toml"
 TEXT = TEMPLATE.read_text(encoding="utf-8")
@@ -108,3 +110,20 @@ def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
         assert out == ""
         assert not Path("made").exists()
     assert refused > len(seeds) // 2
+
+
+def test_schema_names_every_table(capsys):
+    assert run(["schema", "--design"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    tables = {"variable", "stock", "state", "objective", "constraint", "curve", "search"}
+    assert tables < set(schema["properties"])
+
+
+def test_new_writes_a_design_file_that_can_be_read(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["new", "wish", "--design"]) == 0
+    assert "notchflex design wish.toml" in capsys.readouterr().out
+    spec, robot = read_design("wish.toml")
+    assert robot == nf.load_robot("pacheco2021-a")
+    assert len(spec.constraint) == 3
+    assert run(["new", "wish", "--design"]) == 2  # it is there already

@@ -169,5 +169,5 @@ def test_front(tmp_path):
         assert np.degrees(state.total_angle) == pytest.approx(angle, abs=1e-4)
         assert state.peak_strain.max() == pytest.approx(strain, abs=1e-6)
     files = front.save(tmp_path / "front")
-    assert [file.name for file in files][0] == "point_01.toml"
+    assert files[0].name == "point_01.toml"
     assert nf.load_robot(files[0]) == front.points[0].robot

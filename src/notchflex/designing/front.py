@@ -177,7 +177,9 @@ def _spread(
             out["F"], out["G"] = objectives, missed
 
     half = size // 2
-    start = np.concatenate([smooth(problem, half, seed), draw(size - half, problem.count, seed)])
+    start: Any = np.concatenate(
+        [smooth(problem, half, seed), draw(size - half, problem.count, seed)]
+    )
     algorithm: Any = NSGA2(pop_size=size, sampling=start)
     result: Any = minimize(Batched(), algorithm, ("n_gen", generations), seed=seed, verbose=False)
     population = result.pop.get("X")
