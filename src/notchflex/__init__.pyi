@@ -22,6 +22,22 @@ from notchflex.analysis import tip_response as tip_response
 from notchflex.analysis import uncertain as uncertain
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
+from notchflex.control import Controller as Controller
+from notchflex.control import ControlStatus as ControlStatus
+from notchflex.control import Following as Following
+from notchflex.control import Limits as Limits
+from notchflex.control import Observer as Observer
+from notchflex.control import Reach as Reach
+from notchflex.control import Targets as Targets
+from notchflex.control import TargetSearch as TargetSearch
+from notchflex.control import follow as follow
+from notchflex.control import reach as reach
+from notchflex.control import read_targets as read_targets
+from notchflex.designing import Design as Design
+from notchflex.designing import DesignFront as DesignFront
+from notchflex.designing import DesignSpec as DesignSpec
+from notchflex.designing import design as design
+from notchflex.designing import design_front as design_front
 from notchflex.errors import ConvergenceError as ConvergenceError
 from notchflex.errors import ErrorCode as ErrorCode
 from notchflex.errors import Failure as Failure
@@ -88,6 +104,16 @@ from notchflex.robot import json_schema as json_schema
 from notchflex.robot import list_robots as list_robots
 from notchflex.robot import load_robot as load_robot
 from notchflex.robot import save_robot as save_robot
+from notchflex.sensing import SensedForce as SensedForce
+from notchflex.sensing import SensorNoise as SensorNoise
+from notchflex.sensing import sense as sense
 from notchflex.solver.newton import Settings as Settings
+from notchflex.tolerancing import AcceptanceLimit as AcceptanceLimit
+from notchflex.tolerancing import ToleranceAnalysis as ToleranceAnalysis
+from notchflex.tolerancing import ToleranceSpec as ToleranceSpec
+from notchflex.tolerancing import read_tolerance_spec as read_tolerance_spec
+from notchflex.tolerancing import tolerance_analysis as tolerance_analysis
+from notchflex.workspaces import Workspace as Workspace
+from notchflex.workspaces import workspace as workspace
 
 __version__: str

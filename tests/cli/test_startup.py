@@ -29,6 +29,8 @@ ROOT_VERBS = (
     "compare",
     "calibrate",
     "friction-rig",
+    "sense",
+    "workspace",
     "export",
     "bench",
     "doctor",

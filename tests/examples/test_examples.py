@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import notchflex as nf
 from balance import left_over
 from oracles import frames
 from oracles.wrist import A, Wrist
@@ -232,3 +233,42 @@ def test_run_it_in_mujoco(margin):
     chain, angle = names["chain"], names["angle"]
     margin.within("total angle, part of its range", (angle - chain) / np.ptp(chain), 0.02)
     assert "area of the loop: 1.0" in printed
+
+
+def test_which_dimension_to_control():
+    names, printed = ran(11)
+    found = names["found"]
+    # Steeper than any other: a deviation of 5 % of the modulus, by its own difference.
+    bends = [
+        nf.solve(names["wrist"].with_value("material.elastic_modulus", modulus), nf.Load(0.9))
+        for modulus in (9990.0, 10010.0)
+    ]
+    spread = 500.0 * abs(bends[1].total_angle - bends[0].total_angle) / 20.0
+    index = found.sources.index("material.elastic_modulus")
+    assert abs(found.linear.spread[0, index]) == pytest.approx(spread, rel=1e-4)
+    assert found.order[0] == index
+    assert "check material.elastic_modulus" in printed
+
+
+def test_what_pushes_at_the_tip():
+    names, printed = ran(15)
+    sensed, push = names["sensed"], np.array(names["push"])
+    assert ((sensed.low[:, 0] <= push) & (sensed.high[:, 0] >= push)).all()
+    assert sensed.contact.tolist() == (push > 0.0).tolist()
+    # Where the tendon sticks another force, solved by itself, gives the same stroke.
+    other = names["read"].load.part(0, 5)
+    moved = (nf.Load(tip_force=(0.0165, 0.0, 0.0)).external,)
+    changed = nf.LoadPath(other.tension, other.stroke, external=(*other.external[:4], *moved))
+    stroke = nf.simulate(names["wrist"], changed).stroke[-1, 0]
+    assert abs(stroke - names["read"].stroke[4, 0]) < 1e-5
+    assert "sticks" in printed.splitlines()[4]
+
+
+def test_workspace_within_limits():
+    names, _ = ran(16)
+    careful, wrist = names["careful"], names["wrist"]
+    assert careful.strain.max() <= 0.04
+    # The last robot, pulled as far by itself, is at the limit.
+    state = nf.solve(wrist, nf.Load(tension=float(careful.tension.max())))
+    assert state.peak_strain.max() == pytest.approx(0.04, rel=2e-3)
+    assert careful.angle.max() == pytest.approx(state.total_angle, abs=1e-6)

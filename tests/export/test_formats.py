@@ -12,7 +12,7 @@ import notchflex as nf
 from notchflex.export.document import Subject
 from notchflex.export.export import build
 from notchflex.export.formats import FORMATS, format_of
-from notchflex.robot.digest import robot_digest
+from notchflex.results.same_robot import robot_digest
 from notchflex.robot.kinds import Notch
 from refusals import refused
 

@@ -17,7 +17,7 @@ from notchflex._packages import import_all
 from notchflex.robot.error_messages import kind_of
 from notchflex.robot.notches.cut import CutLayout
 from notchflex.robot.notches.opening import Opening
-from notchflex.robot.part import Float, Int, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, Int, part, quantity
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
@@ -151,7 +151,7 @@ class Material:
     density: Annotated[Float | None, quantity("kg/m3", "density, for the weight", above=0)] = None
     allowed_strain: Annotated[
         Float | None,
-        quantity("", "strain beyond which a simulation warns", above=0),
+        quantity("", "strain beyond which a simulation warns", above=0, at_most=MOST_STRAIN),
     ] = None
 
     @property

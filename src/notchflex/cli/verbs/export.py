@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, number
-from notchflex.cli.arguments.export import SOLIDS, PatternArguments
+from notchflex.cli.arguments.export import FINITE_ELEMENTS, SOLIDS, PatternArguments
 from notchflex.cli.arguments.loads import TendonCommand, load_columns, tendon_command
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
@@ -56,7 +56,7 @@ def export(
     pattern: PatternArguments = PatternArguments(),  # noqa: B008 - frozen
     mesh: Annotated[
         Mesh,
-        Parameter(help="How fine the mesh of `--inp` is."),
+        Parameter(group=FINITE_ELEMENTS, help="How fine the mesh is."),
     ] = "medium",
     tension: Annotated[
         tuple[TendonCommand, ...],
@@ -164,7 +164,7 @@ def _report(robot: Robot, written: list[Exported], outputs: Outputs) -> int:
 
     def document() -> dict[str, Any]:
         from notchflex.results.files.json import document_head
-        from notchflex.robot.digest import robot_digest
+        from notchflex.results.same_robot import robot_digest
 
         files = [{"file": one.file, "warnings": list(one.warnings), **one.facts} for one in written]
         return {**document_head(robot), "robot_hash": robot_digest(robot), "files": files}

@@ -18,8 +18,8 @@ from notchflex.export.flat.unroll import Path, unrolled
 from notchflex.export.flat.webs import Web, smallest_web
 from notchflex.export.options import PatternOptions
 from notchflex.export.tube_ends import tube_end
+from notchflex.results.same_robot import robot_digest
 from notchflex.robot import Robot
-from notchflex.robot.digest import robot_digest
 from notchflex.robot.notches.cut import Point
 
 WEB_IN_KERFS = 3.0

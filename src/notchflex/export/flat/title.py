@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from notchflex import __version__
 from notchflex.export.flat.pattern import FlatPattern
+from notchflex.results.same_robot import robot_digest
 from notchflex.robot import Robot
-from notchflex.robot.digest import robot_digest
 
 
 def plain_name(robot: Robot) -> str:

@@ -24,8 +24,8 @@ from notchflex.export.options import SolidOptions
 from notchflex.export.solids.bent import Motion, is_bent
 from notchflex.export.solids.checks import check_channels, check_one_piece, check_window
 from notchflex.export.tube_ends import TubeEnd, tube_end
+from notchflex.results.same_robot import robot_digest
 from notchflex.robot import Robot
-from notchflex.robot.digest import robot_digest
 from notchflex.robot.notches.cut import NotchCut
 from notchflex.robot.notches.profile import Line, pieces
 

@@ -14,7 +14,7 @@ from notchflex.export.document import Subject
 from notchflex.export.options import SolidOptions
 from notchflex.export.solids.checks import check_one_piece
 from notchflex.export.tube_ends import tube_end
-from notchflex.robot.digest import robot_digest
+from notchflex.results.same_robot import robot_digest
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
