@@ -102,6 +102,13 @@ def test_the_tip_ring_of_a_bent_solid_is_at_the_tip_of_the_chain(bent, tmp_path)
     assert middle == pytest.approx(np.array(bent.tip_position), abs=1e-4)
 
 
+@pytest.mark.parametrize("shank", [0.0, 0.5, 5000.0])
+def test_a_bent_solid_has_few_triangles_where_the_tube_is_straight(bent, tmp_path, shank):
+    mesh = written(bent, tmp_path, shank=shank)
+    assert mesh.bounds[0, 2] == pytest.approx(-shank, abs=1e-3 if shank > 100 else 1e-5)
+    assert len(mesh.faces) < 40_000
+
+
 def test_the_free_shape_has_the_precurvature(bent, tmp_path):
     robot = bent.robot
     free = np.radians([[notch.precurvature_deg for notch in robot.notches]])

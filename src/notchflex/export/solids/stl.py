@@ -79,7 +79,7 @@ def stl_solid(subject: Subject, options: SolidOptions) -> StlSolid:
     warnings = [end.warning] if end.warning else []
     if is_bent(subject):
         motion = Motion(subject, cuts)
-        solid = bent_solid(solid, motion)
+        solid = bent_solid(solid, motion, cuts)
         if not all(zone.along_tube for zone in motion.zones):
             warnings.append(STRETCHED)
     return StlSolid(robot_digest(robot), solid, tuple(warnings))
