@@ -40,7 +40,8 @@ def main():
     del half
     found, seconds, cpu = explored(robot, options.tension, options.states)
     print(f"{robot.name}: {len(found)} of {found.tried} states kept, {found.failed} not converged")
-    print(f"  {seconds:.1f} s, {cpu:.1f} s of the processor, {1e6 * cpu / found.tried:.1f} µs a state")
+    each = 1e6 * cpu / found.tried
+    print(f"  {seconds:.1f} s, {cpu:.1f} s of the processor, {each:.1f} µs a state")
     began = time.perf_counter()
     hull = found.hull
     print(f"  convex hull {hull.size:.2f} {hull.unit} in {time.perf_counter() - began:.1f} s")

@@ -66,7 +66,7 @@ def _groups(
 
 def _means(table: Float[np.ndarray, "s m"], group: Int[np.ndarray, " s"]) -> np.ndarray:
     first = np.flatnonzero(np.diff(group, prepend=-1))
-    size = np.diff([*first, len(group)])
+    size = np.diff(np.append(first, len(group)))
     means = np.add.reduceat(table, first, axis=0) / size[:, None]
     # One reading alone stays what it is, to the last digit.
     return np.where((size == 1)[:, None], table[first], means)
