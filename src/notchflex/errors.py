@@ -65,6 +65,19 @@ class Failure(_Coded):
         "{residual:.2g})",
         "take smaller steps, or the robot has no equilibrium there",
     )
+    TARGET_OUT_OF_REACH = (
+        "the target is out of reach; the nearest that was found misses it by {error:.3g}",
+        "choose a target nearer to what the robot can do, or leave some of its entries free",
+    )
+    LIMITS_PREVENT = (
+        "the limits do not allow the target; the nearest within them misses it by {error:.3g}",
+        "widen the limits, or choose another target",
+    )
+    SEARCH_STOPPED = (
+        "the search for the target stopped before its end; the best that was found misses it by "
+        "{error:.3g}",
+        "take smaller steps between targets, or allow more solves",
+    )
 
 
 class ErrorCode(_Coded):
@@ -107,6 +120,10 @@ class ErrorCode(_Coded):
     INVALID_ROBOT = (
         "a robot description has a value that is missing or not allowed",
         "change the keys that the message names; see the page on robot files",
+    )
+    INVALID_SPECIFICATION = (
+        "a specification, such as that of a design, has a value that is missing or not allowed",
+        "change the keys that the message names",
     )
     STATE_OF_ANOTHER_ROBOT = (
         "a state or a file belongs to another robot, or to other values of this one",
@@ -161,8 +178,8 @@ class InputError(ValueError):
     (
         UNKNOWN_NAME, WRONG_TYPE, BAD_SYNTAX, NOT_A_NUMBER, NOT_FINITE, OUT_OF_RANGE,
         WRONG_SHAPE, MISSING_VALUE, CONFLICT, NO_DATA, TOO_FEW_DATA, UNSUPPORTED,
-        INVALID_ROBOT, STATE_OF_ANOTHER_ROBOT, FILE_NOT_FOUND, FILE_UNREADABLE,
-        FILE_UNWRITABLE, FILE_FORMAT, FILE_DAMAGED, TABLE_COLUMNS, TABLE_ROWS,
+        INVALID_ROBOT, INVALID_SPECIFICATION, STATE_OF_ANOTHER_ROBOT, FILE_NOT_FOUND,
+        FILE_UNREADABLE, FILE_UNWRITABLE, FILE_FORMAT, FILE_DAMAGED, TABLE_COLUMNS, TABLE_ROWS,
         MISSING_PACKAGE, NOT_CONVERGED, PROCESS_FAILED, NO_CONNECTION
     ) = map(_Raised, list(ErrorCode)[1:])
     # fmt: on

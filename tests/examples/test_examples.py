@@ -18,13 +18,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import notchflex as nf
 from balance import left_over
 from oracles import frames
 from oracles.wrist import A, Wrist
 from reference_data import choose, reference
 
 ROOT = Path(__file__).resolve().parents[2]
-FILES = sorted((ROOT / "examples").glob("*.py"))
+FILES = {int(file.name[:2]): file for file in sorted((ROOT / "examples").glob("*.py"))}
 ANGLE = 1e-8  # rad; what the tables and oracles are met to elsewhere
 
 
@@ -33,25 +34,26 @@ def ran(number: int) -> tuple[dict[str, Any], str]:
     """Names that an example leaves, and what it prints."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
-        names = runpy.run_path(str(FILES[number - 1]))
+        names = runpy.run_path(str(FILES[number]))
     return names, printed.getvalue()
 
 
-def test_there_are_ten_and_each_asks_a_question():
-    assert [file.name[:3] for file in FILES] == [f"{number:02d}_" for number in range(1, 11)]
-    for file in FILES:
+def test_each_has_its_number_and_asks_a_question():
+    assert len(FILES) == len(list((ROOT / "examples").glob("*.py"))) >= 11
+    for number, file in FILES.items():
+        assert file.name.startswith(f"{number:02d}_")
         text = file.read_text(encoding="utf-8")
         assert re.match(r'"""[^"]*\?"""\n', text), f"{file.name} begins with no question"
         assert 13 <= len(text.splitlines()) <= 50, file.name
 
 
-@pytest.mark.parametrize("number", range(1, 11))
+@pytest.mark.parametrize("number", FILES)
 def test_page_shows_the_example_and_what_it_prints(number):
     page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
     _, printed = ran(number)
-    text = FILES[number - 1].read_text(encoding="utf-8")
+    text = FILES[number].read_text(encoding="utf-8")
     question, code = re.match(r'"""(.*?)"""\n\n(.*)', text, re.DOTALL).groups()
-    part = f"## {question}\n\n`examples/{FILES[number - 1].name}`\n\n"
+    part = f"## {question}\n\n`examples/{FILES[number].name}`\n\n"
     part += f"```python\n{code}```\n\n```text\n{printed}```\n"
     assert part in page, "run docs/make/examples.py"
 
@@ -206,3 +208,67 @@ def test_what_friction_does(margin):
         angle = np.degrees([state.angle.sum() for state in states])
         margin.within(f"bend at mu {mu}", bend - angle[30], 1e-6, "deg")
         margin.within("loop", loop - (angle[::-1] - angle)[:31].max(), 1e-6, "deg")
+
+
+def test_from_robot_to_cut_file(margin):
+    pytest.importorskip("ezdxf", reason="needs the extra export")
+    names = ran(12)[0]
+    half = np.arccos(1.0 - 1.4 / 0.81)
+    wanted = np.array([0.8, 2.0 * 0.81 * half]) - names["kerf"]
+    margin.within("path of the beam", names["window"] - wanted, 1e-9, "mm")
+    wide = half + 0.5 * names["kerf"] / 0.81
+    larger = A.with_(
+        depth=(0.81 * (1.0 - np.cos(wide)),) * 5,
+        height=(0.8 + names["kerf"],) * 5,
+        uncut=(1.2 - names["kerf"],) * 5,
+    )
+    expected = [np.degrees(one.pull(1.0)[0].sum()) for one in (A, larger)]
+    margin.within("bends", names["bends"] - np.array(expected), 1e-6, "deg")
+
+
+def test_run_it_in_mujoco(margin):
+    """MuJoCo shares no code with the chain."""
+    pytest.importorskip("mujoco", reason="needs the extra robotics")
+    names, printed = ran(13)
+    chain, angle = names["chain"], names["angle"]
+    margin.within("total angle, part of its range", (angle - chain) / np.ptp(chain), 0.02)
+    assert "area of the loop: 1.0" in printed
+
+
+def test_which_dimension_to_control():
+    names, printed = ran(11)
+    found = names["found"]
+    # Steeper than any other: a deviation of 5 % of the modulus, by its own difference.
+    bends = [
+        nf.solve(names["wrist"].with_value("material.elastic_modulus", modulus), nf.Load(0.9))
+        for modulus in (9990.0, 10010.0)
+    ]
+    spread = 500.0 * abs(bends[1].total_angle - bends[0].total_angle) / 20.0
+    index = found.sources.index("material.elastic_modulus")
+    assert abs(found.linear.spread[0, index]) == pytest.approx(spread, rel=1e-4)
+    assert found.order[0] == index
+    assert "check material.elastic_modulus" in printed
+
+
+def test_what_pushes_at_the_tip():
+    names, printed = ran(15)
+    sensed, push = names["sensed"], np.array(names["push"])
+    assert ((sensed.low[:, 0] <= push) & (sensed.high[:, 0] >= push)).all()
+    assert sensed.contact.tolist() == (push > 0.0).tolist()
+    # Where the tendon sticks another force, solved by itself, gives the same stroke.
+    other = names["read"].load.part(0, 5)
+    moved = (nf.Load(tip_force=(0.0165, 0.0, 0.0)).external,)
+    changed = nf.LoadPath(other.tension, other.stroke, external=(*other.external[:4], *moved))
+    stroke = nf.simulate(names["wrist"], changed).stroke[-1, 0]
+    assert abs(stroke - names["read"].stroke[4, 0]) < 1e-5
+    assert "sticks" in printed.splitlines()[4]
+
+
+def test_workspace_within_limits():
+    names, _ = ran(16)
+    careful, wrist = names["careful"], names["wrist"]
+    assert careful.strain.max() <= 0.04
+    # The last robot, pulled as far by itself, is at the limit.
+    state = nf.solve(wrist, nf.Load(tension=float(careful.tension.max())))
+    assert state.peak_strain.max() == pytest.approx(0.04, rel=2e-3)
+    assert careful.angle.max() == pytest.approx(state.total_angle, abs=1e-6)

@@ -77,6 +77,11 @@ class SolverRun:
         self._prepared, self.first, self.table = prepared, first, table
         self.from_start = from_start
 
+    def only(self, row: int) -> SolverRun:
+        """Return one of the loads alone; all of them began at the same state."""
+        rows = slice(row, row + 1)
+        return SolverRun(self._prepared, self.first, self.table[rows], self.from_start[rows])
+
     @cached_property
     def states(self) -> Float[np.ndarray, "s state"]:
         """The last solved state at each load, packed: its own, or as far as it was followed."""

@@ -1,0 +1,43 @@
+"""The table of `notchflex follow`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from notchflex._quantity import DEGREES
+from notchflex.cli import terminal
+from notchflex.cli.tables.path_rows import MOST_ROWS
+
+if TYPE_CHECKING:
+    from notchflex.control import Following
+
+
+def print_following(found: Following) -> None:
+    """Print drives, tip and error of every target; of many targets some."""
+    console, tendons = terminal.output(terminal.width()), found.tension.shape[1]
+    met = int(found.reached.sum())
+    console.print(f"{found.robot.name}: {met} of {len(found)} targets met", soft_wrap=True)
+    heads = [">target\n"]
+    for what, unit in (("tension", "N"), ("stroke", "mm")):
+        heads += [f">{what}{'' if tendons == 1 else f' {i + 1}'}\n{unit}" for i in range(tendons)]
+    heads += [">tip x\nmm", ">tip y\nmm", ">tip z\nmm", ">angle\ndeg", ">error\n", "\n"]
+    numbers = np.concatenate([found.tension, found.stroke, found.tip_position], axis=1)
+    angle = found.path.total_angle[found.step] * DEGREES
+    stride = -(-len(found) // MOST_ROWS)
+    shown = sorted({*range(0, len(found), stride), len(found) - 1})
+    vias = np.diff(found.step, prepend=-1) > 1
+    rows = [
+        [
+            str(i + 1),
+            *(f"{value:.4f}" for value in numbers[i]),
+            f"{angle[i]:.2f}",
+            f"{found.error[i]:.1e}",
+            " ".join([*(["overshoot"] if vias[i] else []), found.code[i]]).strip(),
+        ]
+        for i in shown
+    ]
+    console.print(terminal.table(heads, rows))
+    if stride > 1:
+        terminal.note(f"every {stride}th target is shown; --csv FILE writes all.")

@@ -1,0 +1,207 @@
+"""The way to a target: at once, or over a state from which friction helps.
+
+At one tension a robot is bent more after unloading than after loading. A target can often be met on
+either branch: by pulling up to it, or by pulling beyond it and letting go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.control.drive_model import Response
+from notchflex.control.problem import Attempt, Problem
+from notchflex.control.search import find
+from notchflex.control.walk import limit_rows
+from notchflex.errors import Failure
+
+Approach = Literal["direct", "loading", "unloading", "least"]
+
+# An overshoot goes so far beyond what reverses all contacts.
+_BEYOND = 0.05
+# Limits count as kept within this part of them.
+_KEPT = 1e-6
+# Where the search from the present drives fails, it starts again just beyond their dead bands, by
+# this part of them,
+_BEYOND_BAND = 1e-3
+# from these parts of them,
+_STARTS = (0.5, 0.1, 0.0)
+# from each tendon pulled alone by this part of what about closes a notch,
+_ALONE = 0.15
+# and from the best that it found without the drives that are smaller than this part of the largest,
+_SMALL = 0.2
+# and follows the target from the present values in so many parts.
+_PARTS = 6
+
+
+class Way(NamedTuple):
+    """How a target is approached.
+
+    Attributes:
+        via: Drives of the overshoot before the last load; None where there is none.
+        last: Where the search ended.
+        solves: How many loads were solved, those of other ways included.
+    """
+
+    via: Float[np.ndarray, " t"] | None
+    last: Attempt
+    solves: int
+
+
+def approach_target(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    start: Float[np.ndarray, " t"],
+    goal: Float[np.ndarray, " m"],
+    approach: Approach = "direct",
+    known: Response | None = None,
+) -> Way:
+    """Find drives that meet a target, and the way to them.
+
+    Args:
+        problem: What is aimed at, and the limits.
+        before: The state before, packed.
+        start: Its drives.
+        goal: The target; NaN where an entry is free.
+        approach: "direct", with the last load rising ("loading") or falling ("unloading"), or
+            whichever way needs the smallest drives ("least").
+        known: Values and slopes of the state before, where they are known.
+    """
+    direct = find_anyhow(problem, before, start, goal, known)
+    ways = [Way(None, direct, direct.solves)]
+    if approach == "direct" or not direct.response.converged:
+        return ways[0]
+    change = _change(problem, start, direct.drive)
+    if (approach == "loading" and change > 0.0) or (approach == "unloading" and change < 0.0):
+        return ways[0]
+    friction = problem.model.friction(direct.response.state)
+    for over in (True, False):
+        if (over and approach == "loading") or (not over and approach == "unloading"):
+            continue
+        via = _via(problem, direct.drive, friction, over, change > 0.0)
+        between = problem.model.solve(before, via)
+        if not between.converged or not _allowed(problem, between):
+            continue
+        last = find_anyhow(problem, between.state, via, goal, None)
+        right_way = (_change(problem, via, last.drive) < 0.0) is over
+        if right_way or last.failure is not None:
+            ways.append(Way(via, last, last.solves + 1))
+    solves = sum(way.solves for way in ways)
+    wanted = ways if approach == "least" else ways[1:] or ways
+    return min(wanted, key=_rank)._replace(solves=solves)
+
+
+def _rank(way: Way) -> tuple[bool, bool, float, float]:
+    failed = way.last.failure is not None
+    broken = not _keeps_limits(way.last)
+    return failed, broken, way.last.error if failed else 0.0, way.last.effort
+
+
+def _change(problem: Problem, start: np.ndarray, end: np.ndarray) -> float:
+    """How far the drives rise, all together."""
+    return float(np.sum((end - start)[problem.driven]))
+
+
+def _via(
+    problem: Problem, drive: np.ndarray, friction: np.ndarray, over: bool, rises: bool
+) -> np.ndarray:
+    """Drives above or below those of the target, from which all contacts turn round on the way."""
+    if not problem.by_tension:
+        friction = np.zeros_like(friction)
+    # The same shape needs a tension that is about the friction of all contacts (as a logarithm)
+    # smaller after unloading than after loading; to turn all contacts round takes twice that.
+    other = friction if rises is over else 2.0 * friction
+    factor = np.exp(other) * (1.0 + _BEYOND) if over else np.exp(-other) * (1.0 - _BEYOND)
+    via = np.where(problem.driven, drive * factor, drive)
+    return np.clip(via, problem.low, problem.high)
+
+
+def find_anyhow(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    start: Float[np.ndarray, " t"],
+    goal: Float[np.ndarray, " m"],
+    known: Response | None,
+) -> Attempt:
+    """Search from the present drives, and where that fails from others; return the best.
+
+    The tip of a robot that bends far moves to and fro: from afar a search may end in a trough that
+    is not the deepest.
+    """
+    # Where other tendons move, a tendon slides within its dead band too.
+    alone = np.count_nonzero(start[problem.driven]) < 2
+    best = find(problem, before, start, goal, known, over_bands=alone)
+    solves = best.solves
+    if best.failure is not None:
+        other = find(problem, before, start, goal, known, over_bands=not alone)
+        solves += other.solves
+        best = min(best, other, key=_quality)
+    for other_start, over_bands in _other_starts(problem, before, start):
+        if best.failure is None:
+            return best._replace(solves=solves)
+        other = find(problem, before, other_start, goal, over_bands=over_bands)
+        solves += other.solves
+        best = min(best, other, key=_quality)
+    if best.failure is not None:
+        other = _by_parts(problem, before, start, goal)
+        solves += other.solves
+        best = min(best, other, key=_quality)
+    if best.failure is not None and problem.driven.sum() > 1:
+        few = np.where(best.drive < _SMALL * best.drive.max(), problem.low, best.drive)
+        other = find(problem, before, few, goal)
+        solves += other.solves
+        best = min(best, other, key=_quality)
+    return best._replace(solves=solves)
+
+
+def _other_starts(
+    problem: Problem, before: np.ndarray, start: np.ndarray
+) -> Iterator[tuple[np.ndarray, bool]]:
+    """Yield drives to start from, and whether the search leaves dead bands out.
+
+    Drives just beyond the dead band of each tendon, parts of all, and each tendon pulled alone.
+    """
+    driven = np.flatnonzero(problem.driven)
+    taut = [tendon for tendon in driven if start[tendon] > 0.0]
+    for tendon in taut if len(taut) > 1 else ():
+        for side, edge in zip((-1.0, 1.0), problem.model.dead_band(before), strict=True):
+            beyond = start.copy()
+            beyond[tendon] = (1.0 + side * _BEYOND_BAND) * edge[tendon]
+            yield beyond, False
+    for part in _STARTS:
+        yield part * start, True
+    for tendon in driven:
+        alone = np.maximum(problem.low, 0.0)
+        alone[tendon] += _ALONE * problem.unit
+        yield alone, True
+
+
+def _quality(attempt: Attempt) -> tuple[bool, bool, float]:
+    return attempt.failure is not None, not _keeps_limits(attempt), attempt.error
+
+
+def _allowed(problem: Problem, response: Response) -> bool:
+    """Whether a state keeps the limits."""
+    room = limit_rows(problem, response.values, response.jacobian)[1]
+    return not room.size or float(room.min()) >= -_KEPT
+
+
+def _keeps_limits(attempt: Attempt) -> bool:
+    return attempt.response.converged and attempt.excess <= _KEPT
+
+
+def _by_parts(problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray) -> Attempt:
+    """Move the target from the present values to where it is; the memory stays that of before."""
+    here = problem.model.solve(before, np.clip(start, problem.low, problem.high))
+    values, solves = here.values[problem.entries], 1
+    loose = problem._replace(search=problem.search.loose)
+    attempt = Attempt(start, here, np.inf, 0.0, 1, Failure.SEARCH_STOPPED)
+    for part in range(1, _PARTS + 1):
+        aim = problem if part == _PARTS else loose
+        towards = values + part / _PARTS * (goal - values)
+        attempt = find(aim, before, attempt.drive, towards)
+        solves += attempt.solves
+    return attempt._replace(solves=solves)

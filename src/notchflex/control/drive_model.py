@@ -1,0 +1,255 @@
+"""A robot prepared for control: one compiled program solves a load and differentiates it.
+
+`nf.solve` prepares robot, load and result anew each time and returns everything that may be asked.
+A search or a control loop asks for a few quantities and their derivatives by the drives, hundreds
+of times a second: here all that stays the same is packed once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from notchflex._jax import jax, jnp
+from notchflex._quantity import REGISTERED
+from notchflex.analysis.derivatives.tangent import StepLayouts, lanes_of, step_function
+from notchflex.analysis.solve import prepare_for
+from notchflex.loads.command import make_commands
+from notchflex.loads.load_path import LoadPath
+from notchflex.mechanics.motion import rotation_about
+from notchflex.results.state import SavedState, State, fitted
+from notchflex.robot import Robot
+from notchflex.solver.continuation import SolverState, solve_load_step
+from notchflex.solver.derived.quantities import believable, unpad_quantity
+from notchflex.solver.derived.solved_state import SolvedState
+from notchflex.solver.newton import DEFAULT, Settings
+from notchflex.solver.programs.capacity import pad_rows
+from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.prepare import PreparedChain
+
+
+class Response(NamedTuple):
+    """A solved load, and how what was asked of it changes with the drives.
+
+    Attributes:
+        state: The state, packed for the padded chain.
+        values: Quantities that were asked, one after the other, flattened, (m,).
+        jacobian: Their change per unit of every drive (N or mm), (m, t). NaN where the load was
+            so hard that its derivatives are not known.
+        converged: Whether the load has an equilibrium within what the model is for.
+        whole: Whether it was solved in one substep.
+    """
+
+    state: Float[np.ndarray, " state"]
+    values: Float[np.ndarray, " m"]
+    jacobian: Float[np.ndarray, "m t"]
+    converged: bool
+    whole: bool
+
+
+class _Places(NamedTuple):
+    """Where a packed state holds what control needs of it.
+
+    Attributes:
+        tension: Base tension of every tendon, (t,).
+        stroke: Its stroke, (t,).
+        first_ratio: Log ratio of its first contact, (t,).
+        first_bound: Largest of that, (t,).
+        bounds: Of all its contacts, one array per tendon.
+    """
+
+    tension: np.ndarray
+    stroke: np.ndarray
+    first_ratio: np.ndarray
+    first_bound: np.ndarray
+    bounds: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class DriveModel:
+    """A robot under given external loads, as a function of its drives and of the state before.
+
+    Attributes:
+        robot: The robot.
+        load: One step: which tendons are driven by stroke, and the external loads.
+        outputs: Quantities that are asked.
+        start: State to continue from; rest where None.
+        settings: Tolerance and limits of the solver.
+    """
+
+    robot: Robot
+    load: LoadPath
+    outputs: tuple[str, ...]
+    start: State | SavedState | None = None
+    settings: Settings = DEFAULT
+
+    def solve(
+        self, before: Float[np.ndarray, " state"], drive: Float[np.ndarray, " t"]
+    ) -> Response:
+        """Solve one load from a state, and differentiate it.
+
+        Args:
+            before: The state before, packed.
+            drive: Tension (N) or stroke (mm) of every tendon.
+        """
+        load = self._packed_load.copy()
+        load[self._targets] = drive
+        chain, settings = self.prepared.long.dynamic_vector, self._numbers
+        state, flat, slopes, status = _respond(chain, before, load, settings, self._layouts)
+        values, jacobian = flat[self._own], slopes[:, self._own].T
+        if self._turn is not None:
+            values, jacobian = self._turn @ values, self._turn @ jacobian
+        return Response(state, values, jacobian, bool(status[0]), bool(status[1]))
+
+    @cached_property
+    def prepared(self) -> PreparedChain:
+        """The robot as arrays, with modes enough for the loads and for the state before."""
+        refinement = 0 if self.start is None else self.start.refinement
+        return prepare_for(self.robot, self.load, self.start, refinement)
+
+    @cached_property
+    def first(self) -> Float[np.ndarray, " state"]:
+        """The state to continue from, packed for the padded chain."""
+        own = self.prepared.state.pack(fitted(self.start, self.prepared.chain))
+        return pad_rows(np.asarray(own), self.prepared.state, self.prepared.long.state)
+
+    def drives(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
+        """Return tensions (N), of tendons driven by stroke strokes (mm), of a packed state."""
+        places = self._places
+        by_stroke = ~np.isnan(self.load.stroke[0])
+        return np.where(by_stroke, state[places.stroke], state[places.tension])
+
+    def dead_band(
+        self, state: Float[np.ndarray, " state"]
+    ) -> tuple[Float[np.ndarray, " t"], Float[np.ndarray, " t"]]:
+        """Return between which drives nothing moves, as the first contact of a tendon sticks.
+
+        Exactly so while the other tendons stay as they are. A stroke always moves something.
+        """
+        drive, places = self.drives(state), self._places
+        by_stroke = ~np.isnan(self.load.stroke[0])
+        ratio, bound = state[places.first_ratio], state[places.first_bound]
+        low, high = (drive * np.exp(-ratio + side * bound) for side in (-1.0, 1.0))
+        still = by_stroke | (np.abs(ratio) > bound)
+        low = np.where(still, drive, np.minimum(low, drive))
+        return low, np.where(still, drive, np.maximum(high, drive))
+
+    def friction(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
+        """Return the logarithm of the largest tension ratio over all contacts of every tendon."""
+        return np.array([state[places].sum() for places in self._places.bounds])
+
+    @cached_property
+    def _places(self) -> _Places:
+        long = self.prepared.long
+        numbers: SolverState = jax.tree.unflatten(long.state.structure, long.state.indices)
+        chain = self.prepared.chain
+        ratios, bounds = ([np.zeros(0, int)] * chain.tendons for _ in range(2))
+        memory: Any = numbers.memory
+        for group, ratio, bound in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
+            for column, tendon in enumerate(group.numbers):
+                edges = np.asarray(chain.contacts)[tendon]
+                edges = edges[edges >= 0]
+                ratios[tendon] = ratio[edges // 2, column, edges % 2]
+                bounds[tendon] = bound[edges // 2, column, edges % 2]
+        point: Any = numbers.point
+        ratio, bound = (np.array([one[0] for one in every]) for every in (ratios, bounds))
+        drawn: Any = numbers.stroke
+        return _Places(point.base_tension, drawn, ratio, bound, tuple(bounds))
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where the entries of each output are in `Response.values`."""
+        ends = np.cumsum([0, *(int(np.prod(shape)) for shape in self.shapes.values())])
+        return {n: slice(*ends[i : i + 2]) for i, n in enumerate(self.shapes)}
+
+    @cached_property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shape of each output, in the order of `Response.values`."""
+        return {name: shape for name, (shape, _) in self._selected.items()}
+
+    @cached_property
+    def _selected(self) -> dict[str, tuple[tuple[int, ...], np.ndarray]]:
+        """Shape of each output of the robot itself, and where its numbers are in the padded one."""
+        long, begin = self.prepared.long.chain, 0
+        sizes = {"tendon": long.tendons, "notch": long.flexures, "body": long.flexures + 1}
+        found: dict[str, tuple[tuple[int, ...], np.ndarray]] = {}
+        for name in self.outputs:
+            shape = [sizes.get(axis, 3) for axis in REGISTERED[name].per]
+            places = begin + np.arange(int(np.prod(shape))).reshape(shape)
+            begin += places.size
+            own = unpad_quantity(self.prepared.chain, name, places.astype(float))
+            found[name] = (own.shape, own.ravel().astype(int))
+        return found
+
+    @cached_property
+    def _own(self) -> np.ndarray:
+        return np.concatenate([places for _, places in self._selected.values()])
+
+    @cached_property
+    def _turn(self) -> np.ndarray | None:
+        """Turns flattened values from the frame of the base to the world; None for no turn."""
+        angles = self.load.base_rotation
+        if not angles.any():
+            return None
+        rotation = np.asarray(rotation_about(jnp.asarray(angles)))
+        every = np.eye(len(self._own))
+        for name, shape in self.shapes.items():
+            at = self.slices[name]
+            columns = every[at, at].reshape(-1, *shape)
+            turned = REGISTERED[name].turned(columns, rotation)
+            every[at, at] = np.reshape(turned, (len(columns), -1)).T
+        return every
+
+    @cached_property
+    def _packed_load(self) -> np.ndarray:
+        return self._commands[0][0]
+
+    @cached_property
+    def _commands(self) -> tuple[np.ndarray, Any]:
+        ready = self.prepared
+        return ready.padded_commands(make_commands(self.load, self.robot, ready.chain))
+
+    @cached_property
+    def _targets(self) -> np.ndarray:
+        return self._commands[1].indices[0]  # the first field of a `Command`
+
+    @cached_property
+    def _layouts(self) -> StepLayouts:
+        long = self.prepared.long
+        return StepLayouts(long.static_structure, self._commands[1], long.state, self.outputs)
+
+    @cached_property
+    def _numbers(self) -> np.ndarray:
+        return np.array(self.settings.numbers, float)
+
+
+@native(4, lanes_of)
+def _respond(
+    chain_vector: Float[Array, " chain"],
+    before: Float[Array, " state"],
+    load: Float[Array, " command"],
+    numbers: Float[Array, " settings"],
+    layouts: StepLayouts,
+) -> tuple[Array, Array, Array, Array]:
+    """A solved load: its state, what is asked of it, its slopes by the drives, and its status."""
+    chain, command = layouts.chain.unpack(chain_vector), layouts.command.unpack(load)
+    last = layouts.state.unpack(before)
+    result = solve_load_step(chain, command, last, Settings.of(numbers))
+    state = layouts.state.pack(result.solved)
+    way = jnp.stack([result.part_before, 1.0 * result.parts, 1.0 * result.converged, 0.0])
+    step = step_function(state, layouts.state.pack(result.between), way, layouts)
+
+    def flat(load: Array) -> Array:
+        found = step(chain, load, before)[1]
+        return jnp.concatenate([jnp.ravel(found[name]) for name in layouts.outputs])
+
+    values, change = jax.linearize(flat, load)
+    at = np.asarray(layouts.command.indices[0])
+    units = jnp.zeros((len(at), load.size)).at[np.arange(len(at)), at].set(1.0)
+    slopes = jax.lax.scan(lambda none, unit: (none, change(unit)), jnp.zeros(()), units)[1]
+    good = result.converged & believable(SolvedState(chain, result.solved).quantity)
+    return state, values, slopes, jnp.stack([1.0 * good, 1.0 * (result.parts == 1)])

@@ -1,0 +1,224 @@
+"""What following targets returns: drives, states, and how near each target was met."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, overload
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from notchflex._summary import Displayed, Summary, short, vector
+from notchflex.analysis.solve import simulate
+from notchflex.control.problem import Attempt
+from notchflex.control.targets import Targets
+from notchflex.errors import Failure
+from notchflex.loads import Load, LoadPath
+from notchflex.results.equilibrium import Equilibrium
+from notchflex.results.path import EquilibriumPath
+from notchflex.results.state import SavedState, State
+from notchflex.robot import Robot
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Following(Displayed):
+    """Drives that meet targets one after the other; k targets, t tendons.
+
+    Attributes:
+        robot: The robot.
+        targets: The targets.
+        load: All loads in order, those of overshoots between targets included.
+        step: Which of the loads meets each target, from 0, (k,).
+        attempts: Where the search for each target ended.
+        start: The state before the first; None for rest.
+        tolerance: Error at which a target counted as met.
+    """
+
+    robot: Robot
+    targets: Targets
+    load: LoadPath
+    step: Int[np.ndarray, " k"]
+    attempts: tuple[Attempt, ...]
+    start: State | SavedState | None = None
+    tolerance: float = 0.0
+
+    def __len__(self) -> int:
+        """Number of targets."""
+        return len(self.targets)
+
+    @overload
+    def __getitem__(self, target: int) -> Reach: ...
+    @overload
+    def __getitem__(self, target: slice) -> list[Reach]: ...
+    def __getitem__(self, target: int | slice) -> Reach | list[Reach]:
+        """The result for one target, from 0, or for some of them."""
+        if isinstance(target, slice):
+            return [Reach(self, i) for i in range(*target.indices(len(self)))]
+        if not -len(self) <= target < len(self):
+            raise IndexError(f"target {target} of {len(self)} targets")
+        return Reach(self, target % len(self))
+
+    @cached_property
+    def path(self) -> EquilibriumPath:
+        """All states in order, simulated anew from the loads; those of overshoots included."""
+        return simulate(self.robot, self.load, from_state=self.start, refinement=self._refinement)
+
+    @property
+    def _refinement(self) -> int:
+        return 0 if self.start is None else self.start.refinement
+
+    @property
+    def reached(self) -> Bool[np.ndarray, " k"]:
+        """Whether each target is met."""
+        return np.array([one.failure is None for one in self.attempts])
+
+    @property
+    def error(self) -> Float[np.ndarray, " k"]:
+        """Weighted distance from each target (mm, N, rad)."""
+        return np.array([one.error for one in self.attempts])
+
+    @property
+    def solves(self) -> Int[np.ndarray, " k"]:
+        """How many loads were solved for each target."""
+        return np.array([one.solves for one in self.attempts])
+
+    @property
+    def code(self) -> list[str]:
+        """Name of the `Failure` for each target; empty where it is met."""
+        return [one.failure.name if one.failure else "" for one in self.attempts]
+
+    @property
+    def reason(self) -> list[str]:
+        """Why each target is not met; empty where it is."""
+        return [_reason(one.failure, one.error) for one in self.attempts]
+
+    @cached_property
+    def tension(self) -> Float[np.ndarray, "k t"]:
+        """Tension of every tendon at each target, N."""
+        return self.path.tension[self.step]
+
+    @cached_property
+    def stroke(self) -> Float[np.ndarray, "k t"]:
+        """Length drawn out of every tendon at each target, mm."""
+        return self.path.stroke[self.step]
+
+    @cached_property
+    def tip_position(self) -> Float[np.ndarray, "k 3"]:
+        """Position of the tip at each target, mm."""
+        return self.path.tip_position[self.step]
+
+    @property
+    def state(self) -> State:
+        """The state after the last target, to continue from."""
+        return self.path.state
+
+    def _summary(self) -> Summary:
+        met = int(self.reached.sum())
+        rows = [
+            ("targets", f"{len(self)}, {met} met"),
+            ("largest error", short(float(self.error.max()))),
+            ("largest tension", f"{short(float(self.path.tension.max()))} N"),
+            ("solves", f"{int(self.solves.sum())}"),
+        ]
+        if met < len(self):
+            first = int(np.argmin(self.reached))
+            rows.append((f"target {first + 1}", self.reason[first]))
+        hint = "[target] is one result; also .tension, .stroke, .path, .state"
+        return Summary(f"Targets followed by {self.robot.name}", rows, hint)
+
+
+def _reason(failure: Failure | None, error: float) -> str:
+    return f"{failure.text.format(error=error)}; {failure.remedy}" if failure else ""
+
+
+class Reach(Displayed):
+    """Drives that meet one target, and the state there.
+
+    Example:
+        >>> from notchflex import load_robot, reach
+        >>> found = reach(load_robot("pacheco2021-a"), {"total_angle": 1.0}, approach="direct")
+        >>> f"{found.tension[0]:.4f} N", found.code
+        ('1.0601 N', '')
+    """
+
+    def __init__(self, following: Following, target: int) -> None:
+        """Look at one target."""
+        self.following, self.target = following, target
+
+    @property
+    def loads(self) -> list[Load]:
+        """What to command: the load at the target, before it that of an overshoot if any."""
+        every, step = self.following, self.following.step
+        first = 0 if self.target == 0 else int(step[self.target - 1]) + 1
+        return [every.load[i] for i in range(first, int(step[self.target]) + 1)]
+
+    @property
+    def load(self) -> Load:
+        """The load at the target."""
+        return self.loads[-1]
+
+    @property
+    def reached(self) -> bool:
+        """Whether the target is met."""
+        return self._attempt.failure is None
+
+    @property
+    def error(self) -> float:
+        """Weighted distance from the target (mm, N, rad)."""
+        return self._attempt.error
+
+    @property
+    def code(self) -> str:
+        """Name of the `Failure`; empty where the target is met."""
+        return self.following.code[self.target]
+
+    @property
+    def reason(self) -> str:
+        """Why the target is not met; empty where it is."""
+        return self.following.reason[self.target]
+
+    @property
+    def equilibrium(self) -> Equilibrium:
+        """The solved state."""
+        return self.following.path[int(self.following.step[self.target])]
+
+    @property
+    def tension(self) -> Float[np.ndarray, " t"]:
+        """Tension of every tendon, N."""
+        return self.following.tension[self.target]
+
+    @property
+    def stroke(self) -> Float[np.ndarray, " t"]:
+        """Length drawn out of every tendon, mm."""
+        return self.following.stroke[self.target]
+
+    @property
+    def tip_position(self) -> Float[np.ndarray, " 3"]:
+        """Position of the tip, mm."""
+        return self.following.tip_position[self.target]
+
+    @property
+    def state(self) -> State:
+        """The state there, to continue from."""
+        return self.equilibrium.state
+
+    @property
+    def _attempt(self) -> Attempt:
+        return self.following.attempts[self.target]
+
+    def _summary(self) -> Summary:
+        loads: list[Any] = self.loads
+        rows = [
+            ("tension", f"{', '.join(short(float(one)) for one in self.tension)} N"),
+            ("stroke", f"{', '.join(short(float(one)) for one in self.stroke)} mm"),
+            ("tip position", f"{vector(self.tip_position, 3)} mm"),
+            ("error", short(self.error)),
+            ("met", "yes" if self.reached else self.reason),
+        ]
+        if len(loads) > 1:
+            rows.insert(0, ("overshoot", f"over {loads[0]!r}"))
+        return Summary(f"Target of {self.following.robot.name}", rows)
+
+
+__all__ = ["Following", "Reach"]

@@ -1,0 +1,269 @@
+"""Reach one target, or follow many: drives that meet them from the present state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+import numpy as np
+
+from notchflex.control.branches import Approach, approach_target
+from notchflex.control.drive_model import DriveModel
+from notchflex.control.following import Following, Reach
+from notchflex.control.limits import Drive, Limits, bounds_of_robot
+from notchflex.control.problem import Attempt, Problem, TargetSearch
+from notchflex.control.targets import Aim, Targets, aim_at, make_targets
+from notchflex.errors import InputError
+from notchflex.loads import Load, LoadPath
+from notchflex.loads.load_path import load_path
+from notchflex.loads.validation import check_is_robot, short_repr
+from notchflex.results.state import SavedState, State, check_robot
+from notchflex.robot import Robot
+
+# Drives are sought up to so many times what about closes a notch, where no limit is given.
+_MOST = {"tension": 4.0, "stroke": 2.0}
+# A program is compiled for every set of quantities; those of a group cost little beside each other.
+_ASKED_TOGETHER = (
+    ("tip_position", "tip_rotation", "total_angle"),
+    ("tension", "stroke", "peak_strain", "gap"),
+)
+
+
+def reach(
+    robot: Robot,
+    target: Any,
+    *,
+    state: State | SavedState | None = None,
+    load: Load | None = None,
+    drive: Drive = "tension",
+    limits: Limits | None = None,
+    approach: Approach = "least",
+    weights: Mapping[str, float] | None = None,
+    search: TargetSearch | None = None,
+) -> Reach:
+    """Find tensions or strokes that bring a robot from its present state to a target.
+
+    The friction history of the present state counts. A target that can be met after loading as
+    well as after unloading is approached, unless asked otherwise, from the side that needs the
+    smaller tensions; where this is the far side, the result begins with an overshoot.
+
+    Args:
+        robot: The robot.
+        target: Position of the tip (x, y, z), mm; or values by the name of a quantity, such as
+            `{"tip_position": (4.0, None, 9.0), "total_angle": 1.2}`. None is a free entry.
+            "tip_direction" is the unit vector along the tube at the tip.
+        state: The present state; rest where not given.
+        load: External loads that act. Tendons that it commands are held at that; the others are
+            driven.
+        drive: Whether "tension" (N) or "stroke" (mm) is commanded.
+        limits: Limits on drives and robot; tensions of 0 N or more where not given.
+        approach: "least", the way with the smallest drives; "direct", without an overshoot;
+            "loading" or "unloading", with rising or falling drives at the end.
+        weights: What an error of a quantity counts per unit (mm, N, rad); 1 each.
+        search: Tolerance and budget.
+
+    Returns:
+        The drives and the state there. Where the target is not met, `code` and `reason` say why,
+        and the drives are those of the nearest that was found.
+
+    Raises:
+        InputError: Invalid target, limits or state.
+
+    Example:
+        >>> from notchflex import Load, load_robot, solve
+        >>> wrist = load_robot("pacheco2021-a")
+        >>> there = solve(wrist, Load(tension=1.0)).tip_position
+        >>> found = reach(wrist, there, approach="direct")
+        >>> bool(found.reached), round(float(found.tension[0]), 6)
+        (True, 1.0)
+    """
+    targets = make_targets(target, check_is_robot(robot), several=False)
+    if len(targets) > 1:
+        raise InputError.WRONG_SHAPE("reach takes one target; give several to follow")
+    settings = (state, load, drive, limits, approach, weights, search)
+    return _follow(robot, targets, *settings)[0]
+
+
+def follow(
+    robot: Robot,
+    targets: Any,
+    *,
+    state: State | SavedState | None = None,
+    load: Load | None = None,
+    drive: Drive = "tension",
+    limits: Limits | None = None,
+    approach: Approach = "direct",
+    weights: Mapping[str, float] | None = None,
+    search: TargetSearch | None = None,
+) -> Following:
+    """Find tensions or strokes that bring a robot to one target after the other.
+
+    Each target starts from the state that the one before left, with its friction history. After a
+    target that cannot be met the robot stands where it comes nearest.
+
+    Args:
+        robot: The robot.
+        targets: Positions of the tip, (k, 3), mm; or values by the name of a quantity, targets as
+            leading axis; or what `read_targets` returns. None is a free entry.
+        state: The present state; rest where not given.
+        load: External loads, and tendons that are held; as for `reach`.
+        drive: Whether "tension" (N) or "stroke" (mm) is commanded.
+        limits: Limits on drives and robot; `rate` limits the change from target to target.
+        approach: As for `reach`. All but "direct" may overshoot on the way to a target.
+        weights: As for `reach`.
+        search: Tolerance and budget.
+
+    Returns:
+        The drives, the states there, and how near each target was met.
+
+    Raises:
+        InputError: Invalid targets, limits or state.
+
+    Example:
+        >>> from notchflex import load_robot, pull, simulate
+        >>> wrist = load_robot("pacheco2021-a")
+        >>> forward = simulate(wrist, pull(0.5, 1.0, steps=6).release())
+        >>> found = follow(wrist, forward.tip_position)
+        >>> bool(found.reached.all()), bool(abs(found.tension - forward.tension).max() < 1e-6)
+        (True, True)
+    """
+    checked = make_targets(targets, check_is_robot(robot), several=True)
+    return _follow(robot, checked, state, load, drive, limits, approach, weights, search)
+
+
+def _follow(
+    robot: Robot,
+    targets: Targets,
+    state: State | SavedState | None,
+    load: Load | None,
+    drive: Drive,
+    limits: Limits | None,
+    approach: Approach,
+    weights: Mapping[str, float] | None,
+    search: TargetSearch | None,
+) -> Following:
+    if approach not in get_args(Approach):
+        raise InputError.UNKNOWN_NAME(
+            f"approach is one of {', '.join(get_args(Approach))}; got {short_repr(approach)}"
+        )
+    problem, aim = make_problem(robot, targets, state, load, drive, limits, weights, search)
+    model = problem.model
+    rate = np.inf if limits is None or limits.rate is None else limits.rate
+    before, known = model.first, None
+    present = present_drives(problem, before)
+    drives: list[np.ndarray] = []
+    last: list[int] = []
+    attempts: list[Attempt] = []
+    for goal in aim.goals:
+        low = np.maximum(problem.low, np.where(problem.driven, present - rate, -np.inf))
+        high = np.minimum(problem.high, np.where(problem.driven, present + rate, np.inf))
+        chosen = problem.chosen | np.isfinite(rate)
+        near = problem._replace(low=np.minimum(low, high), high=high, chosen=chosen)
+        way = approach_target(near, before, present, goal, approach, known)
+        if way.via is not None:
+            drives.append(way.via)
+        drives.append(way.last.drive)
+        last.append(len(drives) - 1)
+        attempts.append(way.last._replace(solves=way.solves))
+        if way.last.response.converged:
+            present, known = way.last.drive, way.last.response
+            before = known.state
+    applied = _load_path(problem, np.array(drives))
+    tolerance = problem.search.tolerance
+    return Following(robot, targets, applied, np.array(last), tuple(attempts), state, tolerance)
+
+
+def make_problem(
+    robot: Robot,
+    targets: Targets,
+    state: State | SavedState | None,
+    load: Load | None,
+    drive: Drive,
+    limits: Limits | None,
+    weights: Mapping[str, float] | None,
+    search: TargetSearch | None,
+) -> tuple[Problem, Aim]:
+    """Return what a search needs of robot and limits, and the targets as numbers.
+
+    Raises:
+        InputError: Anything that cannot be used.
+    """
+    if drive not in get_args(Drive):
+        raise InputError.UNKNOWN_NAME(f'drive is "tension" or "stroke"; got {short_repr(drive)}')
+    for value, kind, name in (
+        (load, Load, "load"),
+        (limits, Limits, "limits"),
+        (search, TargetSearch, "search"),
+        (state, State | SavedState, "state"),
+    ):
+        if value is not None and not isinstance(value, kind):
+            raise InputError.WRONG_TYPE(f"{name} cannot be {short_repr(value)}; see its help")
+    if state is not None:
+        check_robot(state, robot)
+    tendons, limits = robot.number_of_tendons, limits or Limits()
+    given = load_path(load or Load(), tendons)
+    held = ~np.isnan(given.tension[0]) | ~np.isnan(given.stroke[0])
+    if held.all():
+        raise InputError.CONFLICT(
+            "the load commands every tendon, so that none is left to be driven; "
+            "leave the tension of those to be driven out"
+        )
+    low, high = limits.bounds(drive, tendons)
+    fixed = np.where(np.isnan(given.stroke[0]), given.tension[0], given.stroke[0])
+    bounds = tuple(bounds_of_robot(limits, drive, tendons, robot.number_of_notches))
+    outputs = [*targets.outputs, *(one.quantity for one in bounds)]
+    model = DriveModel(robot, _driven(given, drive, held), _together(outputs), state)
+    chain = model.prepared.chain
+    unit = float(chain.closing_force)
+    if drive == "stroke":
+        unit = float(np.asarray(chain.rods.length).sum())
+    most = _MOST[drive] * unit
+    low = np.where(held, fixed, np.maximum(low, -most if drive == "stroke" else 0.0))
+    chosen = held | (high <= most)
+    high = np.where(held, fixed, np.maximum(np.minimum(high, most), low))
+    aim = aim_at(targets, model.slices, weights)
+    problem = Problem(
+        model=model,
+        entries=aim.entries,
+        weights=aim.weights,
+        driven=~held,
+        low=low,
+        high=high,
+        chosen=chosen,
+        bounds=bounds,
+        unit=unit,
+        by_tension=drive == "tension",
+        search=search or TargetSearch(),
+    )
+    return problem, aim
+
+
+def _together(outputs: Sequence[str]) -> tuple[str, ...]:
+    """Quantities that are asked, with those usually asked beside them: fewer programs."""
+    groups = [group for group in _ASKED_TOGETHER if set(group) & set(outputs)]
+    usual = [name for group in groups for name in group]
+    return tuple(dict.fromkeys([*usual, *sorted(set(outputs))]))
+
+
+def present_drives(problem: Problem, state: np.ndarray) -> np.ndarray:
+    """Return the drives of a packed state; of held tendons what they are held at."""
+    return np.where(problem.driven, problem.model.drives(state), problem.low)
+
+
+def _driven(given: LoadPath, drive: Drive, held: np.ndarray) -> LoadPath:
+    """The load with a command for every tendon, of what is driven a zero."""
+    tables = {"tension": given.tension.copy(), "stroke": given.stroke.copy()}
+    tables[drive][0, ~held] = 0.0
+    return LoadPath(tables["tension"], tables["stroke"], given.base_rotation, given.external)
+
+
+def _load_path(problem: Problem, drives: np.ndarray) -> LoadPath:
+    one = problem.model.load
+    by_stroke = ~np.isnan(one.stroke[0])
+    tension = np.where(by_stroke, np.nan, drives)
+    stroke = np.where(by_stroke, drives, np.nan)
+    external = tuple(one.external[0] for _ in drives)
+    return LoadPath(np.maximum(tension, 0.0), stroke, one.base_rotation, external)
+
+
+__all__ = ["follow", "make_problem", "present_drives", "reach"]

@@ -1,0 +1,106 @@
+"""What a search for a target is given, and what it returns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.control.drive_model import DriveModel, Response
+from notchflex.control.limits import Bound
+from notchflex.errors import Failure, InputError
+from notchflex.loads.validation import check_integer, check_number
+
+
+def size_of(vector: Float[np.ndarray, " k"]) -> float:
+    """Return the Euclidean norm of a vector; of a short one faster than NumPy does."""
+    return math.sqrt(float(vector @ vector))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TargetSearch:
+    """Tolerance and budget of a search for a target.
+
+    Attributes:
+        tolerance: Weighted error (mm, N, rad) at which a target counts as met.
+        solves: Largest number of solves for one target.
+
+    Raises:
+        InputError: A number that is not positive.
+    """
+
+    tolerance: float = 1e-7
+    solves: int = 80
+
+    @property
+    def loose(self) -> TargetSearch:
+        """For a target on the way to another."""
+        return TargetSearch(tolerance=max(self.tolerance, 1e-3), solves=self.solves)
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        check_number(self.tolerance, "the tolerance of a search")
+        check_integer(self.solves, "the number of solves of a search")
+        if not self.tolerance > 0.0 or not self.solves >= 1:
+            raise InputError.OUT_OF_RANGE(
+                "a search needs a positive tolerance and at least one solve; "
+                f"got {self.tolerance!r} and {self.solves!r}"
+            )
+
+
+class Problem(NamedTuple):
+    """What a search is for: one target, and what may not be exceeded.
+
+    Attributes:
+        model: The robot.
+        entries: Which numbers of a response are aimed at.
+        weights: What an error of one unit counts.
+        driven: Which tendons are driven; the others keep what the load commands.
+        low: Lowest drive of every tendon, N or mm.
+        high: Highest drive.
+        chosen: Whether each drive has a highest value, or one above which nothing is sought.
+        bounds: Limits on other quantities.
+        unit: Drive that about closes a notch, N or mm.
+        by_tension: Whether drives are tensions; otherwise they are strokes.
+        search: Tolerance and budget.
+    """
+
+    model: DriveModel
+    entries: np.ndarray
+    weights: np.ndarray
+    driven: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    chosen: np.ndarray
+    bounds: tuple[Bound, ...]
+    unit: float
+    by_tension: bool
+    search: TargetSearch
+
+
+class Attempt(NamedTuple):
+    """Where a search ended.
+
+    Attributes:
+        drive: Drives of all tendons, N or mm.
+        response: The solved state there.
+        error: Weighted distance from the target.
+        excess: Largest violation of a limit, as a part of it; 0 where all are kept.
+        solves: How many loads were solved.
+        failure: Why the target is not met; None where it is.
+    """
+
+    drive: Float[np.ndarray, " t"]
+    response: Response
+    error: float
+    excess: float
+    solves: int
+    failure: Failure | None
+
+    @property
+    def effort(self) -> float:
+        """Size of the drives."""
+        return size_of(self.drive)

@@ -1,0 +1,85 @@
+"""The search for drives that meet one target, from one state: Levenberg-Marquardt with limits.
+
+The tip follows the drives smoothly but for kinks: where a tendon turns round its contacts stick
+first, and a notch closes. There derivatives hold for one side only. A step is therefore judged by
+what it brings, and derivatives are taken at every point anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.control.drive_model import Response
+from notchflex.control.problem import Attempt, Problem, size_of
+from notchflex.control.walk import Walk
+
+# Damping: where a step fails, its factor after one that did, the gain above which it is lifted, and
+# the largest with which a step is worth trying.
+_FIRST, _FACTOR, _GOOD_GAIN, _MOST_DAMPING = 1e-3, 8.0, 0.5, 1e12
+# The part of the promised improvement that a step must bring.
+_LEAST_GAIN = 1e-3
+# A step that changes drives by less than this part of them is none.
+_NO_STEP = 1e-11
+# Drives that are redundant are made smaller in so many rounds of so many corrections, while a round
+# changes them and their size by more than these parts.
+_MOST_RELAXATIONS, _CORRECTIONS, _SMALL_RELAXATION, _SMALL_GAIN = 6, 5, 1e-3, 1e-4
+
+
+def find(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    start: Float[np.ndarray, " t"],
+    goal: Float[np.ndarray, " m"],
+    known: Response | None = None,
+    *,
+    over_bands: bool = True,
+) -> Attempt:
+    """Search drives that meet a target.
+
+    Args:
+        problem: What is aimed at, and the limits.
+        before: The state before, packed.
+        start: Drives to start from.
+        goal: The target; NaN where an entry is free.
+        known: Values and slopes at `start`, where they are known.
+        over_bands: Whether dead bands of the drives are left out.
+
+    Returns:
+        The best that was found within the budget.
+    """
+    rows = np.flatnonzero(~np.isnan(goal))
+    aim = problem.entries[rows], problem.weights[rows], goal[rows]
+    walk = Walk(problem, before, *aim, over_bands)
+    walk.begin(start, known)
+    damping, budget = 0.0, problem.search.solves
+    while not walk.done and walk.solves < budget:
+        step = walk.step(damping)
+        if np.abs(step).max() <= _NO_STEP * walk.scale or damping > _MOST_DAMPING:
+            walk.settled = True
+            break
+        gain = walk.go(step, _LEAST_GAIN)
+        if gain >= _GOOD_GAIN:
+            damping = 0.0 if damping <= _FIRST else damping / _FACTOR
+        elif gain < _LEAST_GAIN:
+            damping = max(_FIRST, damping * _FACTOR)
+    if walk.done and len(walk.free) > len(rows):
+        _relax(walk, budget)
+    return walk.result()
+
+
+def _relax(walk: Walk, budget: int) -> None:
+    """Go on to the smallest drives that meet the target."""
+    for _ in range(_MOST_RELAXATIONS):
+        step = walk.step(0.0)
+        if walk.solves >= budget or np.abs(step).max() <= _SMALL_RELAXATION * walk.scale:
+            return
+        kept, effort = walk.point, size_of(walk.point.drive)
+        walk.jump(step)
+        for _ in range(_CORRECTIONS):
+            if walk.done or walk.solves >= budget:
+                break
+            walk.go(walk.step(0.0), _LEAST_GAIN)
+        if not walk.done or size_of(walk.point.drive) > (1.0 - _SMALL_GAIN) * effort:
+            walk.point = kept
+            return

@@ -1,0 +1,226 @@
+"""Targets: what quantities of the robot are to become, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from notchflex._quantity import REGISTERED
+from notchflex.errors import InputError
+from notchflex.loads.validation import check_number, short_repr
+from notchflex.robot import Robot
+
+DIRECTION = "tip_direction"
+"""Unit vector along the tube at the tip, in the world: the last column of `tip_rotation`."""
+
+# Rows of a rotation may miss those of a true one by so much.
+_ROTATION_ERROR = 1e-6
+_FORMS = "x, y, z of the tip in mm, or names of quantities with their values"
+
+
+@dataclass(frozen=True)
+class Targets:
+    """What quantities are to become, target by target.
+
+    Attributes:
+        values: By name of a quantity, its values, targets as leading axis; NaN where an entry is
+            free. Units mm, N, rad. "tip_direction" is the unit vector along the tube at the tip.
+    """
+
+    values: Mapping[str, np.ndarray]
+
+    def __len__(self) -> int:
+        """Number of targets."""
+        return len(next(iter(self.values.values())))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Quantities that a solve must report for these."""
+        names = ("tip_rotation" if name == DIRECTION else name for name in self.values)
+        return tuple(dict.fromkeys(names))
+
+    def row(self, index: int) -> dict[str, np.ndarray]:
+        """Return one target, counted from 0."""
+        return {name: values[index] for name, values in self.values.items()}
+
+
+class Aim(NamedTuple):
+    """Targets as numbers of a response.
+
+    Attributes:
+        entries: Which numbers of `Response.values` are aimed at, (m,).
+        goals: What they are to become, (k, m); NaN where free.
+        weights: What an error of one unit counts, (m,).
+    """
+
+    entries: Int[np.ndarray, " m"]
+    goals: Float[np.ndarray, "k m"]
+    weights: Float[np.ndarray, " m"]
+
+
+def aim_at(
+    targets: Targets, slices: Mapping[str, slice], weights: Mapping[str, float] | None
+) -> Aim:
+    """Return targets as numbers of a response.
+
+    Args:
+        targets: The targets.
+        slices: Where each output is in `Response.values`.
+        weights: By quantity, what an error of one unit (mm, N, rad) counts; 1 where not given.
+
+    Raises:
+        InputError: A weight of what is no target, or not positive.
+    """
+    weights = _check_weights(weights, targets)
+    index: list[np.ndarray] = []
+    for name in targets.values:
+        at = slices["tip_rotation" if name == DIRECTION else name]
+        numbers = np.arange(at.start, at.stop)
+        index.append(numbers[2::3] if name == DIRECTION else numbers)
+    count = len(targets)
+    goals = [np.reshape(values, (count, -1)) for values in targets.values.values()]
+    sizes = [len(numbers) for numbers in index]
+    each = np.repeat([weights.get(name, 1.0) for name in targets.values], sizes)
+    return Aim(np.concatenate(index), np.concatenate(goals, axis=1), each)
+
+
+def _check_weights(weights: Mapping[str, float] | None, targets: Targets) -> dict[str, float]:
+    if weights is not None and not isinstance(weights, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError.WRONG_TYPE(
+            f"weights are numbers by the name of a quantity; got {short_repr(weights)}"
+        )
+    checked: dict[str, float] = {}
+    for name, weight in (weights or {}).items():
+        if name not in targets.values:
+            raise InputError.UNKNOWN_NAME(
+                f"there is a weight of {name}, but the targets are {', '.join(targets.values)}"
+            )
+        checked[name] = check_number(weight, f"the weight of {name}")
+        if not 0.0 < checked[name] < np.inf:
+            raise InputError.OUT_OF_RANGE(
+                f"the weight of {name} must be positive and finite; got {weight:g}"
+            )
+    return checked
+
+
+def sizes_of(robot: Robot) -> dict[str, int]:
+    """Return the sizes of the axes that quantities of a robot may have."""
+    notches, tendons = robot.number_of_notches, robot.number_of_tendons
+    return {"tendon": tendons, "notch": notches, "body": notches + 1, "row": 3, "axis": 3}
+
+
+def target_shapes(robot: Robot) -> dict[str, tuple[int, ...]]:
+    """Return what may be a target, and its shape: what the solver reports as numbers."""
+    sizes = sizes_of(robot)
+    shapes = {
+        name: tuple(sizes[axis] for axis in one.per)
+        for name, one in REGISTERED.items()
+        if one.source != "path" and one.title and one.kind is float and set(one.per) <= set(sizes)
+    }
+    return {**shapes, DIRECTION: (3,)}
+
+
+def make_targets(given: Any, robot: Robot, *, several: bool) -> Targets:
+    """Check targets.
+
+    Args:
+        given: Positions of the tip (mm), or values by the name of a quantity, or `Targets`; an
+            entry that is None is free.
+        robot: The robot.
+        several: Whether targets are the leading axis of all values; otherwise there is one.
+
+    Raises:
+        InputError: No such quantity, a wrong shape, or a number that is not finite.
+    """
+    if isinstance(given, Targets):
+        return _checked(given.values, robot)
+    named = given if isinstance(given, Mapping) else {"tip_position": given}
+    values: dict[str, np.ndarray] = {}
+    for name, value in named.items():
+        numbers = _numbers(value, name)
+        values[name] = numbers if several else numbers[None]
+    return _checked(values, robot)
+
+
+def _checked(values: Mapping[str, np.ndarray], robot: Robot) -> Targets:
+    shapes = target_shapes(robot)
+    if not values:
+        raise InputError.NO_DATA(f"there is no target; give {_FORMS}")
+    for name, numbers in values.items():
+        if name not in shapes:
+            raise InputError.UNKNOWN_NAME(
+                f"there is no target {short_repr(name)}; there are {', '.join(shapes)}"
+            )
+        _check_shape(name, numbers, shapes[name])
+    if len({len(numbers) for numbers in values.values()}) > 1:
+        raise InputError.WRONG_SHAPE(
+            "all quantities need the same number of targets; got "
+            + ", ".join(f"{len(numbers)} of {name}" for name, numbers in values.items())
+        )
+    empty = np.all([np.isnan(v.reshape(len(v), -1)).all(axis=1) for v in values.values()], axis=0)
+    if empty.any():
+        raise InputError.NO_DATA(
+            f"target {int(np.argmax(empty)) + 1} has no number: all of its entries are free"
+        )
+    if DIRECTION in values:
+        values = {**values, DIRECTION: _unit(values[DIRECTION])}
+    if "tip_rotation" in values:
+        _check_rotations(values["tip_rotation"])
+    return Targets(values)
+
+
+def _numbers(value: Any, name: str) -> np.ndarray:
+    """Numbers of a target; None within them is NaN, NaN itself is refused."""
+    try:
+        if isinstance(value, str | bytes | Mapping) or value is None:
+            raise TypeError
+        entries = np.asarray(value, dtype=object)
+        free = np.array([one is None for one in entries.ravel()], bool).reshape(entries.shape)
+        if any(isinstance(one, bool | str | bytes) for one in entries.ravel()):
+            raise TypeError
+        numbers = np.where(free, np.nan, entries).astype(float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError.WRONG_TYPE(
+            f"a target is {_FORMS}; got {short_repr(value)} for {short_repr(name)}"
+        ) from None
+    if not np.isfinite(numbers[~free]).all():
+        raise InputError.NOT_FINITE(
+            f"a target of {name} is not finite; give finite numbers, and None where it is free"
+        )
+    return numbers
+
+
+def _check_shape(name: str, numbers: np.ndarray, shape: Sequence[int]) -> None:
+    if numbers.shape[1:] == tuple(shape) and numbers.ndim == len(shape) + 1 and len(numbers):
+        return
+    wanted = "×".join(map(str, shape)) or "one number"
+    got = "×".join(map(str, numbers.shape[1:])) or "one number"
+    raise InputError.WRONG_SHAPE(
+        f"a target of {name} is {wanted} for this robot, and there must be at least one; "
+        f"got {len(numbers) if numbers.ndim else 0} of {got}"
+    )
+
+
+def _unit(directions: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
+    """Directions as unit vectors; one with free entries must have them as they are meant."""
+    length = np.linalg.norm(directions, axis=1, keepdims=True)
+    whole = ~np.isnan(length[:, 0])
+    if (length[whole] == 0.0).any() or (np.abs(directions[~whole]) > 1.0).any():
+        raise InputError.OUT_OF_RANGE(
+            "tip_direction must not be zero, and no entry beside a free one may exceed 1"
+        )
+    return np.where(whole[:, None], directions / length, directions)
+
+
+def _check_rotations(rotations: Float[np.ndarray, "k 3 3"]) -> None:
+    whole = rotations[~np.isnan(rotations).any(axis=(1, 2))]
+    error = np.abs(whole @ np.swapaxes(whole, 1, 2) - np.eye(3)).max(initial=0.0)
+    if error > _ROTATION_ERROR or (np.linalg.det(whole) < 0.0).any():
+        raise InputError.OUT_OF_RANGE(
+            "a target of tip_rotation is no rotation matrix: its rows must be of length 1, at "
+            "right angles and right-handed"
+        )
