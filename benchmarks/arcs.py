@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 from acting import State
-from moments import ArcLaw, Memory, arc_law, bending, memory_of
+from fibres import Memory, memory_of
+from moments import ArcLaw, arc_law, bending
 from numpy.polynomial.legendre import leggauss
 
 import notchflex as nf
