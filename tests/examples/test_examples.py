@@ -18,13 +18,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import notchflex as nf
 from balance import left_over
 from oracles import frames
 from oracles.wrist import A, Wrist
 from reference_data import choose, reference
 
 ROOT = Path(__file__).resolve().parents[2]
-FILES = sorted((ROOT / "examples").glob("*.py"))
+FILES = {int(file.name[:2]): file for file in sorted((ROOT / "examples").glob("*.py"))}
 ANGLE = 1e-8  # rad; what the tables and oracles are met to elsewhere
 
 
@@ -33,25 +34,24 @@ def ran(number: int) -> tuple[dict[str, Any], str]:
     """Names that an example leaves, and what it prints."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
-        names = runpy.run_path(str(FILES[number - 1]))
+        names = runpy.run_path(str(FILES[number]))
     return names, printed.getvalue()
 
 
-def test_there_are_ten_and_each_asks_a_question():
-    assert [file.name[:3] for file in FILES] == [f"{number:02d}_" for number in range(1, 11)]
-    for file in FILES:
+def test_each_asks_a_question():
+    for file in FILES.values():
         text = file.read_text(encoding="utf-8")
         assert re.match(r'"""[^"]*\?"""\n', text), f"{file.name} begins with no question"
         assert 13 <= len(text.splitlines()) <= 50, file.name
 
 
-@pytest.mark.parametrize("number", range(1, 11))
+@pytest.mark.parametrize("number", FILES)
 def test_page_shows_the_example_and_what_it_prints(number):
     page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
     _, printed = ran(number)
-    text = FILES[number - 1].read_text(encoding="utf-8")
+    text = FILES[number].read_text(encoding="utf-8")
     question, code = re.match(r'"""(.*?)"""\n\n(.*)', text, re.DOTALL).groups()
-    part = f"## {question}\n\n`examples/{FILES[number - 1].name}`\n\n"
+    part = f"## {question}\n\n`examples/{FILES[number].name}`\n\n"
     part += f"```python\n{code}```\n\n```text\n{printed}```\n"
     assert part in page, "run docs/make/examples.py"
 
@@ -206,3 +206,16 @@ def test_what_friction_does(margin):
         angle = np.degrees([state.angle.sum() for state in states])
         margin.within(f"bend at mu {mu}", bend - angle[30], 1e-6, "deg")
         margin.within("loop", loop - (angle[::-1] - angle)[:31].max(), 1e-6, "deg")
+
+
+def test_follow_with_hysteresis(margin):
+    """The tensions found are those at which a fine loop has the angles, on its own branch."""
+    names, _ = ran(14)
+    wrist, found, angle = names["wrist"], names["found"], names["angle"]
+    peak = float(found.tension[2, 0])
+    loop = nf.simulate(wrist, nf.pull(0.0, peak, steps=4001).release())
+    total, tension = loop.total_angle, loop.tension[:, 0]
+    for target, branch in ((0, slice(0, 4001)), (1, slice(0, 4001)), (3, slice(4001, None))):
+        at = np.argsort(total[branch], kind="stable")
+        expected = np.interp(angle[target], total[branch][at], tension[branch][at])
+        margin("tension", abs(found.tension[target, 0] - expected), 1e-4)

@@ -71,7 +71,7 @@ class Controller:
         >>> from notchflex import load_robot
         >>> controller = Controller(load_robot("pacheco2021-a"), "total_angle")
         >>> [round(float(controller.step(angle)[0]), 3) for angle in (0.3, 0.6, 0.3)]
-        [0.318, 0.643, 0.275]
+        [0.322, 0.66, 0.307]
     """
 
     def __init__(
