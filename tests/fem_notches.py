@@ -65,7 +65,7 @@ def chain_bending() -> tuple[list[float], list[float]]:
 
 def other_directions() -> dict[str, list[float]]:
     """Return errors in chains of equal notches, by the direction."""
-    names = ("strong", "axial", "coupling", "torsion", "shear centre")
+    names = ("strong", "axial", "coupling", "torsion", "shear centre", "shear", "sway")
     errors: dict[str, list[float]] = {name: [] for name in names}
     for row, section, found in _chain_rows():
         height, weak = row["height"], section.second_moment_weak
@@ -77,6 +77,8 @@ def other_directions() -> dict[str, list[float]]:
         twist = 2 * (1 + row["nu"]) * found.torsion / section.torsion_constant
         errors["torsion"].append(float(twist / row["rz"] - 1))
         errors["shear centre"].append(found.shear_centre / row["shear_centre"] - 1)
+        errors["shear"].append(found.shear / row["shear_y"] - 1)
+        errors["sway"].append(found.sway / row["shear_x"] - 1)
     return errors
 
 

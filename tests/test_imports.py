@@ -5,6 +5,7 @@ Imports inside functions and for types only count like any other.
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import notchflex
@@ -23,13 +24,10 @@ ORDER = (
     "fit",
     "comparison",
     "tolerancing",
-    "design",
+    "designing",
     "control",
     "sensing",
-    "workspace",
-    "learning",
-    "sweep",
-    "photographs",
+    "workspaces",
     "plotting",
     "export",
     "viewer",
@@ -62,10 +60,13 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("results.equilibrium", "results.files.json"): _FILES,
     ("results.path", "results.files.dataframe"): _FILES,
     ("results.path", "results.files.dataset"): _FILES,
+    ("workspaces.cloud", "workspaces.files"): _FILES,
     ("results.equilibrium", "results.path"): _TYPE,
     ("results.reason", "results.path"): _TYPE,
     ("results.quantities.path_formulas", "results.path"): _TYPE,
     ("fit.estimation.calibration", "fit.documents"): _SHOWN,
+    ("designing.result", "designing.files"): "a design writes its files by a method",
+    ("designing.files", "designing.front"): _TYPE,
     ("comparison.comparison", "comparison.tables"): _SHOWN,
     ("viewer.viewer", "viewer.page.page"): "the viewer makes its page; the page acts on the viewer",
 }
@@ -103,13 +104,22 @@ def _short(module: str) -> str:
     return module.removeprefix("notchflex.")
 
 
-GRAPH = {
-    _short(module): {_short(other) for other in _imported(file)} for module, file in FILES.items()
-}
-ALLOWED = {
-    module: {other for other in others if (module, other) not in EXCEPTIONS}
-    for module, others in GRAPH.items()
-}
+@cache
+def _graph() -> dict[str, set[str]]:
+    """Every module and those that it imports."""
+    return {
+        _short(module): {_short(other) for other in _imported(file)}
+        for module, file in FILES.items()
+    }
+
+
+@cache
+def _allowed() -> dict[str, set[str]]:
+    """The graph without the exceptions."""
+    return {
+        module: {other for other in others if (module, other) not in EXCEPTIONS}
+        for module, others in _graph().items()
+    }
 
 
 def _place(module: str) -> int:
@@ -120,7 +130,7 @@ def _place(module: str) -> int:
 def test_imports_go_one_way():
     upward = [
         f"{module} -> {other}"
-        for module, others in ALLOWED.items()
+        for module, others in _allowed().items()
         for other in others
         if _place(other) > _place(module)
     ]
@@ -135,22 +145,22 @@ def test_no_cycles():
         if module in way:
             cycles.append(" -> ".join([*way[way.index(module) :], module]))
         elif module not in done:
-            for other in sorted(ALLOWED[module]):
+            for other in sorted(_allowed()[module]):
                 follow(other, [*way, module])
             done.add(module)
 
-    for module in sorted(ALLOWED):
+    for module in sorted(_allowed()):
         follow(module, [])
     assert not cycles, "\n".join(cycles)
 
 
 def test_every_exception_is_still_needed():
     for module, other in EXCEPTIONS:
-        assert other in GRAPH[module], f"{module} no longer imports {other}"
+        assert other in _graph()[module], f"{module} no longer imports {other}"
 
 
 def test_the_compiler_knows_nothing_of_robots():
-    for module, others in GRAPH.items():
+    for module, others in _graph().items():
         if module.partition(".")[0] == "lanewise":
             assert all(other.partition(".")[0] == "lanewise" for other in others), module
 

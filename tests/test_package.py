@@ -35,7 +35,13 @@ NAMES = [
     "Measurements", "read_measurements", "write_measurements",
     "Calibration", "Constant", "LeastSquares", "SumOfDistances", "SumOfRobotErrors", "leave_out",
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
+    "DeckOptions", "Exported", "PatternOptions", "SimulatorOptions",
+    "SolidOptions", "export_robot",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
+    "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
+    "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
+    "read_tolerance_spec",
+    "design", "Design", "DesignSpec", "design_front", "DesignFront",
 ]
 # fmt: on
 

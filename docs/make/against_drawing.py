@@ -145,6 +145,8 @@ def _notches() -> str:
         "coupling": "stretch by bending (neutral axis)",
         "torsion": "torsion",
         "shear centre": "shear centre",
+        "shear": "shift by a force across, in the plane",
+        "sway": "shift by a force across, sideways",
     }
     found |= {names[name]: errors for name, errors in other_directions().items()}
     rows = [

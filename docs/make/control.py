@@ -63,7 +63,7 @@ def three_inverses() -> None:
         left.set(xlabel="tip position x [mm]", ylabel="tip position y [mm]", aspect="equal")
         right.set(xlabel="target [number]", ylabel="error of the tip [mm]")
         right.axvline(119.5, color=GREY, lw=0.8, ls="--")
-        right.text(122, 3e-12, "back", color=GREY)
+        right.text(123, 1e-5, "back", color=GREY)
         figure.legend(loc="outside lower center", ncols=4)
         save(figure, IMAGES / "control.svg")
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,9 @@ from free_body import free_body
 from matplotlib.axes import Axes
 
 import notchflex as nf
+from notchflex.export.simulators.joint_model import joint_model
+from notchflex.export.simulators.mjcf import mjcf
+from notchflex.export.simulators.mujoco_run import run_mujoco
 from notchflex.plotting import dimensioned_figure
 from notchflex.plotting.style import (
     BLUE,
@@ -215,11 +219,42 @@ def bands() -> None:
     save(figure, IMAGES / "bands.svg")
 
 
+def simulators() -> None:
+    """Wrist A in MuJoCo, as `notchflex export` writes it, and in the chain."""
+    wrist = nf.load_robot("pacheco2021-a")
+    model = joint_model(wrist, 2.35)
+    text = mjcf(model)
+    figure = new_figure(8.6, 3.4)
+    left, right = figure.subplots(1, 2)
+    turns = {left: (0.0, 2.35, 0.0), right: (0.0, 1.5, 0.7, 1.9, 0.0)}
+    for axes, ends in turns.items():
+        way = np.concatenate([np.linspace(a, b, 25) for a, b in pairwise(ends)])
+        path = nf.simulate(wrist, [nf.Load(tension=float(one)) for one in way])
+        found = run_mujoco(text, 0, way, 5)
+        known, ran = np.degrees(path.notch_angle), np.degrees(found.angle)
+        if axes is left:
+            known, ran = known.sum(axis=1)[:, None], ran.sum(axis=1)[:, None]
+            axes.set_ylabel("total bending angle [deg]")
+        else:
+            known, ran = known[:, [0, 4]], ran[:, [0, 4]]
+            axes.set_ylabel("notch angle [deg]")
+        names = ("",) if axes is left else (", first notch", ", last notch")
+        colours = (BLUE, VERMILLION)
+        for column, name in enumerate(names):
+            axes.plot(way, known[:, column], color=colours[column], label=f"chain{name}")
+        axes.plot(way, ran, ".", color="black", ms=3, label=["MuJoCo", *["_"] * (len(names) - 1)])
+        axes.set_xlabel("tendon tension $T$ [N]")
+        axes.legend(loc="upper left" if axes is right else "lower right")
+    left.set_title("the range that was fitted")
+    right.set_title("reversals within it")
+    save(figure, IMAGES / "simulators.svg")
+
+
 def main() -> None:
     """Draw all of them."""
     dimensions()
     with house_style():
-        for draw in (chain, memory, closing, cuts, bands):
+        for draw in (chain, memory, closing, cuts, bands, simulators):
             draw()
         free_body(IMAGES)
 

@@ -128,10 +128,35 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "Design",
+            "DesignFront",
+            "DesignSpec",
+            "design",
+            "design_front",
+        ),
+        "notchflex.designing",
+    ),
+    **dict.fromkeys(
+        (
             "Comparison",
             "compare",
         ),
         "notchflex.comparison",
+    ),
+    **dict.fromkeys(
+        (
+            "SensedForce",
+            "SensorNoise",
+            "sense",
+        ),
+        "notchflex.sensing",
+    ),
+    **dict.fromkeys(
+        (
+            "Workspace",
+            "workspace",
+        ),
+        "notchflex.workspaces",
     ),
     **dict.fromkeys(
         (
@@ -148,6 +173,27 @@ _HOME = {
             "read_targets",
         ),
         "notchflex.control",
+    ),
+    **dict.fromkeys(
+        (
+            "AcceptanceLimit",
+            "ToleranceAnalysis",
+            "ToleranceSpec",
+            "read_tolerance_spec",
+            "tolerance_analysis",
+        ),
+        "notchflex.tolerancing",
+    ),
+    **dict.fromkeys(
+        (
+            "DeckOptions",
+            "Exported",
+            "PatternOptions",
+            "SimulatorOptions",
+            "SolidOptions",
+            "export_robot",
+        ),
+        "notchflex.export",
     ),
 }
 

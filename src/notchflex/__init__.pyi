@@ -33,11 +33,22 @@ from notchflex.control import TargetSearch as TargetSearch
 from notchflex.control import follow as follow
 from notchflex.control import reach as reach
 from notchflex.control import read_targets as read_targets
+from notchflex.designing import Design as Design
+from notchflex.designing import DesignFront as DesignFront
+from notchflex.designing import DesignSpec as DesignSpec
+from notchflex.designing import design as design
+from notchflex.designing import design_front as design_front
 from notchflex.errors import ConvergenceError as ConvergenceError
 from notchflex.errors import ErrorCode as ErrorCode
 from notchflex.errors import Failure as Failure
 from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
+from notchflex.export import DeckOptions as DeckOptions
+from notchflex.export import Exported as Exported
+from notchflex.export import PatternOptions as PatternOptions
+from notchflex.export import SimulatorOptions as SimulatorOptions
+from notchflex.export import SolidOptions as SolidOptions
+from notchflex.export import export_robot as export_robot
 from notchflex.fit import Calibration as Calibration
 from notchflex.fit import Constant as Constant
 from notchflex.fit import FrictionReadings as FrictionReadings
@@ -93,6 +104,16 @@ from notchflex.robot import json_schema as json_schema
 from notchflex.robot import list_robots as list_robots
 from notchflex.robot import load_robot as load_robot
 from notchflex.robot import save_robot as save_robot
+from notchflex.sensing import SensedForce as SensedForce
+from notchflex.sensing import SensorNoise as SensorNoise
+from notchflex.sensing import sense as sense
 from notchflex.solver.newton import Settings as Settings
+from notchflex.tolerancing import AcceptanceLimit as AcceptanceLimit
+from notchflex.tolerancing import ToleranceAnalysis as ToleranceAnalysis
+from notchflex.tolerancing import ToleranceSpec as ToleranceSpec
+from notchflex.tolerancing import read_tolerance_spec as read_tolerance_spec
+from notchflex.tolerancing import tolerance_analysis as tolerance_analysis
+from notchflex.workspaces import Workspace as Workspace
+from notchflex.workspaces import workspace as workspace
 
 __version__: str

@@ -30,8 +30,8 @@ def plot(
     unloading apart, with the units of files and pictures (mm, N, deg).
 
     Args:
-        thing: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a
-            `Comparison`, a `Calibration`, a `FrictionRig`, or a dict of label to path.
+        thing: A robot, a path, a state, a batch, bands, a comparison, a calibration or any other
+            result that the library can draw, or a dict of label to path.
         x: Of a path, what is drawn along the horizontal axis: the name of a quantity such as
             "stroke", a CSV column such as "notch_3_deg", or "step".
         y: The same for the vertical axis; a quantity with several entries, such as "notch_angle",

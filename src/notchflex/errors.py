@@ -121,6 +121,10 @@ class ErrorCode(_Coded):
         "a robot description has a value that is missing or not allowed",
         "change the keys that the message names; see the page on robot files",
     )
+    INVALID_SPECIFICATION = (
+        "a specification, such as that of a design, has a value that is missing or not allowed",
+        "change the keys that the message names",
+    )
     STATE_OF_ANOTHER_ROBOT = (
         "a state or a file belongs to another robot, or to other values of this one",
         "use it with its own robot, or start from rest",
@@ -174,8 +178,8 @@ class InputError(ValueError):
     (
         UNKNOWN_NAME, WRONG_TYPE, BAD_SYNTAX, NOT_A_NUMBER, NOT_FINITE, OUT_OF_RANGE,
         WRONG_SHAPE, MISSING_VALUE, CONFLICT, NO_DATA, TOO_FEW_DATA, UNSUPPORTED,
-        INVALID_ROBOT, STATE_OF_ANOTHER_ROBOT, FILE_NOT_FOUND, FILE_UNREADABLE,
-        FILE_UNWRITABLE, FILE_FORMAT, FILE_DAMAGED, TABLE_COLUMNS, TABLE_ROWS,
+        INVALID_ROBOT, INVALID_SPECIFICATION, STATE_OF_ANOTHER_ROBOT, FILE_NOT_FOUND,
+        FILE_UNREADABLE, FILE_UNWRITABLE, FILE_FORMAT, FILE_DAMAGED, TABLE_COLUMNS, TABLE_ROWS,
         MISSING_PACKAGE, NOT_CONVERGED, PROCESS_FAILED, NO_CONNECTION
     ) = map(_Raised, list(ErrorCode)[1:])
     # fmt: on

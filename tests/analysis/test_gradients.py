@@ -116,6 +116,7 @@ def test_slopes_against_differences(case, margin):
             margin.within(f"{parameter} {step}", (mine - expected) / max(abs(expected), 0.1), 1e-7)
 
 
+@pytest.mark.nightly
 def test_a_force_at_the_tip(margin):
     robot = nf.load_robot("pacheco2021-a")
     path = nf.pull(0.6, 1.2, steps=2).loaded(tip_force=(0.02, 0.01, 0.0))
@@ -166,6 +167,7 @@ def test_what_is_not_solved_has_no_slope():
     assert np.isnan(jax.grad(lambda v: draw(v)["total_angle"][0])(draw.start)["stroke"]).all()
 
 
+@pytest.mark.nightly
 def test_what_loads_did_before_the_tendons_has_a_slope(margin):
     robot = nf.load_robot("pacheco2021-a").with_value("friction.coefficient", 0.4)
     # A push against the bend, see test_tip_response.py.

@@ -56,6 +56,7 @@ def test_both_sides_of_a_kink_and_the_one_that_jax_gives():
         assert own == pytest.approx(nearest, abs=1e-6)
 
 
+@pytest.mark.nightly
 def test_the_slopes_of_a_tip_tell_their_kinks():
     found = nf.tip_response(TWO, LOADS[1:3])
     assert {(one.step, one.kind) for one in found.kinks} == {(1, "contact")}

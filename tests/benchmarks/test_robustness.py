@@ -21,6 +21,7 @@ def robustness():
     sys.path.remove(str(FOLDER))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_draw_is_solved_or_says_why(robustness, number):
     draw = __import__("draw")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from notchflex import _canary
-from notchflex.cli.verbs.doctor import requirements
+from notchflex.cli.verbs.installation.doctor import requirements
 from notchflex.solver.programs import store
 
 

@@ -39,6 +39,7 @@ def test_every_page_has_its_script():
         assert (PAPERS / f"numbers_{name}.py").is_file()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("paper", NAMES)
 def test_page_has_the_numbers_of_its_script(paper, script):
     module = importlib.import_module(f"numbers_{paper}")

@@ -100,6 +100,7 @@ OUTSIDE = [
     (("= 10000", "= nan"), ["`material.elastic_modulus`", "nan", "finite number"]),
     (("= 10000", "= inf"), ["`material.elastic_modulus`", "inf", "finite number"]),
     (("= 3000", "= -3000"), ["`material.superelastic_modulus`", "-3000 MPa"]),
+    (("= 0.028", "= 2.8"), ["`material.transition_strain`", "at most 0.5", "0.04 is 4 %"]),
     (("= 0.028", "= 0.2"), ["`material.plastic_strain`", "transition strain"]),
     (("coefficient = 0.13", "coefficient = -0.1"), ["`friction.coefficient`", "at least 0"]),
     (("coefficient = 0.13", "coefficient = nan"), ["`friction.coefficient`", "nan"]),

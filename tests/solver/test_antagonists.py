@@ -123,6 +123,7 @@ def _notch(path: str, opposite: str, friction: nf.Capstan | nf.Frictionless) -> 
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("robot", "strokes"),
     [

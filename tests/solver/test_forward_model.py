@@ -28,6 +28,7 @@ def changes(path: nf.EquilibriumPath) -> Change:
     return Change(1e-3 * random.standard_normal(packed.shape), move)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "load", "outputs"),
     [
@@ -68,6 +69,7 @@ def test_a_step_that_failed_later_does_not_matter():
     assert np.isnan(second)
 
 
+@pytest.mark.nightly
 def test_many_numbers_take_the_adjoint_and_few_the_tangents(margin):
     robot = nf.load_robot("gao2017")
     names = [f"notch[{number}].strip_thickness" for number in range(1, 28)]

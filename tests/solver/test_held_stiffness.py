@@ -63,12 +63,8 @@ def held(path: nf.EquilibriumPath) -> np.ndarray:
     return np.concatenate([one.stiffness for one in pieces])
 
 
-LONG = ("U-links", "four tendons, two by stroke")
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=[pytest.mark.nightly] * (one in LONG)) for one in CASES]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", CASES)
 def test_as_by_dense_differentiation(name, margin):
     path = CASES[name]()
     assert path.converged.all(), path.reason

@@ -23,6 +23,7 @@ def one_strip() -> nf.Robot:
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("force", [2.0, 6.0, 12.0])
 @pytest.mark.parametrize("following", [False, True])
 def test_force_on_the_end_of_a_strip_is_the_elastica(one_strip, force, following, margin) -> None:

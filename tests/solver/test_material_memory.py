@@ -64,8 +64,13 @@ def test_a_saved_state_continues_as_the_uninterrupted_path(
         path.material_dissipation[-1],
         rtol=1e-12,
     )
+    # A path that is read back counts from the state that it continued, too.
+    nf.save_path(rest, tmp_path / "rest.json")
+    read = nf.read_path(tmp_path / "rest.json")
+    np.testing.assert_allclose(read.material_dissipation, rest.material_dissipation, rtol=1e-12)
 
 
+@pytest.mark.nightly
 def test_a_state_of_tendons_continues_under_a_load_in_the_plane(path: nf.EquilibriumPath) -> None:
     start = nf.simulate(WRIST, pulls(TENSIONS[:3])).state
     with_nothing = [nf.Load(tension=0.5, tip_force=(1e-9, 0.0, 0.0))]
@@ -144,6 +149,7 @@ def test_every_notch_kind_takes_nitinol(name: str) -> None:
     assert path.material_dissipation[-1].sum() > 0.0
 
 
+@pytest.mark.nightly
 def test_derivatives_where_friction_holds_a_notch(margin) -> None:
     """A held notch rests on a kink: value and slope are of the same side."""
     notch = nf.ArcNotch("on-axis", depth=1.4, height=1.0, uncut_length=1.0, repeat=2)

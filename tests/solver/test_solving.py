@@ -122,6 +122,7 @@ def test_a_new_load_or_robot_of_the_same_shape_needs_no_new_program(wrist: nf.Ro
     assert set(Native.made) <= programs
 
 
+@pytest.mark.nightly
 def test_wrists_of_one_to_forty_notches_share_four_programs(wrist: nf.Robot) -> None:
     programs = set()
     for notches in (1, 3, 7, 8, 15, 16, 24, 31, 32, 40):
@@ -214,6 +215,7 @@ def test_precurvature_past_closing_is_refused(wrist: nf.Robot) -> None:
         nf.solve(wrist.with_value("notch.precurvature_deg", 40.0), nf.Load(tension=1.0))
 
 
+@pytest.mark.nightly
 def test_modes_that_fill_up_are_no_modes_of_the_robot() -> None:
     # Arcs have fewer modes than strips; what holds the missing ones has a stiffness of 1.
     strip = nf.StripNotch(height=3.5, strip_thickness=1.5, depth=6.9)

@@ -42,6 +42,7 @@ def test_planar_robot_as_one_of_space(margin) -> None:
         margin.within(f"{what} of space and plane", difference, 1e-10, unit)
 
 
+@pytest.mark.nightly
 def test_twist_under_a_lateral_force_is_that_of_saint_venant(lateral, margin) -> None:
     # A force at the tube axis twists every section by its distance from the shear centre.
     section = annular_segment(0.81, 0.70, 1.40)

@@ -120,6 +120,7 @@ def test_no_stroke_leaves_the_tendon_slack(margin):
     margin.within("angles", state.notch_angle, 1e-12, "rad")
 
 
+@pytest.mark.nightly
 def test_no_stroke_is_followed_to_a_tension_that_nothing_bears():
     """Beside the plane of its notches a tendon goes on bending closed notches sideways."""
     robot = ready("A").with_value("tendon[1].direction_deg", 4.0)

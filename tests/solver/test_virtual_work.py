@@ -38,6 +38,7 @@ def solve(made: nf.Robot, tension: np.ndarray) -> nf.Equilibrium:
     return state
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("path", PATHS)
 def test_shortening_is_mutual(path, margin):
     made = robot(path)

@@ -41,6 +41,7 @@ def test_every_weight(case, margin):
     check(margin, under_weight(case), external_rows(case), LENGTH, ANGLE, FORCE)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("case", [TIP_ONLY, TIP_AWAY, BODY_AWAY])
 def test_more_modes(case, margin):
     path = under_weight(case, refinement=1)

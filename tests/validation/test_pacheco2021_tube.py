@@ -41,13 +41,12 @@ def fit(constants, starts):
 
 def test_the_ready_robots_hold_the_fitted_set():
     found = fit((*TUBE, FACTORS), 1)
-    # The search from the values of the files ends close to where it begins: they were fitted with
-    # 40 fibres a section, now there are 20.
-    assert found.cost == pytest.approx(8.0007, abs=2e-4)
+    # 7.99888 from several starts; from the factors 1 the search stops at a kink beside the minimum.
+    assert found.cost == pytest.approx(7.99888, abs=2e-3)
     for name in ("elastic_modulus", "plateau_stress", "plateau_modulus"):
         value = getattr(nf.load_robot("pacheco2021-a-true").material, name)
-        assert found.values[f"material.{name}"] == pytest.approx(value, rel=2e-2)
-    assert found.values["A:sensor.force_factor"] == pytest.approx(1.0445, abs=2e-3)
+        assert found.values[f"material.{name}"] == pytest.approx(value, rel=5e-3)
+    assert found.values["A:sensor.force_factor"] == pytest.approx(1.0447, abs=2e-3)
 
 
 @pytest.mark.nightly
@@ -60,7 +59,6 @@ def test_one_set_and_a_factor_for_wrist_a():
 
 
 @pytest.mark.nightly
-@pytest.mark.xfail(reason="a row of wrist C is solved in two parts, of which no slope is known")
 def test_precurvature_is_one_constant_times_the_height():
     found = fit((*TUBE, FACTORS, "notch.precurvature_deg/height"), 1)
     value = found.values["notch.precurvature_deg/height"]
@@ -68,7 +66,6 @@ def test_precurvature_is_one_constant_times_the_height():
 
 
 @pytest.mark.nightly
-@pytest.mark.xfail(reason="wrist C is 4.9 deg off blind; 4.3 before the fibres became twenty")
 def test_a_wrist_left_out_blind_and_after_one_photograph():
     found = fit((*TUBE, FACTORS), 2)
     folds = leave_out(found, by="robot", photograph=PHOTOGRAPH, starts=3).folds
@@ -78,6 +75,6 @@ def test_a_wrist_left_out_blind_and_after_one_photograph():
     )
     assert updated == pytest.approx({"A": 4.1, "B": 1.3, "C": 2.3}, abs=0.3)
     # With the paper's law 5.6, 2.4 and 4.8.
-    assert blind == pytest.approx({"A": 6.6, "B": 2.5, "C": 4.3}, abs=0.3)
+    assert blind == pytest.approx({"A": 6.6, "B": 2.5, "C": 4.4}, abs=0.2)
     # A 90 % band that the scatter of three wrists widens holds most of what it did not see.
     assert np.mean([fold.share_inside()[EDGES] for fold in folds]) > 0.85

@@ -32,6 +32,7 @@ def test_thirty_updates_a_second_for_27_joints():
         viewer.server.stop()
 
 
+@pytest.mark.nightly
 def test_a_force_across_and_a_weight_are_shown_in_space():
     pytest.importorskip("viser", reason="the extra `viewer` is not installed")
     from notchflex.viewer import Viewer

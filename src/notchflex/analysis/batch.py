@@ -8,12 +8,13 @@ is bounded whatever the batch. Where JAX has a GPU they run there, whole pieces 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
+from threadpoolctl import threadpool_limits
 
 from lanewise import WIDTH
 from notchflex._quantity import REGISTERED
@@ -24,12 +25,14 @@ from notchflex.analysis.outputs import (
     follow_row,
 )
 from notchflex.analysis.solve import prepare_for
+from notchflex.analysis.varied.varied_chains import VariedChains, varied_chains
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
 from notchflex.loads.command import make_commands, pad_commands
 from notchflex.loads.load_path import join_paths, load_path
 from notchflex.loads.validation import check_integer, one_or_several, short_repr
 from notchflex.robot import Robot
+from notchflex.robot.varied import VariedRobots
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain, pad_prepared
 from notchflex.solver.programs.pytree_layout import PytreeLayout
@@ -75,7 +78,7 @@ def solve_batch(
         (100,)
     """
     every = _robots(robots)
-    path = load_path(loads, max(robot.number_of_tendons for robot in every))
+    path = load_path(loads, _most_tendons(every))
     arrays = _simulate(every, path, len(path), outputs, settings, refinement, cores, progress)
     return Batch({name: array[:, 0] for name, array in arrays.items()})
 
@@ -115,7 +118,7 @@ def simulate_batch(
         (2, 8)
     """
     every = _robots(robots)
-    tendons = max(robot.number_of_tendons for robot in every)
+    tendons = _most_tendons(every)
     message = "simulate_batch needs a notchflex.LoadPath, or some in order"
     paths = [load_path(one, tendons) for one in one_or_several(loads, LoadPath, message)]
     if not paths or len({len(path) for path in paths}) > 1:
@@ -125,7 +128,9 @@ def simulate_batch(
     return Batch(_simulate(every, joined, len(paths), *common))
 
 
-def _robots(robots: Any) -> list[Robot]:
+def _robots(robots: Any) -> Sequence[Robot]:
+    if isinstance(robots, VariedRobots):
+        return robots
     message = "a batch needs a notchflex.Robot, or some of them"
     every = one_or_several(robots, Robot, message)
     if not every or not all(isinstance(robot, Robot) for robot in every):
@@ -133,8 +138,14 @@ def _robots(robots: Any) -> list[Robot]:
     return every
 
 
+def _most_tendons(robots: Sequence[Robot]) -> int:
+    if isinstance(robots, VariedRobots):  # which share them
+        return robots.robot.number_of_tendons
+    return max(robot.number_of_tendons for robot in robots)
+
+
 def _simulate(
-    robots: list[Robot],
+    robots: Sequence[Robot],
     joined: LoadPath,
     paths: int,
     outputs: Sequence[str],
@@ -162,7 +173,10 @@ def _simulate(
         for table in _tables(robots, joined, paths, count, asked, refinement)
         for index in table.pieces(threads)
     ]
-    with closing(on_cores(lambda one: one[0].run(one[1], numbers), work, threads)) as pieces:
+    # Every core has a piece of its own: a product of matrices is not to take the others too.
+    one_each = threadpool_limits(1) if isinstance(robots, VariedRobots) else nullcontext()
+    solving = on_cores(lambda one: one[0].run(one[1], numbers), work, threads)
+    with one_each, closing(solving) as pieces:
         for (table, index), piece in zip(work, pieces, strict=True):
             rows = table.rows[index]
             for name, values in piece.items():
@@ -216,17 +230,33 @@ class _BatchRows:
         size = -(-rows // (each * cores * WIDTH)) * WIDTH
         return (slice(start, min(start + size, rows)) for start in range(0, rows, size))
 
-    def run(self, index: slice, numbers: np.ndarray) -> dict[str, np.ndarray]:
-        """Solve a piece of the rows."""
+    def packed(
+        self, index: slice
+    ) -> tuple[Float[np.ndarray, "*k chain"], Float[np.ndarray, "k s command"]]:
+        """Chains of a piece of the rows, one alone if they share it, and their commands."""
         commands = self.commands[index]
         if len(self.commands) == 1:
             commands = np.repeat(self.commands, index.stop - index.start, axis=0)
-        one_robot = len(self.chains) == 1
-        chains = self.chains[0] if one_robot else self.chains[index]
-        by_row = (not one_robot, True, False)
+        return self.chains[0] if len(self.chains) == 1 else self.chains[index], commands
+
+    def run(self, index: slice, numbers: np.ndarray) -> dict[str, np.ndarray]:
+        """Solve a piece of the rows."""
+        chains, commands = self.packed(index)
+        by_row = (chains.ndim == 2, True, False)
         outputs = follow_row.rows(by_row, chains, commands, numbers, *self.layouts)
         flexures = self.flexures[index] if len(self.flexures) > 1 else self.flexures
         return {name: _unpad(name, values, flexures) for name, values in outputs.items()}
+
+
+@dataclass(frozen=True)
+class _VariedRows(_BatchRows):
+    """Rows whose robots differ by a few numbers: chains are worked out piece by piece."""
+
+    varied: VariedChains
+
+    def packed(self, index: slice) -> tuple[np.ndarray, np.ndarray]:
+        """Chains and commands of a piece of the rows."""
+        return self.varied.rows(index)
 
 
 def _unpad(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
@@ -245,15 +275,22 @@ def _empty(values: np.ndarray) -> float:
 
 
 def _tables(
-    robots: list[Robot],
+    robots: Sequence[Robot],
     joined: LoadPath,
     paths: int,
     count: int,
     outputs: tuple[str, ...],
     refinement: int,
-) -> list[_BatchRows]:
+) -> Sequence[_BatchRows]:
     """The rows of a batch by the layout of their robots, shorter ones padded to the longest."""
     steps = len(joined) // paths
+    if isinstance(robots, VariedRobots) and paths == 1:
+        varied = varied_chains(robots, joined, refinement)
+        if varied is not None:
+            layouts = (varied.structure, varied.command, outputs)
+            flexures = np.array([varied.ready.chain.flexures])
+            nothing = np.zeros((0, 0))
+            return [_VariedRows(np.arange(count), nothing, nothing, flexures, layouts, varied)]
     # The modes that any of the loads asks for, so that rows share a program.
     every = [prepare_for(robot, joined, None, refinement) for robot in robots]
     flexures = max(ready.chain.flexures for ready in every)

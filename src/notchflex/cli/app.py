@@ -10,6 +10,7 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from cyclopts import App, CycloptsError, MissingArgumentError, RepeatArgumentError
 
@@ -94,12 +95,41 @@ VERBS = {
         "    notchflex calibrate pacheco2021-a=a.csv pacheco2021-b=b.csv --leave-out robot \\\n"
         "        --fit material.elastic_modulus,friction.coefficient --plot fit.png",
     ),
+    "tolerance": (
+        "Find out what tolerances do: worst case, yield, which dimension to control.",
+        "notchflex tolerance pacheco2021-a limits.toml\n"
+        "    notchflex tolerance pacheco2021-a limits.toml --draws 10000 --plot tolerances.png \\\n"
+        "        --csv robots.csv --json -",
+    ),
+    "design": (
+        "Choose dimensions so that a robot does what is asked.",
+        "notchflex new wish --design\n"
+        "    notchflex design wish.toml -o designed\n"
+        "    notchflex design wish.toml --json - --quiet",
+    ),
     "friction-rig": (
         "Find the coefficient of friction from two hanging weights.",
         "echo weight_1_g,weight_2_g,turn_1_deg,turn_2_deg > readings.csv\n"
         "    echo 100,63.1,90,85 >> readings.csv\n"
         "    echo 200,126.8,88,86 >> readings.csv\n"
         "    notchflex friction-rig readings.csv --plot friction.png",
+    ),
+    "sense": (
+        "Find the force on a robot from tensions and strokes of its tendons.",
+        "notchflex simulate pacheco2021-a --tension 0.1:0.8:8 --tip-force 0.02,0,0 --csv read.csv\n"
+        "    notchflex sense pacheco2021-a read.csv --plot force.png\n"
+        "    notchflex sense pacheco2021-a read.csv --components xz --with tip --tip-noise 0.05",
+    ),
+    "workspace": (
+        "Explore where the tip of a robot can go, while its tendons are pulled and let go.",
+        "notchflex workspace two-axis-wrist --states 20000 --plot workspace.png\n"
+        "    notchflex workspace pacheco2021-a --limit strain=0.04 --states 4000 --json -\n"
+        "    notchflex workspace pacheco2021-a --states 4000 --beside pacheco2021-b",
+    ),
+    "export": (
+        "Write files for the laser, for CAD and for simulators.",
+        "notchflex export pacheco2021-a --dxf wrist.dxf --two-axis\n"
+        "    notchflex export two-axis-wrist --svg wrist.svg --kerf 0.025 --seam split",
     ),
     "bench": (
         "Time the solver on this machine.",
@@ -137,11 +167,14 @@ def build() -> App:
         suppress_keyboard_interrupt=False,  # `run` reports it
         print_error=False,
     )
+    here = Path(__file__).parent
+    files = {file.stem: file.relative_to(here) for file in (here / "verbs").rglob("*.py")}
     for order, (verb, (text, examples)) in enumerate(VERBS.items()):
         name = verb.replace("-", "_")
+        module = ".".join(files[name].with_suffix("").parts)
         plural = "s" if examples.count("notchflex ") > 1 else ""
         app.command(
-            f"notchflex.cli.verbs.{name}:{name}",
+            f"notchflex.cli.{module}:{name}",
             name=verb,
             help=text,
             sort_key=order,

@@ -11,7 +11,10 @@ from notchflex.plotting.fits.friction import friction_picture
 from notchflex.plotting.output import Picture
 from notchflex.plotting.path import path_figure, path_picture, state_picture
 from notchflex.plotting.picture import picture
+from notchflex.plotting.sensing.sensed import sensed_picture
 from notchflex.plotting.style import save
+from notchflex.plotting.tolerances.tolerances import tolerance_picture
+from notchflex.plotting.workspace.cloud import workspace_picture, workspaces_picture
 
 __all__ = [
     "Picture",
@@ -28,5 +31,9 @@ __all__ = [
     "picture",
     "save",
     "save_animation",
+    "sensed_picture",
     "state_picture",
+    "tolerance_picture",
+    "workspace_picture",
+    "workspaces_picture",
 ]

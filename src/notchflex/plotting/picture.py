@@ -2,31 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
 from notchflex.errors import InputError
-from notchflex.plotting.batch import batch_picture
 from notchflex.plotting.beside import beside_picture
-from notchflex.plotting.control.following import following_picture
-from notchflex.plotting.fits.calibration import calibration_picture
-from notchflex.plotting.fits.comparison import comparison_picture
-from notchflex.plotting.fits.friction import friction_picture
 from notchflex.plotting.output import Picture
-from notchflex.plotting.path import path_picture, robot_picture, state_picture
+from notchflex.plotting.path import path_picture, state_picture
 
 if TYPE_CHECKING:
-    from notchflex.results import EquilibriumPath
+    from notchflex.analysis import Bands
+    from notchflex.results import Equilibrium, EquilibriumPath
+
+# The class of a result, and what describes its picture: module in this folder, and function.
+_KINDS = {
+    "Robot": "path:robot_picture",
+    "EquilibriumPath": "path:path_picture",
+    "Equilibrium": "picture:equilibrium_picture",
+    "Batch": "batch:batch_picture",
+    "Bands": "picture:bands_picture",
+    "Comparison": "fits.comparison:comparison_picture",
+    "Calibration": "fits.calibration:calibration_picture",
+    "FrictionRig": "fits.friction:friction_picture",
+    "Design": "designs.design:design_picture",
+    "DesignFront": "designs.front:front_picture",
+    "ToleranceAnalysis": "tolerances.tolerances:tolerance_picture",
+    "Following": "control.following:following_picture",
+    "SensedForce": "sensing.sensed:sensed_picture",
+    "Workspace": "workspace.cloud:workspace_picture",
+}
 
 
 def picture(result: Any, *, title: str | None = None) -> Picture:
     """Describe the picture of a result, whatever its kind.
 
     Args:
-        result: A `Robot`, an `EquilibriumPath`, an `Equilibrium`, a `Batch`, `Bands`, a
-            `Comparison`, a `Calibration`, a `FrictionRig`, a `Following`, or a dict of label to
-            path for several beside each other.
+        result: A robot, a path, a state, a batch, bands, a comparison, a calibration or any other
+            result that the library can draw, or a dict of label to path for several beside each
+            other.
         title: Heading; that of its kind if None.
 
     Returns:
@@ -49,34 +64,24 @@ def picture(result: Any, *, title: str | None = None) -> Picture:
 
 
 def _picture(result: Any) -> Picture:
-    from notchflex.analysis import Bands, Batch
-    from notchflex.comparison import Comparison
-    from notchflex.control import Following
-    from notchflex.results import Equilibrium, EquilibriumPath
-    from notchflex.robot import Robot
-
-    kinds: dict[type, Callable[[Any], Picture]] = {
-        Robot: robot_picture,
-        EquilibriumPath: path_picture,
-        Equilibrium: lambda state: state_picture(state.path, state.step),
-        Batch: batch_picture,
-        Following: following_picture,
-        Bands: lambda bands: path_picture(bands.path, bands=bands),
-        Comparison: comparison_picture,
-    }
-    is_dict = isinstance(result, Mapping) and not isinstance(result, tuple(kinds))
-    if is_dict and all(isinstance(one, EquilibriumPath) for one in result.values()):
+    for kind in type(result).__mro__:
+        if kind.__name__ in _KINDS and kind.__module__.startswith("notchflex."):
+            module, _, function = _KINDS[kind.__name__].partition(":")
+            return getattr(import_module(f"notchflex.plotting.{module}"), function)(result)
+    paths = result.values() if isinstance(result, Mapping) else [result]
+    if all(type(one).__name__ == "EquilibriumPath" for one in paths):
         return beside_picture(cast("Mapping[str, EquilibriumPath]", result))
-    if not isinstance(result, tuple(kinds)):
-        from notchflex.fit import Calibration, FrictionRig  # takes a second
-
-        kinds |= {Calibration: calibration_picture}
-        kinds |= {FrictionRig: friction_picture}
-    for kind, describe in kinds.items():
-        if isinstance(result, kind):
-            return describe(result)
     raise InputError.WRONG_TYPE(
-        "a picture is made of a Robot, an EquilibriumPath, an Equilibrium, a Batch, "
-        "Bands, a Comparison, a Calibration, a FrictionRig or a dict of paths; got "
+        f"a picture is made of one of these: {', '.join(_KINDS)}, or of a dict of paths; got "
         f"{type(result).__name__}."
     )
+
+
+def equilibrium_picture(state: Equilibrium) -> Picture:
+    """Describe the picture of a state: that of its path, with the state in it."""
+    return state_picture(state.path, state.step)
+
+
+def bands_picture(bands: Bands) -> Picture:
+    """Describe the picture of bands: that of the path that they surround."""
+    return path_picture(bands.path, bands=bands)

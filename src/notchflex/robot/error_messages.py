@@ -5,7 +5,7 @@ import difflib
 import functools
 import types
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Union, cast
 
 from pydantic import ValidationError
@@ -198,11 +198,12 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
             return "it must be a number"
         if kind == "greater_than_equal" and got <= 0.0 < limit < 1.0:
             return f"it must be greater than 0{unit}"  # a negative length is no small length
-        return f"it must be {_BOUNDS[kind][0]} {limit:g}{unit}"
+        percent = "; 0.04 is 4 %" if kind == "less_than_equal" and "strain" in place.name else ""
+        return f"it must be {_BOUNDS[kind][0]} {limit:g}{unit}{percent}"
     if kind == "number_wanted":
         return f"it must be a number{' in' if unit else ''}{unit}, without quotes"
     if kind == "literal_error":
-        allowed = typing.get_args(place.field.annotation)
+        allowed = list(_words_in(place.field.annotation))
         return f"allowed: {_quoted(allowed)}{nearest(str(got), allowed)}"
     if is_list(place.field) and not place.kinds:
         if kind in ("too_short", "too_long"):
@@ -218,6 +219,15 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
     return _RULES.get(kind, table)
 
 
+def _words_in(annotation: Any) -> Iterator[str]:
+    """Yield the words that an annotation of a field allows, which may be left out or not."""
+    if typing.get_origin(annotation) is Literal:
+        yield from typing.get_args(annotation)
+    elif typing.get_origin(annotation) in (Annotated, Union, types.UnionType):
+        for one in typing.get_args(annotation):
+            yield from _words_in(one)
+
+
 _BOUNDS = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),
@@ -229,4 +239,6 @@ _RULES = {
     "whole_number_wanted": "it must be a whole number",
     "string_type": "it must be text in quotes",
     "string_too_short": "it must not be empty",
+    "string_too_long": "it is too long",
+    "string_pattern_mismatch": "it must be a word of letters, digits, - and _",
 }

@@ -15,8 +15,9 @@ from pydantic import Field
 
 from notchflex._packages import import_all
 from notchflex.robot.error_messages import kind_of
+from notchflex.robot.notches.cut import CutLayout
 from notchflex.robot.notches.opening import Opening
-from notchflex.robot.part import Float, Int, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, Int, part, quantity
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube
 
@@ -105,6 +106,21 @@ class Notch:
         del following
         return self.uncut_length
 
+    def cut_layout(
+        self, tube: Tube, before: "Notch | None", after: "Notch | None"
+    ) -> CutLayout | None:
+        """Return the cuts of this notch; None where its kind does not know them.
+
+        Drawings, cut patterns and solids follow from them.
+
+        Args:
+            tube: The tube.
+            before: The notch right before this one, toward the base; None for the first.
+            after: The next notch toward the tip; None for the last.
+        """
+        del tube, before, after
+        return None
+
     def openings(self, before: "Notch | None", after: "Notch | None") -> tuple[Opening, ...]:
         """Return the openings through which tendons enter the body behind this notch.
 
@@ -135,7 +151,7 @@ class Material:
     density: Annotated[Float | None, quantity("kg/m3", "density, for the weight", above=0)] = None
     allowed_strain: Annotated[
         Float | None,
-        quantity("", "strain beyond which a simulation warns", above=0),
+        quantity("", "strain beyond which a simulation warns", above=0, at_most=MOST_STRAIN),
     ] = None
 
     @property

@@ -29,9 +29,16 @@ class ProblemError(ValueError):
 @overload
 def part(cls: type[T]) -> type[T]: ...
 @overload
-def part(*, kw_only: bool) -> Callable[[type[T]], type[T]]: ...
+def part(
+    *, kw_only: bool, refuse: Callable[[str], InputError] = InputError.INVALID_ROBOT
+) -> Callable[[type[T]], type[T]]: ...
 @dataclass_transform(frozen_default=True, field_specifiers=(Field,))
-def part(cls: type[T] | None = None, *, kw_only: bool = False) -> Any:
+def part(
+    cls: type[T] | None = None,
+    *,
+    kw_only: bool = False,
+    refuse: Callable[[str], InputError] = InputError.INVALID_ROBOT,
+) -> Any:
     """Make a class a frozen pydantic dataclass that says clearly what is wrong with its values.
 
     Wrong values raise `InputError`; unknown keys are refused by name.
@@ -39,13 +46,14 @@ def part(cls: type[T] | None = None, *, kw_only: bool = False) -> Any:
     Args:
         cls: The class with its annotated fields.
         kw_only: Whether its fields are keyword arguments only, here and in what derives from it.
+        refuse: Makes the error of a message, with its code.
     """
     if cls is None:
-        return functools.partial(_part, kw_only=kw_only)
-    return _part(cls, kw_only=kw_only)
+        return functools.partial(_part, kw_only=kw_only, refuse=refuse)
+    return _part(cls, kw_only=kw_only, refuse=refuse)
 
 
-def _part(cls: type[T], *, kw_only: bool) -> type[T]:
+def _part(cls: type[T], *, kw_only: bool, refuse: Callable[[str], InputError]) -> type[T]:
     dataclass = pydantic.dataclasses.dataclass(
         frozen=True, kw_only=kw_only, config=ConfigDict(extra="forbid")
     )
@@ -58,9 +66,7 @@ def _part(cls: type[T], *, kw_only: bool) -> type[T]:
             checked_init(self, *args, **kwargs)
         except ValidationError as error:
             found = sentences(error, made)
-            raise InputError.INVALID_ROBOT(
-                "\n".join(f"{made.__name__}: {one}" for one in found)
-            ) from None
+            raise refuse("\n".join(f"{made.__name__}: {one}" for one in found)) from None
 
     made.__init__ = checked
     return made
@@ -98,6 +104,9 @@ Int = Annotated[int, BeforeValidator(_as_int)]
 # every robot, and near enough that nothing computed from it overflows.
 _SMALLEST = {"mm": 1e-6, "MPa": 1e-6, "N": 1e-6, "kg/m3": 1e-6, "": 1e-9}
 _LARGEST = {"mm": 1e6, "MPa": 1e9, "kg/m3": 1e6, "deg": 3600.0, "": 1e3}
+
+MOST_STRAIN = 0.5
+"""Beyond every material of a robot; a strain above it was meant in percent."""
 
 
 def quantity(

@@ -34,7 +34,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
     path = _find(name_or_path)
     shown = path.stem if path.parent == READY else str(path)
     text = _read_text(path, shown)
-    table = _parse(text, shown)
+    table = parse_toml(text, shown)
     try:
         robot = from_table(table)
     except InputError as error:
@@ -55,7 +55,7 @@ def robot_from_text(text: str, shown: str = "robot file") -> Robot:
     Raises:
         InputError: The text is no TOML, or a value in it is not allowed.
     """
-    return remember_source(from_table(_parse(text, shown)), text)
+    return remember_source(from_table(parse_toml(text, shown)), text)
 
 
 def _find(name_or_path: str | os.PathLike[str]) -> Path:
@@ -100,7 +100,23 @@ def _read_text(path: Path, shown: str) -> str:
         raise RobotFileError.FILE_UNREADABLE(f"{shown} cannot be read: {reason}.") from None
 
 
-def _parse(text: str, shown: str) -> dict[str, Any]:
+def parse_toml(
+    text: str,
+    shown: str,
+    kind: str = "robot file",
+    error_class: type[InputError] = RobotFileError,
+) -> dict[str, Any]:
+    """Read the text of a TOML file.
+
+    Args:
+        text: The text.
+        shown: What messages call it.
+        kind: What kind of file it is, for messages.
+        error_class: The class of the error.
+
+    Raises:
+        InputError: The text is no TOML; the message names the line.
+    """
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -111,15 +127,13 @@ def _parse(text: str, shown: str) -> dict[str, Any]:
         # "end of document" is the last line that has something on it
         line = line or len(text.rstrip().splitlines())
         at = f", column {column}" if column else ""
-        raise RobotFileError.FILE_UNREADABLE(
+        raise error_class.FILE_UNREADABLE(
             f"{shown}, line {line}{at}: this is not TOML ({what[:1].lower()}{what[1:]}); "
             "write one `key = value` a line, text in quotes."
         ) from None
     except ValueError as error:  # a whole number of thousands of digits
-        raise RobotFileError.FILE_UNREADABLE(
+        raise error_class.FILE_UNREADABLE(
             f"{shown} holds a number that cannot be read: {error}."
         ) from None
     except RecursionError:
-        raise RobotFileError.FILE_UNREADABLE(
-            f"{shown} is nested too deeply for a robot file."
-        ) from None
+        raise error_class.FILE_UNREADABLE(f"{shown} is nested too deeply for a {kind}.") from None

@@ -37,7 +37,7 @@ class SubstepHistory(NamedTuple):
     reached: Bool[Array, ""]
 
 
-# A load and another before it: from rest, loads on the bodies come on before the tendons.
+# From rest, loads on the bodies come on before the tendons; and a load that fails is halved.
 _PARTS_FOLLOWED = 2
 
 
@@ -46,9 +46,8 @@ def attach_derivatives(
 ) -> SolverState:
     """A solved state with its derivatives by chain, command and the state before.
 
-    Contacts remember: where loads on the bodies came on before the tendons, the derivatives go
-    through both parts of the way. Of more parts, and where tendons alone are pulled in more than
-    one, only the last states are known; with friction the derivatives are then NaN.
+    Contacts and material remember: where a load was taken in two parts, the derivatives go through
+    both. Of more parts only the last states are known; with memory the derivatives are then NaN.
 
     Args:
         chain: The chain.
@@ -60,9 +59,8 @@ def attach_derivatives(
     Returns:
         The same state.
     """
-    if not (chain.remembers and chain.loaded):
-        whole = (way.parts <= 1) | (not chain.remembers)
-        return _answering_part(chain, command, last, solved, way.reached & whole)
+    if not chain.remembers:
+        return _answering_part(chain, command, last, solved, way.reached)
     known = way.reached & (way.parts <= _PARTS_FOLLOWED)
     halfway = interpolate_command(chain, command, last, _still(way.part_before))
     items = (halfway, way.between, way.parts > 1), (command, solved, jnp.array(True))

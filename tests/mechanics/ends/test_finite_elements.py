@@ -31,6 +31,8 @@ def test_other_directions(margin):
         ("coupling", 6.0, 6.0),
         ("torsion", 5.0, 12.5),
         ("shear centre", 6.0, 7.0),
+        ("shear", 6.0, 13.0),
+        ("sway", 6.0, 13.0),
     ):
         judge(margin, name, errors[name], rms, largest)
 

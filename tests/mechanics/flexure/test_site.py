@@ -79,3 +79,21 @@ def test_rigid_ends_under_a_sideways_force():
     twist, bend, *solid = sideways(rigid(wrist()))
     assert (twist / solid[0] < 0.85).all()
     assert (bend / solid[1] < 0.55).all()
+
+
+@pytest.mark.parametrize("across", [0, 1])
+def test_rings_shift_by_the_compliance_in_shear(across, margin):
+    """A force through the middle of a notch, at its centre of twist, shifts its rings alone."""
+    five = wrist()
+    one = replace(five, notch=(replace(five.notch[0], repeat=1),))
+    site = sites_of(one)[0]
+    law = notch_stiffness(0.81, 0.7, "off-axis", 1.4, 0.8, 0.33, site.proximal, site.distal)
+    force = 1e-5 * np.eye(3)[across]
+    middle, tip = 1.2 + 0.4, 1.2 + 0.8 + 1.2
+    arm = np.array([-law.shear_centre, 0.0, middle - tip])
+    state = nf.solve(one, nf.Load(tension=0.0, tip_force=force, tip_moment=np.cross(arm, force)))
+    turned = state.body_rotation[-1] - np.eye(3)
+    margin.within("turn, rad", turned, 1e-9)
+    at_middle = state.tip_position - np.array([0.0, 0.0, tip]) + turned @ arm
+    wanted = (law.shear, law.sway)[across] * 1e-5 / LINEAR.elastic_modulus
+    margin.within("shift, relative", at_middle[across] / wanted - 1.0, 1e-8)

@@ -30,6 +30,7 @@ def _strips() -> nf.Robot:
     return robot.replace(notch=robot.notches[:5], tendon=[nf.Tendon(2.0, path="straight")])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "robot",
     [

@@ -24,6 +24,7 @@ def nothing_warned_of(monkeypatch):
     monkeypatch.setattr(backend, "_warned", set())
 
 
+@pytest.mark.nightly
 def test_xla_finds_the_same(wrist, monkeypatch, margin):
     loads = [nf.pull(0.0, top, steps=4).release() for top in (1.0, 2.0, 2.5)]
     outputs = ("total_angle", "peak_strain", "contact_force")

@@ -26,6 +26,7 @@ from notchflex.mechanics.chain import Shaped, laws, shape_of
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
+from notchflex.solver.continuation import SolverState
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain, flat, prepare
 from notchflex.solver.programs.run import run
@@ -61,19 +62,22 @@ class ForwardModel:
         """The robot as it is, as arrays."""
         return self._assembled(self.robot)
 
-    def solve(self, robot: Robot, load: LoadPath) -> EquilibriumPath:
+    def solve(
+        self, robot: Robot, load: LoadPath, start: SolverState | None = None
+    ) -> EquilibriumPath:
         """Follow loads with the robot that has some other numbers.
 
         Args:
             robot: The robot.
             load: Loads of the same kind as those of the model.
+            start: The state to start from, in the place of rest.
 
         Raises:
             InputError: The arrays of the robot have another form than those of the model's.
         """
         ready = self._prepared(robot)
         commands = make_commands(load, robot, ready.chain)
-        came = run(ready, commands, None, self.settings, each_from_start=self.from_rest)
+        came = run(ready, commands, start, self.settings, each_from_start=self.from_rest)
         return EquilibriumPath(robot, load, ready, came, settings=self.settings)
 
     def change(self, robot: Robot, load: LoadPath, name: str) -> Change:
@@ -98,14 +102,33 @@ class ForwardModel:
             chain[self._places[section]] = slope(of_laws, getattr(part, key), order=2)
             return Change(None, chain)
 
+        return self.change_along(
+            lambda value: robot.with_value(name, value), number_at(robot, name), load
+        )
+
+    def change_along(
+        self, robot_at: Callable[[float], Robot], at: float, load: LoadPath, *, order: int = 6
+    ) -> Change:
+        """Differentiate arrays and loads along a family of robots.
+
+        Args:
+            robot_at: The robot of a number; only its geometry and loads on its mass may vary.
+            at: The number where.
+            load: The loads.
+            order: Order of accuracy, as for `slope`.
+
+        Raises:
+            InputError: The number cannot be varied.
+        """
+
         def packed(value: float) -> np.ndarray:
-            varied = robot.with_value(name, value)
+            varied = robot_at(value)
             ready = self._prepared(varied)
             loads, _ = ready.padded_commands(make_commands(load, varied, ready.chain))
             return np.concatenate([ready.long.vector, loads.ravel()])
 
         size = self.ready.long.chain_layout.size
-        by_number = slope(packed, number_at(robot, name))
+        by_number = slope(packed, at, order=order)
         return Change(by_number[size:].reshape(len(load), -1), by_number[:size])
 
     def load_change(

@@ -58,6 +58,7 @@ def tip_response(
     *,
     settings: Settings | None = None,
     refinement: int = 0,
+    each_from_rest: bool = False,
 ) -> TipResponse:
     """Follow loads, and find at every state how the tip answers its drives and what pushes at it.
 
@@ -70,6 +71,7 @@ def tip_response(
         loads: A path, or loads in order.
         settings: How hard the solver tries.
         refinement: More strain modes, as for `simulate`.
+        each_from_rest: Whether every load starts from rest instead of from the one before.
 
     Returns:
         The slopes, and the path they belong to, followed with modes for loads in space.
@@ -85,7 +87,9 @@ def tip_response(
     """
     load = load_path(loads, check_is_robot(robot).number_of_tendons)
     check_refinement(refinement)
-    model = ForwardModel(robot, load, settings or DEFAULT, refinement, any_load=True)
+    model = ForwardModel(
+        robot, load, settings or DEFAULT, refinement, from_rest=each_from_rest, any_load=True
+    )
     path = model.solve(robot, load)
     changes = [Change(loads, None) for loads in _unit_loads(path)]
     # Each state is varied alone: what the contacts remember of the state before stays.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -32,21 +33,36 @@ class Draws(NamedTuple):
     redrawn: int
 
 
-class _Source(NamedTuple):
-    """One number drawn, and the values that follow it."""
+class Source(NamedTuple):
+    """One number drawn, and the values that follow it.
+
+    Attributes:
+        tolerance: How it deviates.
+        nominal: The values of the drawing by name.
+    """
 
     tolerance: Tolerance
     nominal: dict[str, float]
 
-    def values(self, level: float) -> dict[str, float]:
-        """The values at a level of the distribution, between 0 and 1."""
+    @property
+    def name(self) -> str:
+        """Name of what deviates: that of the tolerance, or of a single notch."""
+        return next(iter(self.nominal)) if self.tolerance.per_notch else self.tolerance.value
+
+    def values(self, level: Any) -> dict[str, Any]:
+        """The values at levels of the distribution, each between 0 and 1."""
         return {
             name: one + deviation(self.tolerance, one, level) for name, one in self.nominal.items()
         }
 
 
-def deviation(tolerance: Tolerance, value: float, level: float) -> float:
+def deviation(tolerance: Tolerance, value: float, level: Any) -> Any:
     """Return the deviation from a value that a part `level` of all deviations stays below.
+
+    Args:
+        tolerance: How the value deviates.
+        value: The value of the drawing.
+        level: Between 0 and 1; an array gives an array.
 
     Example:
         >>> deviation(Tolerance("material.elastic_modulus", plus="20 %", minus="10 %"), 4e4, 0.5)
@@ -57,9 +73,31 @@ def deviation(tolerance: Tolerance, value: float, level: float) -> float:
     if tolerance.sd is None:
         return level * (plus + minus) - minus
     if sd == 0.0:
-        return 0.0
+        return 0.0 * level
     lower, upper = ndtr(-minus / sd), ndtr(plus / sd)
-    return sd * float(ndtri(lower + level * (upper - lower)))
+    return sd * ndtri(lower + level * (upper - lower))
+
+
+def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
+    """Return mean and standard deviation of the deviation from a value.
+
+    Example:
+        >>> moments(Tolerance("notch.depth", plus=0.03, minus=0.03), 1.4)
+        (0.0, 0.017320508075688773)
+    """
+    sd = amount(tolerance.sd, value)
+    plus, minus = amount(tolerance.plus, value), amount(tolerance.minus, value)
+    if tolerance.sd is None:
+        return 0.5 * (plus - minus), (plus + minus) / math.sqrt(12.0)
+    if sd == 0.0 or (math.isinf(plus) and math.isinf(minus)):
+        return 0.0, sd
+    # A normal distribution that is cut off at a and b, in standard deviations.
+    a, b = -minus / sd, plus / sd
+    part = ndtr(b) - ndtr(a)
+    low, high = (math.exp(-0.5 * end**2) / math.sqrt(2.0 * math.pi) for end in (a, b))
+    mean = (low - high) / part
+    ends = sum(end * one for end, one in ((a, low), (-b, high)) if one)
+    return float(sd * mean), float(sd * math.sqrt(1.0 + ends / part - mean**2))
 
 
 def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed: int) -> Draws:
@@ -75,14 +113,14 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
         InputError: Hardly any draw makes a valid robot.
     """
     exact = robot.replace(tolerance=None)
-    sources = _sources(exact, tolerances)
+    sources = sources_of(exact, tolerances)
     random = np.random.default_rng(seed)
     robots: list[Robot] = []
     values: list[dict[str, float]] = []
     redrawn = 0
     for level in _levels(draws, len(sources), random):
         for tried in range(_TRIES):
-            drawn = _values(sources, level)
+            drawn = {name: float(one) for name, one in values_at(sources, level).items()}
             try:
                 robots.append(exact.with_values(drawn))
             except InputError as error:
@@ -116,22 +154,33 @@ def _levels(
     return (part + random.random(part.shape)) / draws
 
 
-def _values(sources: Sequence[_Source], levels: Float[np.ndarray, " d"]) -> dict[str, float]:
-    drawn: dict[str, float] = {}
-    for source, level in zip(sources, levels, strict=True):
-        drawn |= source.values(float(level))
+def values_at(sources: Sequence[Source], levels: Float[np.ndarray, "... d"]) -> dict[str, Any]:
+    """Return the values of robots by name, at levels of the sources between 0 and 1."""
+    drawn: dict[str, Any] = {}
+    for source, level in zip(sources, np.moveaxis(levels, -1, 0), strict=True):
+        drawn |= source.values(level)
     return drawn
 
 
-def _sources(robot: Robot, tolerances: Sequence[Tolerance]) -> list[_Source]:
-    """What is drawn: those of all notches first, so that those of a single one replace them."""
-    found: list[_Source] = []
-    for one in sorted(tolerances, key=lambda one: "[" in one.value):
+def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[Source]:
+    """Return what is drawn; the tolerance of a single notch replaces that of all notches there.
+
+    Args:
+        robot: The robot with the values of the drawing.
+        tolerances: What deviates.
+    """
+    found: list[Source] = []
+    alone = {one.value for one in tolerances if "[" in one.value}
+    for one in tolerances:
         numbers = numbers_at(robot, one.value)
-        if one.per_notch:
-            found += [_Source(one, {name: value}) for name, value in numbers.items()]
+        others = {name: value for name, value in numbers.items() if name not in alone}
+        if one.value not in alone and len(others) < len(numbers):
+            names = [[name] for name in others] if one.per_notch else [list(others)]
+            found += [Source(one, {name: others[name] for name in each}) for each in names if each]
+        elif one.per_notch:
+            found += [Source(one, {name: value}) for name, value in numbers.items()]
         elif len(set(numbers.values())) == 1:  # by one name: equal notches stay a group
-            found.append(_Source(one, {one.value: number_at(robot, one.value)}))
+            found.append(Source(one, {one.value: number_at(robot, one.value)}))
         else:
-            found.append(_Source(one, numbers))
+            found.append(Source(one, numbers))
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
 
 from notchflex.cli import terminal
@@ -35,9 +36,22 @@ def closing_lines(robot: Robot, found: ClosingBands) -> list[str]:
 
 def tolerance_lines(bands: Bands) -> list[str]:
     """Return the tolerances that bands were made with, and which of them were assumed."""
-    robot = bands.path.robot
-    given = [_words(robot, one) for one in bands.tolerances if one.value not in bands.assumed]
-    assumed = [_words(robot, one) for one in bands.tolerances if one.value in bands.assumed]
+    return tolerance_words(bands.path.robot, bands.tolerances, bands.assumed)
+
+
+def tolerance_words(
+    robot: Robot, tolerances: Iterable[Tolerance], names: Collection[str]
+) -> list[str]:
+    """Return tolerances in lines of text.
+
+    Args:
+        robot: The robot.
+        tolerances: Its tolerances.
+        names: Of the values whose tolerance is assumed.
+    """
+    tolerances = list(tolerances)
+    given = [_words(robot, one) for one in tolerances if one.value not in names]
+    assumed = [_words(robot, one) for one in tolerances if one.value in names]
     lines = _wrapped(f"Tolerances: {', '.join(given)}.") if given else []
     if assumed:
         text = f"Tolerances assumed: {', '.join(assumed)}. A [tolerance] table in the robot file"

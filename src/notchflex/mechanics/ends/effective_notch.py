@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from notchflex.mechanics.ends.edge_loads import arc_of, end_compliance
 from notchflex.mechanics.ends.flattening import edge_and_brazier, flattening_numbers
+from notchflex.mechanics.ends.shear import shear_compliances
 from notchflex.mechanics.ends.side import Side
 from notchflex.mechanics.ends.vlasov import shear_centre, torsion_length
 from notchflex.mechanics.section import SECTION_OF_CUT
@@ -34,6 +35,9 @@ class NotchStiffness(NamedTuple):
         torsion: Effective length, mm: twist = T ℓ/(G J) with the J of the section; the ends hold
             the section against warping.
         shear_centre: Distance of the centre of twist from the tube axis, toward the spine, mm.
+        shear: Compliance in shear times E, 1/mm: how far the rings shift in the plane of bending
+            under a force across the tube through the middle of the notch.
+        sway: The same sideways, under a force through the centre of twist.
         alpha: α, 1/rad: the stiffness K₀ = E I/ℓ falls to K₀/q², q = 1 + αθ/2 + βθ²/2, θ > 0
             closing.
         beta: β, 1/rad².
@@ -47,6 +51,8 @@ class NotchStiffness(NamedTuple):
     coupling: float
     torsion: float
     shear_centre: float
+    shear: float
+    sway: float
     alpha: float
     beta: float
     closing_factor: float
@@ -95,17 +101,25 @@ def notch_stiffness(
     )
     edge, share = edge_and_brazier(arc.radius, sides)
     imposed = 3.0 * poisson_ratio * height + edge * outer_angle**3 * arc.radius**2 / arc.wall
+    shear, sway = shear_compliances(
+        arc,
+        outer_radius,
+        (length, height + strong),
+        (float(section.second_moment_weak), float(section.second_moment_strong)),
+        sides,
+    )
     closed = _CLOSED_STIFFNESS * arc.wall * arc.radius**2 * length / section.second_moment_weak
-    numbers = NotchStiffness(
-        weak=length,
-        strong=height + strong,
-        axial=height + axial,
-        coupling=coupling,
-        torsion=torsion_length(arc, outer_radius, height, poisson_ratio, section),
+    return NotchStiffness(
+        weak=float(length),
+        strong=float(height + strong),
+        axial=float(height + axial),
+        coupling=float(coupling),
+        torsion=float(torsion_length(arc, outer_radius, height, poisson_ratio, section)),
         shear_centre=shear_centre(arc, height, section),
-        alpha=arc.radius * phi * imposed / length**2,
-        beta=share * brazier * height / length**3,
+        shear=shear,
+        sway=sway,
+        alpha=float(arc.radius * phi * imposed / length**2),
+        beta=float(share * brazier * height / length**3),
         closing_factor=_CLOSING_FACTOR[cut],
         closed_ratio=float(closed),
     )
-    return NotchStiffness(*map(float, numbers))

@@ -16,6 +16,8 @@ then nearly orthogonal, and a condition at the far edge leaves out one polynomia
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 HARMONICS = 41  # n = 0 ... 40
@@ -116,6 +118,7 @@ _EDGE[:_COUNT, 0] = _IN_SURFACE[0, 0]
 _EDGE[2 * _COUNT :, 1] = _OUTWARD[1, 0]
 
 
+@lru_cache(maxsize=256)  # rings of one length are alike, however deep the notches beside them
 def edge_compliance(
     radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
 ) -> np.ndarray:
@@ -151,4 +154,6 @@ def edge_compliance(
     # Displacements are of order r² per N/mm over E t length; slopes have one r less.
     unit = np.stack([radius, one])
     scale = (1.0 - poisson_ratio**2) / (wall * length)
-    return flexibility * (scale * np.outer(unit, unit)[None])
+    found = flexibility * (scale * np.outer(unit, unit)[None])
+    found.setflags(write=False)
+    return found

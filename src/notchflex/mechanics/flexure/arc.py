@@ -7,7 +7,9 @@ the elastic angle. Other loads add a linear part of bending, both for the strong
 about the shear centre. Shear and stretch, small in a short arc, are left out.
 
 With elastic ends (`ends = "shell"`) the compliance of the rings is spread over the arc, and the
-neutral axis moves to where an axial force and bending do not couple.
+neutral axis moves to where an axial force and bending do not couple. A force across the tube also
+shifts the rings against each other: the linear part of each bending carries a constant shear, in
+the ratio in which one force causes both.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import NotchEnds
-from notchflex.mechanics.section import SECTION_OF_CUT
+from notchflex.mechanics.section import SECTION_OF_CUT, Section
 from notchflex.robot import ArcNotch, Tube
 
 # Part of the end compliance that follows the material beyond its elastic limit (finite elements).
@@ -43,6 +45,7 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
     cut = SECTION_OF_CUT[notch.cut](*shape)
     centroid, section = float(cut.centroid), about_neutral_axis(cut)
     closure, stop = tube.outer_radius + centroid, 0.0
+    shear = (0.0, 0.0)
     if site is not None:
         outer, inner, depth = shape
         law = notch_stiffness(
@@ -54,7 +57,7 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
         if notch.ends == "shell":
             centroid -= law.coupling / law.weak
             centre = constant(law.shear_centre - centroid)
-            ends = _ends(law, notch.height)
+            ends, shear = _ends(law, notch.height, cut, site.poisson_ratio)
             section = dataclasses.replace(section, shear_centre=centre, ends=ends)
     # Smooth all along: one piece, with a node in its middle. With six nodes a notch that bends by a
     # radian in its plane is right to 1e-15; the turns of one that also bends sideways and twists
@@ -62,7 +65,9 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
     points = RodQuadrature((0.0, notch.height), (7 + 4 * refinement,), (10 + 3 * refinement,))
     bending, twist = 2 + refinement, 1 + refinement
     centre = float(section.shear_centre)
-    modes = legendre_modes(points, bending, bending, twist, tendon_modes=1, shear_centre=centre)
+    modes = legendre_modes(
+        points, bending, bending, twist, tendon_modes=1, shear_centre=centre, shear=shear
+    )
     free = STRAIGHT + np.radians(notch.precurvature_deg) * modes.basis[..., 0]
     axis = NeutralAxis(points, start=shifted(-centroid), end=shifted(centroid), strain=free)
     return build_rod(
@@ -70,9 +75,28 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
     )
 
 
-def _ends(stiffness: NotchStiffness, height: float) -> NotchEnds:
-    """Refer the effective lengths and the softening to the arc, over which they are spread."""
-    return NotchEnds(
+def _ends(
+    stiffness: NotchStiffness, height: float, cut: Section, poisson_ratio: float
+) -> tuple[NotchEnds, tuple[float, float]]:
+    """Refer the effective lengths and the softening to the arc, over which they are spread.
+
+    Returns:
+        The ends, and the shift of the rings in the plane and sideways, mm, under the force whose
+        moment has the curvature P_1(s)/h.
+    """
+    bending = (stiffness.weak, stiffness.strong)
+    seconds = (float(cut.second_moment_weak), float(cut.second_moment_strong))
+    # Beyond what the linear part of the bending gives: h^2 l/(12 I).
+    shear = [
+        all_of_it - height**2 * length / (12.0 * second)
+        for all_of_it, length, second in zip(
+            (stiffness.shear, stiffness.sway), bending, seconds, strict=True
+        )
+    ]
+    push, sway = (
+        one * float(cut.area) / (2.0 * (1.0 + poisson_ratio) * height) - 1.0 for one in shear
+    )
+    ends = NotchEnds(
         weak=constant(stiffness.weak / height - 1.0),
         strong=constant(stiffness.strong / height - 1.0),
         axial=constant(stiffness.axial / height - 1.0),
@@ -80,7 +104,15 @@ def _ends(stiffness: NotchStiffness, height: float) -> NotchEnds:
         odd=constant(0.5 * stiffness.alpha * height),
         even=constant(0.5 * stiffness.beta * height**2),
         material_share=constant(MATERIAL_SHARE),
+        sway=constant(sway),
+        push=constant(push),
     )
+    # M = E I kappa h/l changes by the force: 2 E I/(h l) where kappa = P_1/h.
+    in_plane, sideways = (
+        2.0 * second / (height * length) * one
+        for one, length, second in zip(shear, bending, seconds, strict=True)
+    )
+    return ends, (in_plane, sideways)
 
 
 @unchecked.register

@@ -72,6 +72,7 @@ def legendre_modes(
     *,
     tendon_modes: int | None = None,
     shear_centre: float = 0.0,
+    shear: tuple[float, float] = (0.0, 0.0),
 ) -> StrainModes:
     """Make modes of curvature and twist that are Legendre polynomials of arc length.
 
@@ -82,6 +83,9 @@ def legendre_modes(
         twist: Those of the twist, about the shear centre.
         tendon_modes: Bending modes that tendons alone need; all where not given.
         shear_centre: Distance of the shear centre from the neutral axis, mm.
+        shear: How far a force across the rod shifts its end, mm, in the plane of bending and
+            sideways, where its moment has the curvature P_1/length. That shear is constant along
+            the rod and belongs to the linear mode of the bending.
 
     Returns:
         The modes; a unit of the first bends the rod by 1 rad.
@@ -95,6 +99,10 @@ def legendre_modes(
         first += count
     # Twist about the shear centre shears the neutral axis, which lies off it, sideways.
     modes[:, 4, bending + sideways :] = shear_centre * modes[:, 2, bending + sideways :]
+    # Of dM/ds = n x e_z: a force along x lowers the moment about y, along y it raises that about x.
+    if any(shear):
+        modes[:, 3, 1] -= shear[0]
+        modes[:, 4, bending + 1] += shear[1]
     fewest = bending if tendon_modes is None else tendon_modes
     return StrainModes(modes / length, (fewest, bending, modes.shape[-1]))
 

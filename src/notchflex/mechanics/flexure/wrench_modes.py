@@ -96,6 +96,6 @@ def _compliance(section: FibreSection, poisson_ratio: float) -> Float[np.ndarray
     compliance = 1.0 / np.stack([np.asarray(one) for one in stiffness], axis=-1)
     if (ends := section.ends) is None:
         return compliance
-    none = np.zeros_like(ends.weak)
-    added = (ends.strong, ends.weak, ends.torsion, none, ends.sway, ends.axial)
-    return compliance * (1.0 + np.stack(added, axis=-1))
+    added = (ends.strong, ends.weak, ends.torsion, ends.push, ends.sway, ends.axial)
+    parts = np.broadcast_arrays(*map(np.asarray, added))
+    return compliance * (1.0 + np.stack(parts, axis=-1))

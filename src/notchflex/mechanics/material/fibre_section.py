@@ -25,6 +25,7 @@ class NotchEnds(Pytree):
         even: Its even part, mm^2.
         material_share: Share of `weak` that follows the material; the rest stays elastic.
         sway: In shear sideways.
+        push: In shear in the plane of bending.
     """
 
     weak: Float[Array, "*shape"]
@@ -35,11 +36,12 @@ class NotchEnds(Pytree):
     even: Float[Array, "*shape"]
     material_share: Float[Array, "*shape"]
     sway: Float[Array, "*shape"] | float = 0.0
+    push: Float[Array, "*shape"] | float = 0.0
 
     @classmethod
     def rigid(cls, like: Float[Array, "*shape"]) -> NotchEnds:
         """Return ends that add nothing, in the shape of an array."""
-        return cls(*(np.zeros(np.shape(like)) for _ in range(8)))  # pyright: ignore
+        return cls(*(np.zeros(np.shape(like)) for _ in range(9)))  # pyright: ignore
 
     def flattening(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
         """By how much the distances of the fibres shrink at a curvature: q."""

@@ -260,6 +260,7 @@ def elastic_resultants(
     across = shear * (along_y - section.shear_centre * twist)
     if ends is not None:
         across = across / (1.0 + ends.sway)
+        along_x = along_x / (1.0 + ends.push)
     resultants = [
         elastic_modulus * section.second_moment_strong * about_x,
         elastic_modulus * section.second_moment_weak * about_y,

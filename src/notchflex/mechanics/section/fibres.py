@@ -7,12 +7,16 @@ what the strips leave, about 1e-7 of them. Used when a robot is put together, in
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from jaxtyping import Float
-from numpy.polynomial.legendre import leggauss
+from numpy.polynomial import legendre
 
 from notchflex._jax import constant
 from notchflex.mechanics.section.angles import half_angle
+
+leggauss = lru_cache(maxsize=16)(legendre.leggauss)
 
 FIBRES = 20
 _RADII, _ANGLES, _STRIPS = 10, 40, 160

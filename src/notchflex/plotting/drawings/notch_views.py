@@ -7,7 +7,6 @@ of notch registers its own `notch_view`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
@@ -19,6 +18,8 @@ from numpy.typing import NDArray
 from notchflex.errors import InputError
 from notchflex.robot import ArcNotch, Robot, StripNotch, ULink
 from notchflex.robot.kinds import Notch
+from notchflex.robot.notches.cut import NotchCut
+from notchflex.robot.notches.profile import outline
 
 Points = NDArray[np.float64]
 
@@ -26,6 +27,8 @@ STUB = 0.35
 """Drawn length of a neighbouring piece, in outer diameters."""
 LONGEST = 1.6
 """Longest uncut piece that is not broken, in outer diameters."""
+CHORD = 0.0005
+"""Largest distance of a drawn arc from the true one, in outer diameters."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,12 @@ class NotchView:
     toward: bool = False  # the remaining section lies on the side of the bend
     notes: Sequence[str] = ()  # further dimensions in words
     absent: Sequence[str] = ()  # names of dimensions that are 0
+
+
+def _drawn(cut: NotchCut, at: float, sign: float, diameter: float) -> Points:
+    """Return the edge of a cut that starts at a place of the view, above or below the axis."""
+    points = np.array(outline(cut, CHORD * diameter))
+    return (points - [points[:, 0].min() - at, 0.0]) * [1.0, sign]
 
 
 @singledispatch
@@ -122,8 +131,9 @@ class _SideView:
 def _arc(notch: ArcNotch, robot: Robot, first: bool, following: Notch | None) -> NotchView:
     """Describe a cut that leaves an arc of the wall (Pacheco 2021, York 2015)."""
     outer, inner = robot.tube.outer_radius, robot.tube.inner_radius
-    corner = outer - notch.depth
-    radial = notch.cut == "on-axis"
+    (window,), _ = notch.cut_layout(robot.tube, None, following)
+    corner = window.corners[1][1]
+    radial = window.radial
     # A radial cut face is seen from its outer to its inner corner.
     slanted = corner * inner / outer if radial else corner
     line = _SideView(robot, first)
@@ -132,7 +142,8 @@ def _arc(notch: ArcNotch, robot: Robot, first: bool, following: Notch | None) ->
     for number in range(shown):
         start, end = line.piece(notch.height, "" if number else "height")
         top = max(corner, slanted)
-        edge = np.array([(start, outer), (start, top), (end, top), (end, outer)])
+        edge = _drawn(window, start, 1.0, line.diameter)
+        edge[:, 1] = np.maximum(edge[:, 1], top)
         # Where the cut ends above the axis, the wall hides its face.
         face = np.array([(start, corner), (end, corner)]) if corner < top else None
         cuts.append(Cut(edge, face))
@@ -163,7 +174,8 @@ def _arc(notch: ArcNotch, robot: Robot, first: bool, following: Notch | None) ->
 @notch_view.register
 def _strip(notch: StripNotch, robot: Robot, first: bool, following: Notch | None) -> NotchView:
     """Describe a pair of triangular notches with the strip between them (Liu 2022)."""
-    del following  # the last notch may reach beyond the tip, so the view is broken off there too
+    # The last notch may reach beyond the tip, so the view is broken off there too.
+    (below, above), _ = notch.cut_layout(robot.tube, None, following)
     outer = robot.tube.outer_radius
     line = _SideView(robot, first)
     cuts: list[Cut] = []
@@ -171,9 +183,8 @@ def _strip(notch: StripNotch, robot: Robot, first: bool, following: Notch | None
     for number in range(min(notch.repeat, 2)):
         start, near = line.piece(notch.height, "" if number else "height")
         _, far = line.piece(notch.strip_thickness, "" if number else "strip thickness")
-        upper = [(start, outer), (near, outer - notch.depth), (near, outer)]
-        lower = [(far, -outer), (far, notch.depth - outer), (far + notch.height, -outer)]
-        cuts += [Cut(np.array(upper)), Cut(np.array(lower))]
+        cuts.append(Cut(_drawn(below, start, 1.0, line.diameter)))
+        cuts.append(Cut(_drawn(above, far, -1.0, line.diameter)))
         vertex = near
         if number == 0:
             line.piece(notch.uncut_length, "uncut length")
@@ -204,21 +215,20 @@ def _strip(notch: StripNotch, robot: Robot, first: bool, following: Notch | None
 def _u_link(notch: ULink, robot: Robot, first: bool, following: Notch | None) -> NotchView:
     """Describe a row of slots with round ends (Gao 2017)."""
     outer, radius, half = robot.tube.outer_radius, notch.slot_radius, 0.5 * notch.strip_length
+    slot = notch.cut_layout(robot.tube, None, following).cuts[0]
     line = _SideView(robot, first)
     cuts: list[Cut] = []
     side = -1.0 if notch.proximal_slot == "away" else 1.0
     shown = range(notch.slots) if notch.slots <= 4 else (0, 1, 2, notch.slots - 1)
     # The slot of the section is cut from the side of the bend; its neighbour from the other one.
     centres: dict[float, float] = {}
-    around = np.linspace(0.0, math.pi, 25)
     for place, number in enumerate(shown):
         if place and number > shown[place - 1] + 1:
             line.stub()
             line.at += STUB * line.diameter
         start, end = line.piece(notch.height, "slot width" if place == 1 else "")
         sign, middle = side * (-1.0) ** number, 0.5 * (start + end)
-        arc = [(middle - radius * np.cos(t), sign * (-half - radius * np.sin(t))) for t in around]
-        cuts.append(Cut(np.array([(start, sign * outer), *arc, (end, sign * outer)])))
+        cuts.append(Cut(_drawn(slot, start, sign, line.diameter)))
         if place < 3:
             centres[sign] = middle
         if number + 1 in shown:
@@ -229,7 +239,7 @@ def _u_link(notch: ULink, robot: Robot, first: bool, following: Notch | None) ->
         line.stub()
     section_at = centres[1.0]
     ends = [(section_at, -half), (centres[-1.0], half)]
-    corner = -half - radius
+    corner = slot.corners[1][1]
     depth = outer + half + radius
     return line.view(
         tip=following is None,

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from notchflex.robot.kinds import Material
-from notchflex.robot.part import Float, ProblemError, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
 
 # On a plateau flatter than this part of Young's modulus the sums over fibres have jumps.
 _LEAST_SLOPE = 0.01
@@ -57,7 +57,8 @@ class Nitinol(Material):
         quantity("MPa", "stress in tension where the plateau of unloading ends", above=0),
     ] = None
     transformation_strain: Annotated[
-        Float | None, quantity("", "strain where the plateau of loading ends", above=0)
+        Float | None,
+        quantity("", "strain where the plateau of loading ends", above=0, at_most=MOST_STRAIN),
     ] = None
     _: KW_ONLY
     kind: Literal["nitinol"] = "nitinol"

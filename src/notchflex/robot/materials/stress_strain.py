@@ -8,14 +8,14 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from notchflex.robot.kinds import Material
-from notchflex.robot.part import Float, ProblemError, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
 
 _LEAST, _MOST = 2, 40
 # Where a curve is flatter than this part of Young's modulus the sums over fibres have jumps.
 _LEAST_SLOPE = 0.01
 
 Strains = Annotated[
-    tuple[Annotated[Float, quantity("", "strain", above=0)], ...],
+    tuple[Annotated[Float, quantity("", "strain", above=0, at_most=MOST_STRAIN)], ...],
     Field(min_length=_LEAST, max_length=_MOST),
 ]
 Stresses = Annotated[

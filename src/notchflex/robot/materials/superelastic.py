@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from notchflex.robot.kinds import Material
-from notchflex.robot.part import Float, ProblemError, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, ProblemError, part, quantity
 
 
 @part
@@ -42,10 +42,11 @@ class Superelastic(Material):
         Float, quantity("MPa", "modulus of the superelastic branch", above=0)
     ]
     transition_strain: Annotated[
-        Float, quantity("", "strain where the superelastic branch begins", above=0)
+        Float,
+        quantity("", "strain where the superelastic branch begins", above=0, at_most=MOST_STRAIN),
     ]
     plastic_strain: Annotated[
-        Float, quantity("", "strain where the plastic branch begins", above=0)
+        Float, quantity("", "strain where the plastic branch begins", above=0, at_most=MOST_STRAIN)
     ] = 0.10
     plastic_modulus: Annotated[Float, quantity("MPa", "modulus of the plastic branch", above=0)] = (
         1000.0

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from notchflex.robot.kinds import Notch
+from notchflex.robot.notches.cut import CutLayout, slot
 from notchflex.robot.part import Float, part, quantity
 from notchflex.robot.tube import Tube
 
@@ -96,6 +97,19 @@ class ArcNotch(Notch):
         outer, inner = tube.outer_radius, tube.inner_radius
         read = inner if self.depth_at == "inner" else 0.5 * (outer + inner)
         return outer + (self.depth - outer) * outer / read
+
+    def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
+        """Return the window that leaves the arc."""
+        del before, after
+        bottom = tube.outer_radius - self.section_depth(tube)
+        window = slot(
+            self.direction_deg,
+            (0.0, self.height),
+            bottom,
+            tube.outer_radius,
+            radial=self.cut == "on-axis",
+        )
+        return CutLayout((window,), self.height + self.uncut_length)
 
     def problems(self, tube: Tube) -> Iterator[tuple[str, str]]:
         """Find a cut that goes through the tube, and a precurvature beyond any closing angle."""

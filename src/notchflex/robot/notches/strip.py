@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from notchflex.robot.kinds import Notch
+from notchflex.robot.notches.cut import CutLayout, NotchCut
 from notchflex.robot.notches.opening import Opening
 from notchflex.robot.part import Float, part, quantity
 from notchflex.robot.tendon import Tendon
@@ -170,6 +171,20 @@ class StripNotch(Notch):
         The paper's beam has no thickness where it is clamped.
         """
         return 0.5 * self.strip_thickness if self.has_elastic_ends else 0.0
+
+    def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
+        """Return the triangle below the strip and the one above it, from the opposite side."""
+        del before, after
+        surface, bottom = tube.outer_radius, tube.outer_radius - self.depth
+        low, high = self.height, self.height + self.strip_thickness
+        below = ((0.0, surface), (low, bottom), (low, surface))
+        above = ((high, surface), (high, bottom), (high + self.height, surface))
+        sharp = (0.0, 0.0, 0.0)
+        cuts = (
+            NotchCut(self.direction_deg, below, sharp),
+            NotchCut(self.direction_deg + 180.0, above, sharp),
+        )
+        return CutLayout(cuts, high + self.uncut_length)
 
     def openings(self, before: Notch | None, after: Notch | None) -> tuple[Opening, ...]:
         """Return the notch below the strip and, on the other side, the one above it."""

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from notchflex.robot.kinds import Notch
+from notchflex.robot.notches.cut import CutLayout, slot
 from notchflex.robot.notches.opening import Opening
 from notchflex.robot.part import Float, part, quantity
 from notchflex.robot.tendon import Tendon
@@ -195,6 +196,26 @@ class ULink(Notch):
         if isinstance(following, ULink):
             return self.strip_thickness
         return self.strip_thickness + self.height + self.uncut_length
+
+    def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
+        """Return the slot before the strip and, of the last link of a row, the last slot."""
+        del before
+        bottom = -0.5 * self.strip_length - self.slot_radius
+        side = self.direction_deg + (180.0 if self.proximal_slot == "away" else 0.0)
+        starts = [(side, 0.0)]
+        if not isinstance(after, ULink):
+            starts.append((side + 180.0, self.pitch))
+        cuts = tuple(
+            slot(
+                to,
+                (start, start + self.height),
+                bottom,
+                tube.outer_radius,
+                radius=self.slot_radius,
+            )
+            for to, start in starts
+        )
+        return CutLayout(cuts, self.height + self.spacing(after))
 
     def openings(self, before: Notch | None, after: Notch | None) -> tuple[Opening, ...]:
         """Return the slot before the strip and, behind the last link of a row, the last slot.

@@ -77,6 +77,11 @@ class SolverRun:
         self._prepared, self.first, self.table = prepared, first, table
         self.from_start = from_start
 
+    def only(self, row: int) -> SolverRun:
+        """Return one of the loads alone; all of them began at the same state."""
+        rows = slice(row, row + 1)
+        return SolverRun(self._prepared, self.first, self.table[rows], self.from_start[rows])
+
     @cached_property
     def states(self) -> Float[np.ndarray, "s state"]:
         """The last solved state at each load, packed: its own, or as far as it was followed."""
@@ -121,10 +126,15 @@ class SolverRun:
         return unpad_quantity(self._prepared.chain, name, values)
 
     def before(self, name: str) -> np.ndarray:
-        """Return a quantity of the state before the first load; of its shape tension and stroke."""
-        if name not in ("tension", "stroke"):
+        """Return a quantity of the state before the first load.
+
+        Of its shape tension and stroke are known; "material" is the memory of the material.
+        """
+        if name not in ("tension", "stroke", "material"):
             return self._derived[name][0]
         start: SolverState = self._prepared.state.unpack(self.first)
+        if name == "material":
+            return np.asarray(start.memory.material)
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.plotting.shapes.outline import body_corners
+from notchflex.plotting.shapes.prisms import prism, tube_wall
 from notchflex.plotting.shapes.robot_shape import FlexureShape, RobotShape, shape_from_angles
 from notchflex.robot import Robot
 
@@ -63,27 +64,13 @@ def _across(view: float) -> Points:
 
 def _tube(rest: RobotShape, along: Points) -> Manifold:
     """Return the wall of the tube, longer than the body."""
-    from manifold3d import Manifold
-
-    low, high = float(along.min()) - _BEYOND, float(along.max()) + _BEYOND
-    tube = rest.robot.tube
-    outer, inner = (
-        Manifold.cylinder(high - low, radius, circular_segments=ROUND)
-        for radius in (tube.outer_radius, tube.inner_radius)
-    )
-    return (outer - inner).translate((0.0, 0.0, low))
+    ends = float(along.min()) - _BEYOND, float(along.max()) + _BEYOND
+    return tube_wall(rest.robot.tube, ends, ROUND)
 
 
 def _through(polygon: Points, view: float, rest: RobotShape) -> Manifold:
     """Return the prism of a polygon (across, along) seen from the side."""
-    from manifold3d import CrossSection, FillRule, Manifold
-
-    deep = 2.0 * rest.robot.tube.outer_diameter
-    prism = Manifold.extrude(CrossSection([polygon], FillRule.NonZero), deep)
-    across, along = _across(view), np.array([0.0, 0.0, 1.0])
-    axes = np.stack([across, along, np.cross(across, along)], axis=1)
-    middle = axes @ np.array([0.0, 0.0, -0.5 * deep])
-    return prism.transform(np.concatenate([axes, middle[:, None]], axis=1))
+    return prism(polygon, view, 2.0 * rest.robot.tube.outer_diameter)
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,16 @@ from notchflex.cli.interview.ask import Interview
 from notchflex.cli.interview.questions import interviewed
 from notchflex.cli.interview.wordings import commented
 from notchflex.errors import InputError
-from notchflex.results.files.writing import check_output, write_text
+from notchflex.results.files.writing import check_output, read_text, write_text
 from notchflex.robot.writing import robot_text
 
 TUBE = Group("Tube", sort_key=1)
 NOTCHES = Group("Notches (one value for all, or one for each, base to tip)", sort_key=2)
 TENDONS = Group("Tendons (one value for each)", sort_key=3)
 MATERIAL = Group("Material and friction", sort_key=4)
+
+TEMPLATE = Path(__file__).parents[3] / "designing" / "specification" / "template.toml"
+"""The design file that `--design` writes."""
 
 _SECTIONS = ("notch", "tendon", "material", "friction")
 
@@ -109,6 +112,9 @@ def new(
         ),
     ] = None,
     yes: Annotated[bool, flag("Take all defaults unasked.", name=("--yes", "-y"))] = False,
+    design: Annotated[
+        bool, flag("Write a commented design file for `notchflex design` instead; asks nothing.")
+    ] = False,
 ) -> None:
     """Ask for the calliper readings of a wrist and write a commented robot file.
 
@@ -123,6 +129,16 @@ def new(
             f"{path} is already there; choose another name, or remove it first."
         )
     check_output(str(path), "NAME")
+    if design:
+        if set_ or answers != Answers():
+            raise InputError.CONFLICT(
+                "--design takes no other options: edit the design file that it writes."
+            )
+        write_text(path, read_text(TEMPLATE, "design file"))
+        print(
+            f"Wrote {path}. Edit it, then run: notchflex design {shlex.quote(str(path))} -o FOLDER"
+        )
+        return
     settings = dict(map(_setting, set_ or ()))
     options = {f"--{key.replace('_', '-')}": answer for key, answer in vars(answers).items()}
     interview = Interview(settings | options, accept_defaults=yes)

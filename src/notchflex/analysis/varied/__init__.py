@@ -1,0 +1,1 @@
+"""Many robots that differ by a few numbers, as tables of chains."""

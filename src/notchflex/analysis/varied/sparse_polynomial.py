@@ -1,0 +1,261 @@
+r"""Polynomials in several variables through exact values of a vector, with a measured error.
+
+A vector that is a smooth function of a few numbers is evaluated exactly at few points and by a
+polynomial elsewhere. Along each variable Leja points are added until they change nothing; which
+products of powers are needed follows from how fast these changes fall (Gerstner and Griebel 2003,
+with the changes along one variable in place of a search). Terms whose variables never act together
+are left out. The error is measured at points that are not among the nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+_DEGREE = 16
+VectorOf = Callable[[Float[np.ndarray, " d"]], Float[np.ndarray, " m"]]
+
+
+@lru_cache(maxsize=1)
+def leja_points() -> Float[np.ndarray, " points"]:
+    """Return points from -1 to 1, each as far from all before it as possible; the first is 0."""
+    grid, found = np.linspace(-1.0, 1.0, 4001), [0.0]
+    while len(found) <= _DEGREE + 1:
+        distance = np.prod(np.abs(grid[:, None] - np.array(found)), axis=1)
+        found.append(float(grid[np.argmax(distance)]))
+    return np.array(found)
+
+
+class _Terms(NamedTuple):
+    """Products of Newton's polynomials through Leja points, each 1 at its own point.
+
+    A term is a term before it times one more factor.
+
+    Attributes:
+        powers: Number of factors of every term for every variable, (terms, d); the first has none.
+        before: Which term it is made of, (terms,).
+        variable: The variable of its last factor, (terms,).
+    """
+
+    powers: Int[np.ndarray, "terms d"]
+    before: Int[np.ndarray, " terms"]
+    variable: Int[np.ndarray, " terms"]
+
+    @classmethod
+    def of(cls, indices: Iterable[tuple[int, ...]]) -> _Terms:
+        """Sort a set of powers that holds every power that divides another one."""
+        ordered = sorted(indices, key=lambda index: (sum(index), index))
+        place = {index: number for number, index in enumerate(ordered)}
+        variable = [max(np.flatnonzero(index), default=0) for index in ordered]
+        before = [0]
+        for index, last in zip(ordered[1:], variable[1:], strict=True):
+            fewer = list(index)
+            fewer[last] -= 1
+            before.append(place[tuple(fewer)])
+        return cls(np.array(ordered), np.array(before), np.array(variable))
+
+    def at(self, points: Float[np.ndarray, "rows d"]) -> Float[np.ndarray, "terms rows"]:
+        """Return every term at points between -1 and 1."""
+        leja = leja_points()
+        most = self.powers.max(axis=0, initial=0)
+        factors = [
+            (points[:, variable] - leja[:degree, None])
+            / np.array([_span(leja, k) for k in range(degree)])[:, None]
+            for variable, degree in enumerate(most)
+        ]
+        terms = np.ones((len(self.powers), len(points)))
+        for term in range(1, len(terms)):
+            variable = self.variable[term]
+            factor = factors[variable][self.powers[term, variable] - 1]
+            np.multiply(terms[self.before[term]], factor, out=terms[term])
+        return terms
+
+
+def _span(leja: np.ndarray, degree: int) -> float:
+    """What the factor of a degree is divided by, so that the product is 1 at the next point."""
+    above = np.prod(leja[degree + 1] - leja[: degree + 1])
+    below = np.prod(leja[degree] - leja[:degree]) if degree else 1.0
+    return float(above / below)
+
+
+class SparsePolynomial(NamedTuple):
+    """A polynomial from several numbers to some entries of a vector; the others are constant.
+
+    Attributes:
+        middle: Middle of the range of every number.
+        half: Half its range.
+        terms: The products of powers.
+        coefficients: Of every term for every entry that varies, unlike ones only, (u, terms).
+        entries: Places of the entries that vary in the vector.
+        which: Which of the unlike rows each of them has.
+        base: The vector in the middle.
+        nodes: Exact vectors at all points that were evaluated, (points, m).
+    """
+
+    middle: Float[np.ndarray, " d"]
+    half: Float[np.ndarray, " d"]
+    terms: _Terms
+    coefficients: Float[np.ndarray, "u terms"]
+    entries: Int[np.ndarray, " v"]
+    which: Int[np.ndarray, " v"]
+    base: Float[np.ndarray, " m"]
+    nodes: Float[np.ndarray, "points m"]
+
+    def covers(self, numbers: Float[np.ndarray, "rows d"]) -> bool:
+        """Whether numbers lie in the range that the polynomial was made for."""
+        return bool((np.abs(numbers - self.middle) <= self.half * (1.0 + 1e-12)).all())
+
+    def varied(self, numbers: Float[np.ndarray, "rows d"]) -> Float[np.ndarray, "v rows"]:
+        """Return the entries that vary, at rows of numbers."""
+        terms = self.terms.at((numbers - self.middle) / self.half)
+        return (self.coefficients @ terms)[self.which]
+
+
+def fit_polynomial(
+    vector_of: VectorOf,
+    low: Float[np.ndarray, " d"],
+    high: Float[np.ndarray, " d"],
+    cliques: Iterable[Sequence[int]],
+    scale_of: VectorOf,
+    parts: Sequence[Int[np.ndarray, ...]],
+    *,
+    tolerance: float,
+    aim: float,
+    most: int,
+    checks: Float[np.ndarray, "k d"],
+) -> SparsePolynomial | None:
+    """Find a polynomial that is right to a tolerance.
+
+    Args:
+        vector_of: The exact vector at numbers.
+        low: Lower ends of the ranges.
+        high: Upper ends, above the lower ones.
+        cliques: Places of variables that act together.
+        scale_of: From the largest size of every entry to what errors are measured in.
+        parts: Places of entries that answer the numbers alike; of each it is found by itself which
+            products of powers it needs.
+        tolerance: Largest error in parts of the scale.
+        aim: Terms that are smaller are left out at first, in parts of the scale.
+        most: How many exact vectors may be evaluated.
+        checks: Numbers at which the error is measured.
+
+    Returns:
+        The polynomial; None where it is not right within so many evaluations.
+    """
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    known: dict[tuple[int, ...], np.ndarray] = {}
+
+    def at(index: tuple[int, ...]) -> np.ndarray:
+        if index not in known:
+            known[index] = vector_of(middle + half * leja_points()[list(index)])
+        return known[index]
+
+    count = len(middle)
+    scale = scale_of(np.abs(at((0,) * count)))
+    changes: list[np.ndarray] = []
+    for variable in range(count):
+        found = _changes(at, variable, count, scale, parts, aim)
+        if found is None or len(known) > most:
+            return None
+        changes.append(found)
+    for share in (1.0, 0.1, 0.01):
+        wanted = share * aim
+        indices = _indices(changes, cliques, wanted, most)
+        if indices is None:
+            return None
+        terms = _Terms.of(indices)
+        for index in sorted(indices):  # the last variables first: what is left stays the same
+            at(index)
+        values = np.stack([at(tuple(index)) for index in terms.powers.tolist()])
+        made = _solved(middle, half, terms, values, np.stack(list(known.values())))
+        if _error(made, vector_of, checks, scale) <= tolerance:
+            return made
+    return None
+
+
+def _changes(
+    at: Callable[[tuple[int, ...]], np.ndarray],
+    variable: int,
+    count: int,
+    scale: np.ndarray,
+    parts: Sequence[np.ndarray],
+    aim: float,
+) -> Float[np.ndarray, "parts degrees"] | None:
+    """How much each further point along a variable changes each part, in parts of the scale."""
+    points = leja_points()
+    values: list[np.ndarray] = []
+    sizes: list[np.ndarray] = []
+    for degree in range(_DEGREE + 1):
+        index = [0] * count
+        index[variable] = degree
+        value = at(tuple(index))
+        if degree:
+            basis = _Terms.of([(power,) for power in range(degree)]).at(points[: degree + 1, None])
+            before = basis[:, degree] @ np.linalg.solve(basis[:, :degree].T, np.stack(values))
+            change = np.abs(value - before) / scale
+            sizes.append(np.array([np.max(change[part], initial=0.0) for part in parts]))
+        values.append(value)
+        if degree > 1 and max(sizes[-1].max(), sizes[-2].max()) < 0.1 * aim:
+            kept = np.stack([np.ones(len(parts)), *sizes[:-2]], axis=-1)
+            # None smaller than a later one, so that no term comes without those that divide it.
+            return np.minimum(np.maximum.accumulate(kept[:, ::-1], axis=1)[:, ::-1], 1.0)
+    return None
+
+
+def _indices(
+    changes: Sequence[Float[np.ndarray, "parts degrees"]],
+    cliques: Iterable[Sequence[int]],
+    wanted: float,
+    most: int,
+) -> list[tuple[int, ...]] | None:
+    """Products of powers that matter, none without those that divide it; None if too many."""
+    found: dict[tuple[int, ...], None] = {(0,) * len(changes): None}
+    for clique in cliques:
+        for part in range(len(changes[0])):
+            partial = [(next(iter(found)), 1.0)]
+            for variable in clique:
+                further = changes[variable][part, 1:]
+                partial += [
+                    ((*powers[:variable], degree, *powers[variable + 1 :]), size * float(own))
+                    for powers, size in partial
+                    for degree, own in enumerate(further, start=1)
+                    if size * own >= wanted
+                ]
+                if len(partial) > most:
+                    return None
+            found |= dict.fromkeys(powers for powers, _ in partial)
+    return list(found) if len(found) <= most else None
+
+
+def _solved(
+    middle: np.ndarray,
+    half: np.ndarray,
+    terms: _Terms,
+    values: Float[np.ndarray, "terms m"],
+    nodes: Float[np.ndarray, "points m"],
+) -> SparsePolynomial:
+    base = values[0]
+    entries = np.flatnonzero((nodes != base).any(axis=0))
+    columns, which = np.unique(values[:, entries], axis=1, return_inverse=True)
+    basis = terms.at(leja_points()[terms.powers])
+    coefficients = np.linalg.solve(basis.T, columns).T
+    return SparsePolynomial(
+        middle, half, terms, np.ascontiguousarray(coefficients), entries, which.ravel(), base, nodes
+    )
+
+
+def _error(
+    made: SparsePolynomial, vector_of: VectorOf, checks: Float[np.ndarray, "k d"], scale: np.ndarray
+) -> float:
+    """Largest error at points that are no nodes, in parts of the scale."""
+    found = np.tile(made.base, (len(checks), 1))
+    found[:, made.entries] = made.varied(checks).T
+    exact = np.stack([vector_of(one) for one in checks])
+    return float(np.max(np.abs(found - exact) / scale, initial=0.0))
+
+
+__all__ = ["SparsePolynomial", "fit_polynomial", "leja_points"]

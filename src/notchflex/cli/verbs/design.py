@@ -1,0 +1,135 @@
+"""`notchflex design`: from a design file to a robot file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import flag
+from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile, Quiet
+from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.results.files.writing import check_folder
+
+if TYPE_CHECKING:
+    from notchflex.designing import Design
+
+
+def design(
+    spec: Annotated[str, Parameter(help="Design file; `notchflex new NAME --design` writes one.")],
+    /,
+    *,
+    output: Annotated[
+        str | None,
+        Parameter(
+            name=("--output", "-o"),
+            group=OUTPUT,
+            metavar="FOLDER",
+            help="Write robot.toml, wishes.csv, design.json and design.svg into this folder.",
+        ),
+    ] = None,
+    front: Annotated[
+        bool,
+        flag("Find the front between two or three objectives: point_01.toml and so on, front.csv."),
+    ] = False,
+    json: JsonFile = None,
+    plot: PlotFile = None,
+    quiet: Quiet = False,
+) -> int:
+    """Choose dimensions so that a robot does what is asked.
+
+    The design file names variables, loads, objectives and constraints. Prints what was asked beside
+    what is achieved, which limits hold the design and what each costs. Ctrl-C keeps the best robot
+    so far.
+    """
+    from notchflex.designing.files import file_names, write_design
+
+    checked = () if output is None else check_folder(output, file_names(), "-o", inputs=[spec])
+    files = {f"-o ({file.name})": str(file) for file in checked}
+    outputs = Outputs([spec], quiet=quiet, files=files, json=json, plot=plot)
+    with terminal.working("loading the solver"):
+        terminal.use_compile_cache()
+        import notchflex.designing as designing
+    if front:
+        return _front(spec, output, outputs)
+    with terminal.bars("ranking robots") as progress:
+        made = designing.design(spec, progress=progress)
+    if output is not None:
+        written = write_design(made, output, inputs=[spec])
+        terminal.note(f"written: {', '.join(map(str, written))}.")
+    outputs.write_json(lambda: designing.design_document(made))
+
+    def picture() -> object:
+        from notchflex._plot import plot as drawn
+
+        return drawn(made)
+
+    outputs.save_picture(picture)  # pyright: ignore[reportArgumentType]
+    if outputs.prints_tables:
+        _print(made)
+    if not made.converged:
+        terminal.error(f"{made.reason}.")
+    return DONE if made.converged else NOT_CONVERGED
+
+
+def _front(spec: str, output: str | None, outputs: Outputs) -> int:
+    """Find a front, write and print it."""
+    import notchflex.designing as designing
+    from notchflex._plot import plot as drawn
+
+    with terminal.bars("spreading over the front") as progress:
+        found = designing.design_front(spec, progress=progress)
+    if output is not None:
+        written = designing.write_front(found, output, inputs=[spec])
+        terminal.note(f"written: {', '.join(map(str, written))}.")
+    outputs.write_json(
+        lambda: {
+            "objectives": list(found.titles),
+            "reason": found.reason,
+            "points": [designing.design_document(point) for point in found.points],
+        }
+    )
+    outputs.save_picture(lambda: drawn(found))  # pyright: ignore[reportArgumentType]
+    if outputs.prints_tables:
+        heads = ["point", *(f">{title}" for title in found.titles)]
+        rows = [
+            (str(number), *(f"{value:.5g}" for value in values))
+            for number, values in enumerate(found.objectives.tolist(), start=1)
+        ]
+        terminal.output().print(terminal.table(heads, rows, gap=2))
+    if found.reason:
+        terminal.error(f"{found.reason}.")
+    return NOT_CONVERGED if found.reason else DONE
+
+
+def _print(made: Design) -> None:
+    from notchflex.designing.result import numbers
+
+    console = terminal.output()
+    heads = ("asked of", "asked", ">achieved", "unit", ">before", "met")
+    rows = [
+        (
+            one.title,
+            one.asked,
+            numbers(one.achieved),
+            one.unit,
+            numbers(one.before),
+            "" if one.met is None else "yes" if one.met else "no",
+        )
+        for one in made.wishes
+    ]
+    console.print(terminal.table(heads, rows, gap=2))
+    heads = ("\nvariable", ">\nvalue", "\nunit", ">\nbefore", ">\nlimits")
+    rows = [
+        (v.name, f"{v.value:.5g}", v.unit, f"{v.before:.5g}", f"{v.lower:g} to {v.upper:g}")
+        for v in made.variables
+    ]
+    if rows:
+        console.print(terminal.table(heads, rows, gap=2))
+    console.print()
+    for sentence in made.explanation:
+        console.print(sentence)
+    console.print(
+        f"{made.starts} searches, {made.solves} robots solved, {made.gradients} derivatives."
+    )

@@ -1,0 +1,1 @@
+"""Verbs about the installation: its speed, its state, completion in the shell."""

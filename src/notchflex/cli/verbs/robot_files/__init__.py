@@ -1,0 +1,1 @@
+"""Verbs about robot files: listing, showing and writing them."""

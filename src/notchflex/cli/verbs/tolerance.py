@@ -1,0 +1,96 @@
+"""`notchflex tolerance`: worst case, yield and sensitivity of a robot with tolerances."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import converted, whole
+from notchflex.cli.arguments.robots import (
+    RobotName,
+    Settings,
+    changed_title,
+    chosen_robot,
+    robot_files,
+)
+from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
+
+if TYPE_CHECKING:
+    from notchflex.tolerancing import ToleranceAnalysis
+
+
+def tolerance(
+    robot: RobotName,
+    tolerances: Annotated[
+        str,
+        Parameter(
+            metavar="TOLERANCES.toml",
+            help="A TOML file with `[load.NAME]` (the options of `simulate` as keys), `[[accept]]` "
+            "(`quantity`, `lower`, `upper`), and if wanted `[tolerance]`, as in a robot file, and "
+            "`wanted` in `[yield]`. Without `[tolerance]` those of the robot hold.",
+        ),
+    ],
+    /,
+    *,
+    draws: Annotated[
+        int,
+        converted(whole(50, 10_000_000), "N"),
+        Parameter(
+            help="About how many robots are drawn: 25 independent sets of scrambled Sobol points, "
+            "each as large as the nearest power of two."
+        ),
+    ] = 100_000,
+    seed: Annotated[int, converted(whole(0), "N"), Parameter(help="Seed of the draws.")] = 0,
+    refinement: Annotated[
+        int,
+        converted(whole(0, 3), "N"),
+        Parameter(help="0 to 3: more strain modes in every notch, to check the accuracy."),
+    ] = 0,
+    settings: Settings = (),
+    json: JsonFile = None,
+    csv: CsvFile = None,
+    plot: PlotFile = None,
+    quiet: Quiet = False,
+) -> None:
+    """Find out what tolerances do to a robot that must meet acceptance limits.
+
+    Prints for every limit the value of the drawing, worst case and root sum of squares (by
+    gradients), and the percentiles of drawn robots; the yield with its 95 % interval; and for every
+    tolerance its part of the variance (Sobol indices), the yield if that dimension were exact, and
+    the tolerance that is allowed for the wanted yield. The CSV has a row for every drawn robot.
+    """
+    outputs = Outputs([*robot_files(robot), tolerances], quiet=quiet, json=json, csv=csv, plot=plot)
+    chosen = chosen_robot(robot, settings)
+    with terminal.bars(f"reading {tolerances}") as show:
+        terminal.use_compile_cache()
+        from notchflex.tolerancing import tolerance_analysis
+
+        found = tolerance_analysis(
+            chosen, tolerances, draws=draws, seed=seed, refinement=refinement, progress=show
+        )
+    _write(found, outputs)
+    for sentence in found.warnings():
+        terminal.warn(sentence)
+    if outputs.prints_tables:
+        from notchflex.cli.tables.tolerance_tables import print_tolerances
+
+        print_tolerances(found, changed_title(chosen, settings))
+
+
+def _write(found: ToleranceAnalysis, outputs: Outputs) -> None:
+    from notchflex.tolerancing.documents import tolerance_columns, tolerance_document
+
+    def picture() -> Any:
+        from notchflex.plotting import tolerance_picture
+
+        return tolerance_picture(found)
+
+    outputs.write_json(lambda: tolerance_document(found))
+    if target := outputs.targets.get("csv"):
+        from notchflex.results.files.csv import write_csv
+
+        columns = tolerance_columns(found)
+        write_csv(target, list(columns), zip(*columns.values(), strict=True))
+    outputs.save_picture(picture)

@@ -1,0 +1,20 @@
+"""Design: from what is asked of a robot to its dimensions."""
+
+from notchflex.designing.design_robot import design as design
+from notchflex.designing.documents import design_document as design_document
+from notchflex.designing.files import write_design as write_design
+from notchflex.designing.files import write_front as write_front
+from notchflex.designing.front import DesignFront as DesignFront
+from notchflex.designing.front import design_front as design_front
+from notchflex.designing.result import Design as Design
+from notchflex.designing.result import VariableResult as VariableResult
+from notchflex.designing.result import WishResult as WishResult
+from notchflex.designing.specification.parts import DesignConstraint as DesignConstraint
+from notchflex.designing.specification.parts import DesignObjective as DesignObjective
+from notchflex.designing.specification.parts import DesignSpec as DesignSpec
+from notchflex.designing.specification.parts import DesignState as DesignState
+from notchflex.designing.specification.parts import DesignVariable as DesignVariable
+from notchflex.designing.specification.parts import SearchOptions as SearchOptions
+from notchflex.designing.specification.parts import Stock as Stock
+from notchflex.designing.specification.parts import TargetCurve as TargetCurve
+from notchflex.designing.specification.reading import read_design as read_design

@@ -1,0 +1,153 @@
+"""`nf.design`: from what is asked to a robot."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from notchflex.designing.explanation import curves_missed, explain
+from notchflex.designing.forms import problems_of
+from notchflex.designing.model.wishes import Wish
+from notchflex.designing.result import (
+    Design,
+    VariableResult,
+    WishResult,
+    asked_in_words,
+    total_counts,
+)
+from notchflex.designing.search.problem import Evaluation, Problem, Progress
+from notchflex.designing.search.rows import TOLERANCE
+from notchflex.designing.search.search import Searches, search
+from notchflex.designing.specification.parts import DesignConstraint, DesignSpec
+from notchflex.designing.specification.reading import read_design, robot_of, spec_from_table
+from notchflex.errors import InputError
+from notchflex.loads.validation import short_repr
+from notchflex.robot import Robot
+from notchflex.robot.robot import remember_source, source_of
+
+
+def design(
+    spec: DesignSpec | Mapping[str, Any] | str | os.PathLike[str],
+    *,
+    robot: Robot | None = None,
+    progress: Progress | None = None,
+) -> Design:
+    """Choose numbers of a robot so that it does what is asked.
+
+    Args:
+        spec: A design file, its table, or a `DesignSpec`.
+        robot: The robot to begin with, instead of the one that the specification names.
+        progress: Called with the stage, what is done of it and how much there is.
+
+    Returns:
+        The robot, what is achieved beside what was asked, and why not more. Where constraints
+        contradict each other it is the robot that comes nearest. Ctrl-C ends the search with the
+        best robot so far.
+
+    Raises:
+        InputError: The specification is not allowed, contradicts itself or does not fit the robot,
+            or no robot between the limits can be solved.
+
+    Example:
+        >>> wish = {"quantity": "closing_angle", "take": "sum", "equal": 120.0}
+        >>> height = {"value": "notch.height", "lower": 0.3, "upper": 1.2}
+        >>> made = design({"robot": "pacheco2021-a", "variable": [height], "constraint": [wish]})
+        >>> f"{made.robot.notches[0].height:.4f} mm"
+        '0.6268 mm'
+    """
+    asked, first = given(spec, robot)
+    problems = problems_of(asked, first)
+    searches = search(problems, asked.search, progress)
+    return made_of(asked, first, problems, searches)
+
+
+def given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
+    """Return a specification given in any form, and the robot to begin with.
+
+    Raises:
+        InputError: It is not allowed, or its robot cannot be read.
+    """
+    if isinstance(spec, str | os.PathLike):
+        asked, named = read_design(spec)
+        return asked, robot or named
+    if isinstance(spec, Mapping):
+        spec = spec_from_table(spec)
+    if not isinstance(spec, DesignSpec):
+        raise InputError.WRONG_TYPE(
+            f"a design needs a design file, its table or a DesignSpec; got {short_repr(spec)}"
+        )
+    return spec, robot or robot_of(spec, Path())
+
+
+def made_of(spec: DesignSpec, first: Robot, problems: list[Problem], searches: Searches) -> Design:
+    """Make the result of the best of some searches."""
+    best = searches.best
+    problem, found = best.problem, best.found
+    one = found.evaluation
+    assert one is not None
+    here = problem.evaluate(problem.start)
+    missed = missed_by_wish(problem, one)
+    wishes = tuple(
+        _achieved(wish, one.point, here and here.point, missed.get(id(wish)))
+        for wish in problem.wishes
+    )
+    variables = problem.solver.variables
+    met = problem.worst(one) <= TOLERANCE
+    reason = ""
+    if searches.interrupted:
+        reason = "interrupted; this is the best robot so far"
+    elif not met:
+        reason = "not all constraints can be met; this is the robot that comes nearest"
+    elif far := curves_missed(best):
+        reason = far[0].rstrip(".")
+    elif not found.stationary:
+        reason = "the search ended before it settled; try more starts or iterations"
+    solves, gradients = total_counts(problems)
+    return Design(
+        spec=spec,
+        before=first,
+        robot=remember_source(one.point.robot, source_of(first)),
+        converged=not reason,
+        reason=reason,
+        wishes=wishes,
+        variables=tuple(
+            VariableResult(c.name, c.unit, value, was, c.lower, c.upper)
+            for c, value, was in zip(
+                variables.columns, one.point.x.tolist(), variables.start.tolist(), strict=True
+            )
+        ),
+        explanation=explain(best),
+        solves=solves,
+        gradients=gradients,
+        starts=len(searches.outcomes),
+        outcome=best,
+    )
+
+
+def missed_by_wish(problem: Problem, one: Evaluation) -> dict[int, float]:
+    """Return the most by which each constraint is missed, in the sizes of its numbers."""
+    found: dict[int, float] = {}
+    for row, missed in zip(problem.rows, np.abs(problem.violation(one)).tolist(), strict=True):
+        found[id(row.wish)] = max(found.get(id(row.wish), 0.0), missed)
+    return found
+
+
+def _achieved(wish: Wish, point: Any, before: Any, missed: float | None) -> WishResult:
+    """Compare what is achieved with what was asked."""
+    met = None
+    if isinstance(wish.asked, DesignConstraint):
+        met = missed is not None and missed <= TOLERANCE
+    was = () if before is None else tuple(wish.measure(before.plain).values.tolist())
+    return WishResult(
+        title=wish.title,
+        unit=wish.unit,
+        asked=asked_in_words(wish),
+        achieved=tuple(wish.measure(point.plain).values.tolist()),
+        before=was,
+        met=met,
+        parts=wish.labels,
+    )

@@ -1,0 +1,176 @@
+"""Sentences about a design: which limits hold it, what each costs, and what cannot be met."""
+
+from __future__ import annotations
+
+from math import floor, log10
+
+import numpy as np
+
+from notchflex._summary import short
+from notchflex.designing.model.wishes import Wish
+from notchflex.designing.search.optimality import Held, multipliers
+from notchflex.designing.search.problem import Problem
+from notchflex.designing.search.rows import TOLERANCE, Row
+from notchflex.designing.search.search import Outcome
+from notchflex.designing.specification.parts import DesignObjective
+
+# The most sentences about limits, the dearest first.
+_MOST = 12
+# A limit is changed by about this part of its size to tell what it costs.
+_PART = 0.05
+_NOTHING = 1e-9
+
+
+def curves_missed(outcome: Outcome) -> tuple[str, ...]:
+    """Return a sentence for every curve with points that the axis does not reach."""
+    one = outcome.found.evaluation
+    assert one is not None
+    told: list[str] = []
+    for curve in {id(w.curve): w.curve for w in outcome.problem.wishes if w.curve}.values():
+        far = one.point.plain.curve(curve).values
+        missed = np.flatnonzero(far > curve.within) + 1
+        if len(missed):
+            shown = ", ".join(map(str, missed[:10].tolist())) + (" ..." if len(missed) > 10 else "")
+            told.append(
+                f"curve.{curve.name} is not reached at {len(missed)} of {len(far)} points "
+                f"({shown}), up to {short(float(far.max()))} mm away; asked {curve.within:g} mm."
+            )
+    return tuple(told)
+
+
+def explain(outcome: Outcome) -> tuple[str, ...]:
+    """Return sentences about the best robot of a design."""
+    return (*curves_missed(outcome), *_about_limits(outcome))
+
+
+def _about_limits(outcome: Outcome) -> tuple[str, ...]:
+    one = outcome.found.evaluation
+    assert one is not None
+    problem = outcome.problem
+    if problem.worst(one) > TOLERANCE:
+        return (*_missed(outcome), *_at_limits(outcome))
+    found = multipliers(problem, outcome.found.z, one)
+    costs = sorted(found.held, key=lambda held: -abs(_effect(problem, held)[1]))
+    sentences = [_sentence(problem, held) for held in costs]
+    kept = [one for one in sentences if one]
+    left = len(kept) - _MOST
+    if not kept:
+        kept = ["No limit holds the design: what is asked is met inside all limits."]
+    more = [f"{left} more limits are reached."] if left > 0 else []
+    return (*kept[:_MOST], *more)
+
+
+def _effect(problem: Problem, held: Held) -> tuple[float, float]:
+    """A round change of a limit, and what it changes of the sum."""
+    if held.is_variable:
+        size = problem.solver.variables.span[held.row]
+    else:
+        row = problem.rows[held.row]
+        limits = [abs(one) for one in (row.lower, row.upper) if np.isfinite(one)]
+        size = max(limits, default=0.0) or float(problem.sizes[held.row])
+    step = _round(_PART * size)
+    return step, held.cost * step
+
+
+def _round(value: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, not above a value."""
+    power = 10.0 ** floor(log10(value)) if value > 0.0 else 1.0
+    return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= value * (1.0 + 1e-9))
+
+
+def _sentence(problem: Problem, held: Held) -> str:
+    step, effect = _effect(problem, held)
+    what = _objective_name(problem)
+    place, unit, change = _place(problem, held, step)
+    if what is None or abs(effect) <= _NOTHING * problem.total_size:
+        return f"{place}." if held.side else ""
+    name, of_unit, sign = what
+    gain = effect if held.side else -abs(effect)
+    if held.side == 0:
+        way = "more" if effect < 0.0 else "less"
+        change = f"{short(step)} {unit}".strip() + f" {way}"
+    elif held.side < 0:
+        gain = -effect
+    amount = f"{short(abs(gain))} {of_unit}".strip()
+    return f"{place}; {change} would {'save' if sign > 0 else 'gain'} {amount} of {name}."
+
+
+def _place(problem: Problem, held: Held, step: float) -> tuple[str, str, str]:
+    if held.is_variable:
+        column = problem.solver.variables.columns[held.row]
+        limit = column.upper if held.side > 0 else column.lower
+        title, unit = column.name, column.unit
+    else:
+        row = problem.rows[held.row]
+        limit = row.upper if held.side >= 0 else row.lower
+        title, unit = row.title, row.wish.unit
+    at = {1: "greatest", -1: "least", 0: "wanted"}[held.side]
+    shown = f"{short(limit)} {unit}".strip()
+    change = f"{short(step)} {unit}".strip() + (" more" if held.side > 0 else " less")
+    return f"{title} stands at its {at} value, {shown}", unit, change
+
+
+def _objective_name(problem: Problem) -> tuple[str, str, float] | None:
+    """Name, unit and direction of the only objective; None without one."""
+    objectives = problem.objectives
+    if len(objectives) == 0:
+        return None
+    if len(objectives) > 1:
+        return "the weighted sum of the objectives", "", 1.0
+    wish = objectives[0]
+    asked = wish.asked
+    assert isinstance(asked, DesignObjective)
+    if asked.target is not None:
+        return f"the squared distance of {wish.title} from {asked.target:g}", "", 1.0
+    if wish.take == "rms":
+        return f"the square of {wish.title}", f"{wish.unit}²" if wish.unit else "", 1.0
+    return wish.title, wish.unit, 1.0 if asked.goal == "minimise" else -1.0
+
+
+def _missed(outcome: Outcome) -> tuple[str, ...]:
+    """What cannot be met together, and by how much the nearest robot misses it."""
+    one, problem = outcome.found.evaluation, outcome.problem
+    assert one is not None
+    missed = np.abs(problem.violation(one))
+    worst: dict[int, tuple[float, int]] = {}
+    wishes: dict[int, Wish] = {}
+    for number, row in enumerate(problem.rows):
+        if missed[number] > TOLERANCE:
+            before = worst.get(id(row.wish), (0.0, number))
+            worst[id(row.wish)] = max(before, (float(missed[number]), number))
+            wishes[id(row.wish)] = row.wish
+    told: list[str] = []
+    for _, number in sorted(worst.values(), reverse=True):
+        row = problem.rows[number]
+        told.append(_miss(row, float(one.rows.values[number])))
+    start = (
+        "One constraint cannot be met"
+        if len(told) == 1
+        else "These constraints contradict each other"
+    )
+    return (f"{start} within the limits of the variables; the robot that comes nearest:", *told)
+
+
+def _miss(row: Row, value: float) -> str:
+    unit = f" {row.wish.unit}" if row.wish.unit else ""
+    limit = row.upper if value > row.upper else row.lower
+    way = "above" if value > limit else "below"
+    word = "the value" if row.is_equality else "its limit"
+    off = f"{short(abs(value - limit))}{unit} {way} {word} {short(limit)}{unit}"
+    return f"{row.title} is {short(value)}{unit}, {off}."
+
+
+def _at_limits(outcome: Outcome) -> tuple[str, ...]:
+    """Which variables stand at their limits, where wider ones could help."""
+    names: list[str] = []
+    for z, column in zip(
+        outcome.found.z.tolist(), outcome.problem.solver.variables.columns, strict=False
+    ):
+        if z < 1e-6 or z > 1.0 - 1e-6:
+            limit = column.upper if z > 0.5 else column.lower
+            which = "greatest" if z > 0.5 else "least"
+            names.append(f"{column.name} ({which}, {limit:g} {column.unit})".replace(" )", ")"))
+    if not names:
+        return ("No variable stands at its limit: other variables are needed, or weaker wishes.",)
+    shown = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
+    return (f"Wider limits could help where a variable stands at its own: {shown}.",)

@@ -1,0 +1,262 @@
+"""One robot of a design, solved under its states: readings with exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex._quantity import REGISTERED
+from notchflex.analysis.closing_loads.closing import Closing, closing
+from notchflex.analysis.derivatives.forward_model import ForwardModel
+from notchflex.analysis.derivatives.numbers import slope
+from notchflex.analysis.derivatives.tangent import Change
+from notchflex.designing.model.closings import closing_slopes
+from notchflex.designing.model.curves import Bodies, distances, offsets, target_points
+from notchflex.designing.model.load_states import PROBE, Direction, Probe, StatePaths
+from notchflex.designing.model.quantities import OF_ROBOTS, edge_unit
+from notchflex.designing.model.reading import Reading
+from notchflex.designing.model.variables import LoadNumber, Variables
+from notchflex.designing.specification.parts import TargetCurve
+from notchflex.errors import InputError
+from notchflex.loads import LoadPath
+from notchflex.mechanics.chain.mass import body_lengths
+from notchflex.results.path import EquilibriumPath
+from notchflex.robot import Robot
+from notchflex.robot.value_names import numbers_at
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A vector of variables, its robot, and what was solved of it.
+
+    Attributes:
+        variables: The variables.
+        x: The vector.
+        robot: Its robot.
+        paths: The layout of the states.
+        arrays: Quantities of every step of all states, in the units of Python.
+        slopes_of: Gives the derivatives of quantities of all steps, variables as leading axis;
+            None for values only.
+        kept: What was worked out already.
+    """
+
+    variables: Variables
+    x: Float[np.ndarray, " v"]
+    robot: Robot
+    paths: StatePaths
+    arrays: Mapping[str, np.ndarray]
+    slopes_of: Callable[[str], np.ndarray] | None = None
+    kept: dict[Any, Any] = field(default_factory=dict[Any, Any])
+
+    @property
+    def plain(self) -> Point:
+        """The same for values only."""
+        return replace(self, slopes_of=None)
+
+    def of_state(self, name: str, state: str) -> Reading:
+        """A quantity of a state, flat, in the unit of the edges."""
+        return self._at(name, self.paths.step[state]).scaled(edge_unit(name)[1])
+
+    def _at(self, name: str, step: int) -> Reading:
+        values = np.ravel(self.arrays[name][step])
+        if self.slopes_of is None:
+            return Reading(values, None)
+        slopes = self.slopes_of(name)[:, step]
+        return Reading(values, slopes.reshape(len(slopes), -1).T)
+
+    def closings(self) -> Reading:
+        """Closing tensions, N; NaN for a notch that does not close."""
+        table: Closing = self._once("closing", lambda: closing(self.robot))
+        if self.slopes_of is None or not np.isfinite(table.tension).all():
+            return Reading(table.tension, None)
+
+        def slopes() -> np.ndarray:
+            return closing_slopes(self.robot, table, self._changes)
+
+        return Reading(table.tension, self._once("closing slopes", slopes))
+
+    def _once(self, key: Any, made: Callable[[], Any]) -> Any:
+        if key not in self.kept:
+            self.kept[key] = made()
+        return self.kept[key]
+
+    def of_robot(self, name: str) -> Reading:
+        """A quantity of the robot alone."""
+        return self._of_robot(OF_ROBOTS[name].formula)
+
+    def value(self, path: str) -> Reading:
+        """Values of the robot file."""
+        found = numbers_at(self.robot, path)
+        values = np.array(list(found.values()))
+        if self.slopes_of is None:
+            return Reading(values, None)
+        return Reading(values, np.stack([self.variables.parts_of(one) for one in found]))
+
+    def _of_robot(self, formula: Callable[[Robot], np.ndarray]) -> Reading:
+        values = formula(self.robot)
+        if self.slopes_of is None:
+            return Reading(values, None)
+        slopes = [
+            np.zeros(len(values))
+            if column.load is not None
+            else slope(lambda t, n=number: formula(self.moved(n, t)), 0.0, order=2) / column.span
+            for number, column in enumerate(self.variables.columns)
+        ]
+        return Reading(values, np.stack(slopes, axis=1))
+
+    def compliance(self, state: str, direction: Direction) -> Reading:
+        """The tip compliance along a direction, mm/N: a force to either side, and its travel."""
+        plus, minus = (
+            self._at("tip_position", self.paths.step[Probe(state, direction, side)])
+            for side in (1, -1)
+        )
+        row = np.array([direction]) / (2.0 * PROBE)
+        return plus.minus(minus).map(row)
+
+    def curve(self, curve: TargetCurve) -> Reading:
+        """Distances of the points of a curve, mm."""
+        return distances(self.offsets(curve))
+
+    def offsets(self, curve: TargetCurve) -> Reading:
+        """Vectors from the points of a curve to the axis, mm."""
+        step, points = self.paths.step[curve.state], target_points(curve)
+        poses = [self.arrays[name][step] for name in ("body_position", "body_rotation")]
+        if self.slopes_of is None:
+            return offsets(self.robot, Bodies(*poses), points, None)
+        lengths = self._of_robot(lambda one: body_lengths(one.tube, one.notches)).slopes
+        assert lengths is not None
+        changes = [self.slopes_of(name)[:, step] for name in ("body_position", "body_rotation")]
+        return offsets(self.robot, Bodies(*poses, *changes), points, list(lengths.T))
+
+    def moved(self, number: int, part: float) -> Robot:
+        """Return the robot with a variable moved by a part of its span."""
+        x = self.x.copy()
+        x[number] += part * self.variables.columns[number].span
+        return self._once(("robot", number, part), lambda: self.variables.robot_at(x))
+
+    def _changes(self, model: ForwardModel, load: LoadPath) -> list[Change]:
+        """Directions of all variables for a model whose loads do not depend on them."""
+        return [self.change(model, load, number) for number in range(len(self.x))]
+
+    def change(self, model: ForwardModel, load: LoadPath, number: int) -> Change:
+        """Direction of a variable of the robot for a model; nothing for one of the loads."""
+        column = self.variables.columns[number]
+        if column.load is not None:
+            return Change(None, np.zeros(model.ready.long.chain_layout.size))
+        if column.law is not None:
+            return model.change(self.robot, load, column.law)
+        loaded = any(not one.is_nothing for one in load.external)
+        key = ("change", number, id(model.ready.chain_layout))
+        if not loaded and key in self.kept:  # the arrays of the robot, without its weight
+            return Change(None, self.kept[key])
+        by = model.change_along(lambda part: self.moved(number, part), 0.0, load, order=2)
+        assert by.loads is not None
+        assert by.chain is not None
+        self.kept[key] = by.chain / column.span
+        return Change(by.loads / column.span, self.kept[key])
+
+
+@dataclass(frozen=True, eq=False)
+class Solver:
+    """Solves robots of one form under the states of a design.
+
+    Attributes:
+        variables: The variables.
+        paths: The layout of the states.
+        outputs: Quantities of states that are needed.
+        counts: How many robots were solved, and how many differentiated.
+    """
+
+    variables: Variables
+    paths: StatePaths
+    outputs: tuple[str, ...]
+    counts: dict[str, int] = field(default_factory=lambda: {"solves": 0, "gradients": 0})
+
+    @cached_property
+    def _models(self) -> dict[str, ForwardModel]:
+        return {}
+
+    def _model(self, robot: Robot, load: LoadPath) -> ForwardModel:
+        if "one" not in self._models:
+            from_rest = self.paths.from_rest
+            self._models["one"] = ForwardModel(robot, load, from_rest=from_rest)
+        return self._models["one"]
+
+    def point(self, x: Float[np.ndarray, " v"]) -> Point:
+        """Solve the robot of a vector.
+
+        Raises:
+            InputError: No robot can have these values, or a state does not converge.
+        """
+        robot = self.variables.robot_at(x)
+        self.counts["solves"] += 1
+        if not self.paths.pieces:
+            return self._without_states(robot, x)
+        numbers = self.variables.loads_at(x)
+        load = self.paths.path(numbers)
+        model = self._model(robot, load)
+        path = model.solve(robot, load)
+        if not path.converged.all():
+            step = int(np.argmin(path.converged))
+            raise InputError.NOT_CONVERGED(path.failures[step][1])
+        arrays = {name: np.asarray(path.quantity(name)) for name in self.outputs}
+        slopes: dict[str, np.ndarray] = {}
+
+        def slopes_of(name: str) -> np.ndarray:
+            if not slopes:
+                self.counts["gradients"] += 1
+                slopes.update(self._slopes(point, model, path))
+            return slopes[name]
+
+        point = Point(self.variables, x, robot, self.paths, arrays, slopes_of)
+        return point
+
+    def path(self, x: Float[np.ndarray, " v"]) -> EquilibriumPath | None:
+        """Return the states of the robot of a vector; None if there are none."""
+        if not self.paths.pieces:
+            return None
+        robot = self.variables.robot_at(x)
+        load = self.paths.path(self.variables.loads_at(x))
+        return self._model(robot, load).solve(robot, load)
+
+    def _without_states(self, robot: Robot, x: np.ndarray) -> Point:
+        def slopes_of(name: str) -> np.ndarray:
+            raise KeyError(name)
+
+        return Point(self.variables, x, robot, self.paths, {}, slopes_of)
+
+    def _slopes(
+        self, point: Point, model: ForwardModel, path: EquilibriumPath
+    ) -> dict[str, np.ndarray]:
+        changes: list[Change] = []
+        for number, column in enumerate(self.variables.columns):
+            change = point.change(model, path.load, number)
+            if column.load is not None:
+                change = Change(self._load_change(model, path, point.x, column.load), change.chain)
+            changes.append(change)
+        found = model.derivatives(path, changes, self.outputs)
+        wrong = [name for name, one in found.items() if not _known(name, one, path)]
+        if wrong:
+            raise InputError.NOT_CONVERGED(
+                f"a step was so hard that the derivatives of {wrong[0]} are not known; "
+                "give the state more `steps`"
+            )
+        return found
+
+    def _load_change(
+        self, model: ForwardModel, path: EquilibriumPath, x: np.ndarray, number: LoadNumber
+    ) -> np.ndarray:
+        numbers = self.variables.loads_at(x)
+        more = self.paths.path(numbers | {number: numbers[number] + 1.0})
+        return model.load_change(path, more)
+
+
+def _known(name: str, slopes: np.ndarray, path: EquilibriumPath) -> bool:
+    """Whether derivatives are known wherever the quantity itself is a number."""
+    there = np.isfinite(np.asarray(path.quantity(name)))
+    return REGISTERED[name].kind is not float or bool(np.isfinite(slopes[:, there]).all())

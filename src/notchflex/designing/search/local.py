@@ -1,0 +1,169 @@
+"""One search from one start: SLSQP with exact derivatives, trust-constr where it stalls."""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import Bounds, NonlinearConstraint, minimize
+
+from notchflex.designing.search.optimality import multipliers
+from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.search.rows import TOLERANCE
+from notchflex.designing.search.scaled import Scaled
+from notchflex.designing.search.squares import is_sum_of_squares, nearest_squares
+from notchflex.designing.search.trust_region import approach
+
+# SLSQP keeps an estimate of the curvature, which a kink (a notch that closes) spoils: it begins
+# anew where it ended, up to so many times, while the sum falls by this part.
+_AGAIN, _GAIN = 4, 1e-7
+# It ends where the sum falls no further by this part in so many iterations.
+_STALLED, _PATIENCE = 1e-10, 4
+_PRECISION = 1e-14
+# SLSQP begins where limits are missed by no more than this, in their sizes.
+_FAR = 0.02
+_TRUST = 40
+
+
+class _Stop(Exception):  # noqa: N818 - no error
+    """Ends a search that gains nothing more."""
+
+
+class Found(NamedTuple):
+    """Where a search ended.
+
+    Attributes:
+        z: The scaled variables.
+        evaluation: The robot there, with derivatives; None if the search could not begin.
+        stationary: Whether no small change improves it, to first order.
+        iterations: Number of iterations.
+    """
+
+    z: Vector
+    evaluation: Evaluation | None
+    stationary: bool
+    iterations: int
+
+
+def search_from(problem: Problem, z: Vector, iterations: int) -> Found:
+    """Search from a start by SLSQP.
+
+    Args:
+        problem: The problem.
+        z: The start.
+        iterations: Most iterations.
+
+    Returns:
+        The best robot met.
+    """
+    first = problem.evaluate(z)
+    first = None if first is None else problem.with_slopes(first, z)
+    if first is None:
+        return Found(z, None, False, 0)
+    stationary = False
+    if is_sum_of_squares(problem):
+        z, first, settled = nearest_squares(problem, z, first)
+        return Found(z, first, settled or is_stationary(problem, z, first), 0)
+    z, one, done = approach(problem, z, first, iterations)
+    best = z, one
+    if problem.worst(one) > _FAR:  # limits that contradict each other here
+        return Found(z, one, False, done)
+    for _ in range(_AGAIN):
+        before = best
+        best, more = _slsqp(problem, *best, iterations - done)
+        done += more
+        stationary = is_stationary(problem, *best)
+        if stationary or done >= iterations or not _gained(problem, before[1], best[1]):
+            break
+    return Found(*best, stationary, done)
+
+
+def search_on(problem: Problem, found: Found, iterations: int) -> Found:
+    """Go on by trust-constr where SLSQP ended without having settled."""
+    if found.evaluation is None or problem.count == 0:
+        return found
+    best, more = _trust(problem, found.z, found.evaluation, min(_TRUST, iterations))
+    if _gained(problem, found.evaluation, best[1]):
+        again = search_from(problem, best[0], iterations)
+        return again._replace(iterations=found.iterations + more + again.iterations)
+    return found._replace(iterations=found.iterations + more)
+
+
+def is_stationary(problem: Problem, z: Vector, one: Evaluation) -> bool:
+    """Whether all constraints hold and no small change improves the design, to first order."""
+    return problem.worst(one) <= TOLERANCE and multipliers(problem, z, one).is_stationary
+
+
+def _gained(problem: Problem, before: Evaluation, after: Evaluation) -> bool:
+    if problem.worst(before) > TOLERANCE:
+        return problem.worst(after) < 0.9 * problem.worst(before)
+    return before.total - after.total > _GAIN * max(abs(before.total), 1e-12)
+
+
+def _slsqp(
+    problem: Problem, z: Vector, first: Evaluation, iterations: int, *, elastic: bool = False
+) -> tuple[tuple[Vector, Evaluation], int]:
+    scaled = Scaled(problem, first, z, elastic, (z, first))
+    history: list[tuple[float, float]] = []
+
+    def watch(y: np.ndarray) -> None:
+        found = scaled.evaluation(y)
+        if found is None:
+            return
+        miss = 0.0 if elastic else problem.worst(found)
+        history.append((miss, scaled.value(y)))
+        if len(history) <= _PATIENCE:
+            return
+        (before, value_before), (now, value) = history[-1 - _PATIENCE], history[-1]
+        settled = abs(value_before - value) <= _STALLED * max(abs(value), 1e-12)
+        if settled and abs(before - now) <= 1e-3 * TOLERANCE + _STALLED * before:
+            raise _Stop
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a step out of the limits is clipped
+        with contextlib.suppress(_Stop):
+            minimize(
+                scaled.value,
+                scaled.y,
+                jac=scaled.gradient,
+                bounds=scaled.limits,
+                constraints=scaled.constraints,
+                method="SLSQP",
+                callback=watch,
+                options={"maxiter": max(iterations, 1), "ftol": _PRECISION},
+            )
+    return _best(problem, scaled), len(history)
+
+
+def _trust(
+    problem: Problem, z: Vector, first: Evaluation, iterations: int
+) -> tuple[tuple[Vector, Evaluation], int]:
+    scaled = Scaled(problem, first, z, best=(z, first))
+    limits: Any = [
+        NonlinearConstraint(one["fun"], 0.0, 0.0 if one["type"] == "eq" else np.inf, one["jac"])
+        for one in scaled.constraints
+    ]
+    low = np.array([-np.inf if a is None else a for a, _ in scaled.limits])
+    high = np.array([np.inf if b is None else b for _, b in scaled.limits])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it warns of rows that depend on each other
+        result: Any = minimize(
+            scaled.value,
+            np.clip(scaled.y, low + 1e-6, high - 1e-6),
+            jac=scaled.gradient,
+            bounds=Bounds(low, high, keep_feasible=True),  # pyright: ignore[reportArgumentType]
+            constraints=limits,
+            method="trust-constr",
+            options={"maxiter": iterations, "gtol": 1e-8},
+        )
+    return _best(problem, scaled), int(result.nit)
+
+
+def _best(problem: Problem, scaled: Scaled) -> tuple[Vector, Evaluation]:
+    """The best robot that a search met, with its derivatives."""
+    assert scaled.best is not None
+    z, one = scaled.best
+    full = problem.with_slopes(one, z)
+    return (scaled.start, scaled.first) if full is None else (z, full)

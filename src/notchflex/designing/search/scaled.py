@@ -1,0 +1,219 @@
+"""A problem in the form that SciPy's searches take: one vector, scaled sums and rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from notchflex.designing.search.problem import Evaluation, Problem, Vector
+
+# What a sum is taken to be where there is no robot or no equilibrium, in sizes of the sum.
+_PENALTY = 1e3
+
+
+# What a limit that is missed by one size of its row costs, in sizes of the sum.
+_ELASTIC = 30.0
+# Robots that are kept: a search asks for sum, rows and their derivatives one after the other.
+_KEPT = 4
+
+
+@dataclass
+class Linear:
+    """Derivatives of the sum and of the rows, "eq" (= 0) and "ineq" (>= 0)."""
+
+    gradient: Vector
+    rows: dict[str, np.ndarray]
+
+
+@dataclass(eq=False)
+class Scaled:
+    """A problem for searches, scaled where it begins.
+
+    Attributes:
+        problem: The problem.
+        first: The robot where the search begins, with derivatives.
+        start: Where that is.
+        elastic: Whether all limits give way together, at a price: then there is always a step.
+        best: The best robot met so far, and its vector.
+        kept: Robots met last.
+        linear: Where derivatives were asked last, and what they are.
+    """
+
+    problem: Problem
+    first: Evaluation
+    start: Vector
+    elastic: bool = False
+    best: tuple[Vector, Evaluation] | None = None
+    kept: dict[bytes, Evaluation | None] = field(default_factory=dict[bytes, "Evaluation | None"])
+    linear: tuple[bytes, Linear] | None = None
+
+    def __post_init__(self) -> None:
+        """Find the sizes of sum and rows."""
+        span = self.problem.solver.variables.span
+        first = self.first
+        assert first.objective.slopes is not None
+        assert first.rows.slopes is not None
+        by = np.linalg.norm(first.objective.slopes[0] * span)
+        for bound, reading in zip(self.problem.bounds, first.bounded, strict=True):
+            assert reading.slopes is not None
+            by += abs(bound.factor) * np.linalg.norm(reading.slopes * span, axis=1).max()
+        self.size = float(by) if by > 1e-9 * (1.0 + abs(first.total)) else 1.0 + abs(first.total)
+        sizes = np.linalg.norm(first.rows.slopes * span, axis=1)
+        self.row_size = np.where(sizes > 1e-9 * self.problem.sizes, sizes, self.problem.sizes)
+        self.bound_size = np.array([np.ptp(r.values) or 1.0 for r in first.bounded])
+        self.bound_zero = np.array(
+            [
+                reading.values.max() if bound.side == "above" else reading.values.min()
+                for bound, reading in zip(self.problem.bounds, first.bounded, strict=True)
+            ]
+        )
+        self.give = 0.0
+        if self.elastic:
+            rows = self._rows(np.append(self.start, np.zeros(len(self.problem.bounds) + 1)), first)
+            self.give = 1.01 * max(0.0, -float(rows["ineq"].min(initial=0.0)))
+        self.linear = self.y.tobytes(), self._derivatives(first)
+        self._good = self._value(self.y, first), self._rows(self.y, first)
+
+    @property
+    def y(self) -> Vector:
+        """Where the search begins."""
+        more = [np.zeros(len(self.problem.bounds)), np.full(int(self.elastic), self.give)]
+        return np.concatenate([self.start, *more])
+
+    @property
+    def limits(self) -> list[tuple[float | None, float | None]]:
+        """Limits of the vector."""
+        give: list[tuple[float | None, float | None]] = [(0.0, None)] * self.elastic
+        return [(0.0, 1.0)] * self.problem.count + [(None, None)] * len(self.problem.bounds) + give
+
+    def evaluation(self, y: Vector) -> Evaluation | None:
+        """Return the robot at a vector, perhaps without derivatives."""
+        key = y.tobytes()
+        if key not in self.kept:
+            if len(self.kept) > _KEPT:
+                del self.kept[next(iter(self.kept))]
+            self.kept[key] = found = self.problem.evaluate(y)
+            if found is not None and self._is_better(found):
+                self.best = y[: self.problem.count].copy(), found
+        return self.kept[key]
+
+    def value(self, y: Vector) -> float:
+        """Return the sum; far above all others where there is no robot."""
+        found = self.evaluation(y)
+        return self._good[0] + _PENALTY if found is None else self._value(y, found)
+
+    def rows(self, y: Vector, kind: str) -> np.ndarray:
+        """Return the numbers of the equalities ("eq") or inequalities ("ineq")."""
+        found = self.evaluation(y)
+        return self._good[1][kind] if found is None else self._rows(y, found)[kind]
+
+    def gradient(self, y: Vector) -> Vector:
+        """Return the derivatives of the sum."""
+        return self._linear(y).gradient
+
+    def jacobian(self, y: Vector, kind: str) -> np.ndarray:
+        """Return the derivatives of the rows."""
+        return self._linear(y).rows[kind]
+
+    def _linear(self, y: Vector) -> Linear:
+        key = y.tobytes()
+        if self.linear is None or self.linear[0] != key:
+            found = self.evaluation(y)
+            full = None if found is None else self.problem.with_slopes(found, y)
+            if full is None:
+                assert self.linear is not None
+                return self.linear[1]
+            self.kept[key] = full
+            if self.best is not None and self.best[1].point is full.point:
+                self.best = self.best[0], full
+            self.linear = key, self._derivatives(full)
+            self._good = self._value(y, full), self._rows(y, full)
+        return self.linear[1]
+
+    def _is_better(self, found: Evaluation) -> bool:
+        if self.best is None:
+            return True
+        return is_better(self.problem, found, self.best[1])
+
+    def _slack(self, y: Vector) -> Vector:
+        count = self.problem.count
+        return self.bound_zero + self.bound_size * y[count : count + len(self.problem.bounds)]
+
+    def _value(self, y: Vector, one: Evaluation) -> float:
+        factors = np.array([bound.factor for bound in self.problem.bounds])
+        own = float(one.objective.values.sum() + factors @ self._slack(y)) / self.size
+        return own + _ELASTIC * float(y[-1]) if self.elastic else own
+
+    def _rows(self, y: Vector, one: Evaluation) -> dict[str, np.ndarray]:
+        low, high, same = self._row_limits
+        numbers, slack = one.rows.values, self._slack(y)
+        least: list[np.ndarray] = []
+        for side, limit in ((1.0, low), (-1.0, high)):
+            here = np.isfinite(limit) & ~same
+            least.append(side * (numbers[here] - limit[here]) / self.row_size[here])
+        for k, (bound, reading) in enumerate(zip(self.problem.bounds, one.bounded, strict=True)):
+            least.append(bound.sign * (slack[k] - reading.values) / self.bound_size[k])
+        equal = (numbers[same] - low[same]) / self.row_size[same]
+        if not self.elastic:
+            return {"eq": equal, "ineq": np.concatenate([np.zeros(0), *least])}
+        joined = np.concatenate([equal, -equal, *least])
+        return {"eq": np.zeros(0), "ineq": joined + float(y[-1])}
+
+    def _derivatives(self, one: Evaluation) -> Linear:
+        bounds, span = self.problem.bounds, self.problem.solver.variables.span
+        assert one.objective.slopes is not None
+        assert one.rows.slopes is not None
+        factors = np.array([bound.factor for bound in bounds])
+        by = [one.objective.slopes[0] * span, factors * self.bound_size]
+        rows = one.rows.slopes * span / self.row_size[:, None]
+        rows = np.concatenate([rows, np.zeros((len(rows), len(bounds)))], axis=1)
+        low, high, same = self._row_limits
+        sides = ((1.0, low), (-1.0, high))
+        least = [side * rows[np.isfinite(limit) & ~same] for side, limit in sides]
+        for k, (bound, reading) in enumerate(zip(bounds, one.bounded, strict=True)):
+            assert reading.slopes is not None
+            own = np.zeros((len(reading.values), len(bounds)))
+            own[:, k] = bound.sign
+            by_z = -bound.sign * reading.slopes * span / self.bound_size[k]
+            least.append(np.concatenate([by_z, own], axis=1))
+        none = np.zeros((0, rows.shape[1]))
+        gradient = np.concatenate(by) / self.size
+        if not self.elastic:
+            return Linear(gradient, {"eq": rows[same], "ineq": np.concatenate([none, *least])})
+        joined = np.concatenate([rows[same], -rows[same], *least])
+        joined = np.concatenate([joined, np.ones((len(joined), 1))], axis=1)
+        return Linear(np.append(gradient, _ELASTIC), {"eq": none, "ineq": joined})
+
+    @property
+    def _row_limits(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        rows = self.problem.rows
+        low = np.array([one.lower for one in rows])
+        high = np.array([one.upper for one in rows])
+        return low, high, low == high
+
+    @property
+    def constraints(self) -> list[dict[str, Any]]:
+        """The rows as SciPy takes them."""
+        first = self._rows(self.y, self.first)
+        return [
+            {
+                "type": kind,
+                "fun": partial(self.rows, kind=kind),
+                "jac": partial(self.jacobian, kind=kind),
+            }
+            for kind, numbers in first.items()
+            if len(numbers)
+        ]
+
+
+def is_better(problem: Problem, one: Evaluation, other: Evaluation) -> bool:
+    """Whether a robot is better than another: nearer to all limits, or as near and with less."""
+    from notchflex.designing.search.rows import TOLERANCE
+
+    a, b = problem.worst(one), problem.worst(other)
+    if max(a, b) <= TOLERANCE:
+        return one.total < other.total
+    return a < b

@@ -1,0 +1,172 @@
+"""The whole search: every size and number of notches, several starts each, the best of all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from notchflex.designing.search.local import Found, search_from, search_on
+from notchflex.designing.search.nearest import nearest
+from notchflex.designing.search.problem import Problem, Progress, Vector
+from notchflex.designing.search.rows import TOLERANCE
+from notchflex.designing.search.squares import is_followed
+from notchflex.designing.search.starts import (
+    Candidate,
+    draw,
+    evaluate_all,
+    ranked,
+    smooth,
+    spread_out,
+)
+from notchflex.designing.specification.parts import SearchOptions
+from notchflex.errors import InputError
+
+# A robot that misses by less than this part is searched from once more.
+_NEAR = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Where one search ended.
+
+    Attributes:
+        problem: Robots of which form.
+        number: Number of that form.
+        start: Where it began, scaled.
+        found: Where it ended.
+    """
+
+    problem: Problem
+    number: int
+    start: Vector
+    found: Found
+
+    @property
+    def merit(self) -> tuple[float, float]:
+        """What it misses, and its sum; less is better."""
+        one = self.found.evaluation
+        assert one is not None
+        worst = self.problem.worst(one)
+        return (worst if worst > TOLERANCE else 0.0), one.total
+
+
+@dataclass(eq=False)
+class Searches:
+    """All searches of a design.
+
+    Attributes:
+        outcomes: Where they ended.
+        interrupted: Whether they were stopped by Ctrl-C.
+    """
+
+    outcomes: list[Outcome] = field(default_factory=list[Outcome])
+    interrupted: bool = False
+
+    @property
+    def best(self) -> Outcome:
+        """The best of all."""
+        return min(self.outcomes, key=lambda one: one.merit)
+
+
+def search(
+    problems: Sequence[Problem], options: SearchOptions, progress: Progress | None
+) -> Searches:
+    """Search robots of several forms.
+
+    Args:
+        problems: A problem for every form.
+        options: How hard to try.
+        progress: Called with what is done.
+
+    Raises:
+        InputError: No robot between the limits can be solved; the message says why.
+    """
+    searches = Searches()
+    told: Progress = progress or (lambda stage, done, total: None)
+    try:
+        starts = _starts(problems, options, told)
+        for done, (number, z) in enumerate(starts):
+            told("searching", done, len(starts))
+            found = search_from(problems[number], z, options.iterations)
+            if found.evaluation is not None:
+                searches.outcomes.append(Outcome(problems[number], number, z, found))
+                if is_followed(problems[number], found.evaluation.total):
+                    break
+        if searches.outcomes and searches.best.merit[0] > 0.0:
+            told("searching what comes nearest", 0, 1)
+            _approach(searches, options)
+        if searches.outcomes and not searches.best.found.stationary:
+            told("searching on", 0, 1)
+            best = searches.best
+            if best.merit[0] == 0.0:
+                found = search_on(best.problem, best.found, options.iterations)
+                searches.outcomes.append(replace(best, found=found))
+    except KeyboardInterrupt:
+        searches.interrupted = True
+        if not searches.outcomes:
+            raise
+    if not searches.outcomes:
+        raise _nothing(problems)
+    return searches
+
+
+def _starts(
+    problems: Sequence[Problem], options: SearchOptions, told: Progress
+) -> list[tuple[int, Vector]]:
+    """Choose starts: the robot as it is and the best candidates, some of every form."""
+    each = max(4, options.candidates // len(problems))
+    several = max(1, round(options.starts / len(problems)))
+    starts: list[tuple[int, Vector]] = []
+    for number, problem in enumerate(problems):
+        told("ranking robots", number, len(problems))
+        here = problem.start
+        half = max(1, each // 2)
+        drawn = np.concatenate(
+            [
+                here[None],
+                smooth(problem, half, options.seed),
+                draw(each - half or 1, problem.count, options.seed),
+            ]
+        )
+        every = evaluate_all(problem, drawn if options.starts > 1 else here[None])
+        solved = [one for _, one in every if one is not None]
+        if solved:
+            problem.set_sizes(solved)
+        candidates = [Candidate(z, one) for z, one in every if one is not None]
+        own = [one for one in candidates if one.z is every[0][0]]
+        best = spread_out(ranked(problem, candidates[len(own) :]), several - len(own))
+        starts += [(number, one.z) for one in (*own, *best)]
+    return starts
+
+
+def _approach(searches: Searches, options: SearchOptions) -> None:
+    """Search what misses least, and from there once more if nothing is missed."""
+    ordered = sorted(searches.outcomes, key=lambda one: one.merit)[: max(2, options.starts // 2)]
+    for one in ordered:
+        evaluation = one.found.evaluation
+        assert evaluation is not None
+        z, near = nearest(one.problem, one.found.z, evaluation)
+        if one.problem.worst(near) <= _NEAR:
+            found = search_from(one.problem, z, options.iterations)
+        else:
+            found = Found(z, near, False, 0)
+        if found.evaluation is not None:
+            searches.outcomes.append(Outcome(one.problem, one.number, one.start, found))
+        if searches.best.merit[0] == 0.0:
+            return
+
+
+def _nothing(problems: Sequence[Problem]) -> InputError:
+    """Make the error that says why no robot could be solved."""
+    reasons: dict[str, int] = {}
+    for problem in problems:
+        for reason, count in problem.failures.items():
+            reasons[reason] = reasons.get(reason, 0) + count
+    most = max(reasons, key=lambda one: reasons[one], default="no robot was tried")
+    first = most.splitlines()[0]
+    return InputError.UNSUPPORTED(
+        "no robot between the limits of the variables can be made and solved; most often: "
+        f"{first} Change the limits or the loads."
+    )

@@ -1,0 +1,120 @@
+"""From far away to where limits hold: linear programs within a trust region.
+
+Every step minimises the linearised sum plus what limits are missed by, at a price, within a box.
+There is always a step, also where limits contradict each other at first, and no step leaves the
+range in which derivatives predict anything: where a notch closes, the box shrinks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linprog
+
+from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.search.rows import TOLERANCE
+
+# The box at first, at most and at last, in parts of the ranges of the variables.
+_FIRST, _MOST, _LAST = 0.15, 0.5, 1e-4
+# What all limits missed by their sizes cost, in sizes of the sum; it grows where they stay missed.
+_PRICE, _DEARER, _DEAREST = 10.0, 10.0, 1e5
+# A step is taken if it gains this part of what was promised; the box grows beyond the other part.
+_TAKEN, _GOOD = 0.05, 0.7
+# Little is left to be gained, or nothing is missed by more than this: SLSQP takes over.
+_SETTLED, _NEAR = 1e-5, 1e-3
+_STEPS = 30
+
+
+@dataclass
+class _Model:
+    """Sum and rows, linear about a point."""
+
+    problem: Problem
+    one: Evaluation
+    price: float
+    size: float
+
+    def merit(self, other: Evaluation) -> float:
+        """Sum and price of what is missed."""
+        missed = np.abs(self.problem.violation(other)).sum()
+        return other.total / self.size + self.price * float(missed)
+
+    def step(self, z: Vector, box: float) -> tuple[Vector, float]:
+        """Return the best step within a box, and the merit that it promises."""
+        problem, one = self.problem, self.one
+        span = problem.solver.variables.span
+        assert one.objective.slopes is not None
+        assert one.rows.slopes is not None
+        n, m, k = problem.count, len(problem.rows), len(problem.bounds)
+        sizes = problem.sizes if m else np.zeros(0)
+        by = one.rows.slopes * span / sizes[:, None]
+        low = np.array([row.lower for row in problem.rows])
+        high = np.array([row.upper for row in problem.rows])
+        matrix: list[np.ndarray] = []
+        right: list[np.ndarray] = []
+        for side, limit in ((1.0, high), (-1.0, low)):
+            here = np.isfinite(limit)
+            give = -np.eye(m)[here]
+            matrix.append(np.hstack([side * by[here], give, np.zeros((int(here.sum()), k))]))
+            right.append(side * (limit[here] - one.rows.values[here]) / sizes[here])
+        for number, (bound, reading) in enumerate(zip(problem.bounds, one.bounded, strict=True)):
+            assert reading.slopes is not None
+            rows = np.zeros((len(reading.values), n + m + k))
+            rows[:, :n] = bound.sign * reading.slopes * span
+            rows[:, n + m + number] = -bound.sign
+            matrix.append(rows)
+            right.append(-bound.sign * reading.values)
+        factors = [bound.factor / self.size for bound in problem.bounds]
+        cost = np.concatenate(
+            [one.objective.slopes[0] * span / self.size, np.full(m, self.price), factors]
+        )
+        limits = [(max(-box, -a), min(box, 1.0 - a)) for a in z.tolist()]
+        limits += [(0.0, np.inf)] * m + [(-np.inf, np.inf)] * k
+        every = np.concatenate([np.zeros((0, n + m + k)), *matrix])
+        found = linprog(cost, every, np.concatenate([np.zeros(0), *right]), bounds=limits)
+        if found.x is None:
+            return np.zeros(n), self.merit(one)
+        return found.x[:n], float(found.fun) + float(one.objective.values.sum()) / self.size
+
+
+def approach(
+    problem: Problem, z: Vector, first: Evaluation, iterations: int
+) -> tuple[Vector, Evaluation, int]:
+    """Step to where limits hold, or are missed by least.
+
+    Args:
+        problem: The problem.
+        z: The start, scaled.
+        first: The robot there, with derivatives.
+        iterations: Most steps.
+
+    Returns:
+        Where it ended, the robot there with derivatives, and the number of steps.
+    """
+    one, box, price = first, _FIRST, _PRICE
+    done = 0
+    while done < min(iterations, _STEPS) and problem.count:
+        if problem.worst(one) <= _NEAR:
+            break
+        model = _Model(problem, one, price, problem.total_size)
+        step, promised = model.step(z, box)
+        here = model.merit(one)
+        gain = here - promised
+        if gain <= _SETTLED * max(1.0, abs(here)) or box < _LAST:
+            if problem.worst(one) <= TOLERANCE or price >= _DEAREST or box < _LAST:
+                break
+            price *= _DEARER
+            continue
+        done += 1
+        other = problem.evaluate(np.clip(z + step, 0.0, 1.0))
+        part = -1.0 if other is None else (here - model.merit(other)) / gain
+        full = None
+        if other is not None and part > _TAKEN:
+            full = problem.with_slopes(other, z + step)
+        if full is None:
+            box = 0.4 * min(box, float(np.abs(step).max()))
+            continue
+        z, one = np.clip(z + step, 0.0, 1.0), full
+        box = min(_MOST, 2.0 * box) if part > _GOOD else box
+    return z, one, done

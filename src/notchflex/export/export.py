@@ -1,0 +1,108 @@
+"""Writes robots to files of other programs: cut patterns, drawings, solids, simulators."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from notchflex.errors import InputError
+from notchflex.export.document import Document, Subject
+from notchflex.export.formats import FORMATS, format_of
+from notchflex.results.files.writing import check_output, replacing
+from notchflex.robot import Robot
+
+if TYPE_CHECKING:
+    from notchflex.results import Equilibrium, EquilibriumPath
+
+
+class Exported(NamedTuple):
+    """A file that was written.
+
+    Attributes:
+        file: Its path.
+        warnings: Sentences about what is in it.
+        facts: Numbers about what is in it, with their units in the names.
+    """
+
+    file: str
+    warnings: tuple[str, ...]
+    facts: dict[str, Any]
+
+
+def export_robot(
+    robot: Robot | EquilibriumPath | Equilibrium,
+    file: str | PathLike[str],
+    options: object | None = None,
+) -> Exported:
+    """Write a robot to a file of another program; the suffix selects the format.
+
+    Args:
+        robot: The robot without loads; or a state, or a path whose last step counts, for the
+            formats that show the robot under load.
+        file: Path of the file, written completely or not at all; a file there is replaced.
+        options: Options of the format; those that it has by default if None.
+
+    Returns:
+        What was written, with warnings.
+
+    Raises:
+        InputError: The robot or the options do not allow it, a package is missing, or the file
+            cannot be written.
+
+    Example:
+        >>> import notchflex as nf
+        >>> nf.export_robot(nf.load_robot("pacheco2021-a"), "wrist.pdf").file
+        'wrist.pdf'
+    """
+    target = fspath(file)
+    name = format_of(target)
+    check_output(target, "export_robot")
+    FORMATS[name].check_packages("export_robot")
+    document = build(name, _subject(robot), options)
+    return write({target: document})[0]
+
+
+def build(name: str, subject: Subject, options: object | None = None) -> Document:
+    """Make the document of a format; nothing is written.
+
+    Raises:
+        InputError: The robot or the options do not allow it.
+    """
+    one = FORMATS[name]
+    options = one.options() if options is None else options
+    if not isinstance(options, one.options):
+        raise InputError.WRONG_TYPE(
+            f"a {one.text} takes {one.options.__name__}; got {type(options).__name__}."
+        )
+    if subject.path is not None and not one.bends:
+        raise InputError.CONFLICT(
+            f"a {one.text} shows the robot as it is cut, without loads; give the robot instead "
+            "of a result."
+        )
+    return one.build(subject, options)
+
+
+def write(documents: Mapping[str, Document]) -> list[Exported]:
+    """Write documents, by file; each completely or not at all."""
+    written: list[Exported] = []
+    for file, document in documents.items():
+        with replacing(file) as temporary:
+            document.save(temporary)
+        written.append(Exported(file, document.warnings, document.facts))
+    return written
+
+
+def _subject(robot: object) -> Subject:
+    if isinstance(robot, Robot):
+        return Subject(robot)
+    from notchflex.results import Equilibrium, EquilibriumPath  # they import JAX
+
+    if isinstance(robot, EquilibriumPath):
+        return Subject(robot.robot, robot, len(robot) - 1)
+    if isinstance(robot, Equilibrium):
+        return Subject(robot.path.robot, robot.path, robot.step)
+    raise InputError.WRONG_TYPE(
+        f"export_robot takes a Robot, an Equilibrium or an EquilibriumPath; got "
+        f"{type(robot).__name__}."
+    )

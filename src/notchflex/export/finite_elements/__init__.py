@@ -1,0 +1,1 @@
+"""Decks of finite elements of notched tubes, for CalculiX."""

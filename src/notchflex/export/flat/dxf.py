@@ -1,0 +1,93 @@
+"""A flat pattern as DXF, by ezdxf: R2000, or R12 for old programs."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from notchflex.export.document import Subject
+from notchflex.export.flat.drawing import LAYERS, PatternDrawing, pattern_drawing
+from notchflex.export.flat.pattern import flat_pattern
+from notchflex.export.options import PatternOptions
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+
+_COLOURS = {"CUT": 1, "CUT_OFF": 5, "REFERENCE": 8, "TEXT": 7}  # red, blue, grey, black or white
+_MM = 4  # $INSUNITS
+
+
+@dataclass(frozen=True)
+class DxfPattern:
+    """A pattern as the text of a DXF file."""
+
+    drawing: PatternDrawing
+    text: str
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences about the pattern."""
+        return self.drawing.pattern.warnings
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Numbers about the pattern."""
+        return self.drawing.pattern.facts
+
+    def save(self, file: Path) -> None:
+        """Write it."""
+        file.write_text(self.text, encoding="utf-8", newline="\n")
+
+
+def dxf_pattern(subject: Subject, options: PatternOptions) -> DxfPattern:
+    """Make the flat pattern of a robot as DXF.
+
+    Lengths are in mm; with `y_unit="deg"` the y coordinates are degrees.
+
+    Raises:
+        InputError: See `flat_pattern`.
+    """
+    drawing = pattern_drawing(flat_pattern(subject, options))
+    return DxfPattern(drawing, _text_of(drawing))
+
+
+def _text_of(drawing: PatternDrawing) -> str:
+    import ezdxf
+    from ezdxf._options import options as ezdxf_options
+    from ezdxf.enums import TextEntityAlignment
+
+    options = drawing.pattern.options
+    # The same robot gives the same file: without times and random names.
+    before = ezdxf_options.write_fixed_meta_data_for_testing
+    ezdxf_options.write_fixed_meta_data_for_testing = True
+    try:
+        units = 0 if options.dxf_version == "R12" else _MM  # R12 has no units
+        made = ezdxf.new(options.dxf_version, units=units)  # pyright: ignore[reportPrivateImportUsage]
+        _layers(made)
+        space = made.modelspace()
+        for line in drawing.lines:
+            attributes = {"layer": line.layer}
+            if options.dxf_version == "R12":
+                space.add_polyline2d(line.points, close=line.closed, dxfattribs=attributes)
+            else:
+                space.add_lwpolyline(line.points, close=line.closed, dxfattribs=attributes)
+        for one in drawing.texts:
+            text = space.add_text(one.text, height=one.height, dxfattribs={"layer": "TEXT"})
+            middle = TextEntityAlignment.MIDDLE_CENTER
+            text.set_placement(one.place, align=middle if one.centred else None)
+        (low, bottom), (high, top) = drawing.box
+        made.header["$EXTMIN"], made.header["$EXTMAX"] = (low, bottom, 0.0), (high, top, 0.0)
+        stream = io.StringIO()
+        made.write(stream)
+    finally:
+        ezdxf_options.write_fixed_meta_data_for_testing = before
+    return stream.getvalue()
+
+
+def _layers(made: Drawing) -> None:
+    for name, text in LAYERS.items():
+        layer = made.layers.add(name, color=_COLOURS[name])
+        if made.dxfversion > "AC1009":  # R12 has no descriptions
+            layer.description = text

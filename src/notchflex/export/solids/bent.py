@@ -1,0 +1,184 @@
+"""The solid of a bent robot: every point of the straight one moves with the model.
+
+A point of a flexure moves with the section of the rod that it lies in, from its place in the
+straight tube to that in the state; all others move with their rigid body. The triangles stay those
+of the straight solid, refined, so that the surface stays closed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from notchflex.export.cuts import RobotCuts
+from notchflex.plotting.shapes.interpolation import rotation_of
+from notchflex.plotting.shapes.robot_shape import RobotShape, shape_at, shape_from_angles
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+    from notchflex.export.document import Subject
+
+Points = NDArray[np.float64]
+
+PIECES = 16
+"""Sections of the model's flexures at least, between which points are interpolated."""
+STEPS = 10
+"""Straight pieces of a bent flexure at least: a notch that bends by 30 deg has 3 deg in each."""
+
+
+@dataclass(frozen=True)
+class Zone:
+    """The length of tube in which one flexure lies, and how its points move.
+
+    A spine is crossed along z, a strip across the tube.
+
+    Args:
+        start: Where it starts along the tube [mm].
+        end: Where it ends.
+        direction: What the place of a point in the flexure is measured along, a unit vector.
+        places: Place of each section, rising [mm], (k,).
+        turns: Rotation of each section from the straight tube to the state, (k, 3, 3).
+        moves: Its displacement after that rotation [mm], (k, 3).
+    """
+
+    start: float
+    end: float
+    direction: Points
+    places: Points
+    turns: Points
+    moves: Points
+
+    @property
+    def along_tube(self) -> bool:
+        """Whether it is a spine along the tube, not a strip across it."""
+        return bool(self.direction[2] > 0.5)
+
+    def pose_at(self, height: float) -> tuple[Points, Points]:
+        """Return rotation and displacement at a height of a spine, between two sections [mm]."""
+        before = int(np.clip(np.searchsorted(self.places, height) - 1, 0, len(self.places) - 2))
+        step = self.places[before + 1] - self.places[before]
+        part = float(np.clip((height - self.places[before]) / step, 0.0, 1.0))
+        first, second = self.turns[before], self.turns[before + 1]
+        turn = first @ rotation_of(part * Rotation.from_matrix(first.T @ second).as_rotvec())
+        middle = np.array([[0.0, 0.0, height]])
+        return turn, self.moved(middle)[0] - turn @ middle[0]
+
+    def moved(self, points: Points) -> Points:
+        """Return points of the zone where they are in the state [mm], (v, 3)."""
+        at = np.clip(points @ self.direction, self.places[0], self.places[-1])
+        before = np.clip(np.searchsorted(self.places, at) - 1, 0, len(self.places) - 2)
+        step = self.places[before + 1] - self.places[before]
+        part = ((at - self.places[before]) / step)[:, None]
+        first, second = (
+            np.einsum("vij,vj->vi", self.turns[one], points) + self.moves[one]
+            for one in (before, before + 1)
+        )
+        return (1.0 - part) * first + part * second
+
+
+def is_bent(subject: Subject) -> bool:
+    """Whether the solid is that of a robot under loads, or of one that is bent without any."""
+    curved = any(notch.precurvature_deg for notch in subject.robot.notches)
+    return subject.path is not None or curved
+
+
+def state_shape(subject: Subject, pieces: int = PIECES) -> RobotShape:
+    """Return the shape of a robot in its state, without loads where there is none."""
+    if subject.path is not None:
+        return shape_at(subject.path, subject.step, pieces)
+    free = np.radians([notch.precurvature_deg for notch in subject.robot.notches])
+    return shape_from_angles(subject.robot, free, pieces)
+
+
+class Motion:
+    """How every point of the straight tube moves to its place in a state."""
+
+    def __init__(self, subject: Subject, cuts: RobotCuts) -> None:
+        """Take the shapes of the straight tube and of the state."""
+        robot = subject.robot
+        level = "tendons" if subject.path is None else subject.path.chain.level
+        straight = np.zeros(robot.number_of_notches)
+        rest = shape_from_angles(robot, straight, PIECES, level)
+        self.shape = state_shape(subject)
+        self.zones = [
+            _zone(rest, self.shape, cuts, notch) for notch in range(robot.number_of_notches)
+        ]
+        turns = self.shape.rotation @ np.swapaxes(rest.rotation, 1, 2)
+        self._bodies = turns, self.shape.position - _turned(turns, rest.position)
+
+    def of_body(self, number: int) -> tuple[Points, Points]:
+        """Return rotation and displacement of a body (0 is the base)."""
+        turns, moves = self._bodies
+        return turns[number], moves[number]
+
+    def __call__(self, points: Points) -> Points:
+        """Return points of the straight tube where they are in the state [mm], (v, 3)."""
+        along = points[:, 2]
+        body = np.searchsorted([zone.end for zone in self.zones], along, side="left")
+        turns, moves = self._bodies
+        new = _turned(turns[body], points) + moves[body]
+        for zone in self.zones:
+            inside = (along >= zone.start) & (along <= zone.end)
+            new[inside] = zone.moved(points[inside])
+        return new
+
+
+def bent_solid(straight: Manifold, motion: Motion) -> Manifold:
+    """Bend the straight solid of a robot."""
+    length = min(float(np.ptp(zone.places)) for zone in motion.zones) / STEPS
+    return straight.refine_to_length(length).warp_batch(motion)
+
+
+def _turned(turns: Points, points: Points) -> Points:
+    return np.einsum("vij,vj->vi", turns, points)
+
+
+def _zone(rest: RobotShape, shape: RobotShape, cuts: RobotCuts, notch: int) -> Zone:
+    """Return the zone of a flexure."""
+    robot = rest.robot
+    line, bent = rest.flexures[notch], shape.flexures[notch]
+    turns = bent.rotation @ np.swapaxes(line.rotation, 1, 2)
+    moves = bent.position - _turned(turns, line.position)
+    first = next(number for number, one in enumerate(cuts.cuts) if one.notch == notch + 1)
+    if float(np.asarray(rest.chain.rods.has_closure)[notch]) > 0.0:  # a spine along the tube
+        direction = np.array([0.0, 0.0, 1.0])
+        ends = cuts.cuts[first].start, cuts.cuts[first].end
+        return _without_legs(ends, direction, line.position @ direction, turns, moves, 0.0)
+    # A strip across the tube lies between this notch's first cut and the next one along the tube.
+    view = math.radians(robot.notches[notch].direction_deg)
+    direction = np.array([math.cos(view), math.sin(view), 0.0])
+    places = line.position @ direction
+    if places[0] > places[-1]:  # its proximal end lies on the side of the bend
+        direction, places = -direction, -places
+    ends = cuts.cuts[first].end, cuts.cuts[first + 1].start
+    return _without_legs(ends, direction, places, turns, moves, robot.tube.outer_radius)
+
+
+def _without_legs(
+    ends: tuple[float, float],
+    direction: Points,
+    places: Points,
+    turns: Points,
+    moves: Points,
+    outer: float,
+) -> Zone:
+    """Return a zone whose sections all have a place of their own.
+
+    Elastic ends are sections at one place: those of a strip run along the wall, and are spread over
+    it, from the strip to the outer surface; of others the outermost counts.
+    """
+    low, high = np.flatnonzero(places == places[0])[-1], np.flatnonzero(places == places[-1])[0]
+    spread = np.array(places)
+    if low > 0:
+        spread[: low + 1] = np.linspace(min(-outer, places[0]), places[0], low + 1)
+    if high < len(places) - 1:
+        spread[high:] = np.linspace(places[-1], max(outer, places[-1]), len(places) - high)
+    kept = np.concatenate([[True], np.diff(spread) > 0.0])
+    kept[-1] = True
+    return Zone(*ends, direction, spread[kept], turns[kept], moves[kept])

@@ -1,0 +1,98 @@
+"""The picture of a design: the robot before and after at its states, and its numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from notchflex.plotting.output import Picture
+from notchflex.plotting.shapes.panel import plane_of, shape_panel
+from notchflex.plotting.sheet import BELOW, Cell, Curve, Mark, Note, Panel, Span, dots, stack
+from notchflex.plotting.style import BLACK, BLUE, GREY, VERMILLION
+
+if TYPE_CHECKING:
+    from notchflex.designing import Design
+    from notchflex.results import EquilibriumPath
+
+BEFORE, AFTER = GREY, BLUE
+_STATES, _VALUES = 3, 12
+
+
+def design_picture(made: Design, *, title: str = "") -> Picture:
+    """Describe a design: the robot at up to three states, before and after, and its variables.
+
+    Args:
+        made: The design.
+        title: Heading.
+    """
+    cells: list[Cell] = []
+    path, before = made.path, made.path_before
+    states = list(made.state_steps.items())[-_STATES:]
+    column = 0
+    for label, one, colour in (("before", before, BEFORE), ("designed", path, AFTER)):
+        if one is None or not one.converged.any():
+            continue
+        steps = [step for _, step in states if one.converged[step]]
+        shades = [colour] * len(steps)
+        panel = shape_panel(one, steps, plane_of(one), title=label, colours=shades, legend=BELOW)
+        cells.append(Cell(_with_curves(panel, made, one, label), 0, column, 2))
+        column += 1
+    cells += stack([_variables(made), _wishes(made)], column)
+    name = title or f"{made.spec.name}: {made.before.name}"
+    return Picture(name, 1.2 + 3.6 * (column + 1), 6.8, cells, [])
+
+
+def _with_curves(panel: Panel, made: Design, path: EquilibriumPath, label: str) -> Panel:
+    """Add the points of target curves."""
+    from dataclasses import replace
+
+    from notchflex.designing.model.curves import target_points
+
+    marks: list[Mark] = list(panel.items)
+    view = plane_of(path)
+    for curve in made.spec.curve:
+        points = target_points(curve)
+        if view is not None:
+            across = points[:, 0] * np.cos(view) + points[:, 1] * np.sin(view)
+            points = np.stack([across, points[:, 2]], axis=1)
+        marks.append(dots(points, VERMILLION, 2.5, name=f"curve {curve.name}", layer=40))
+    return replace(panel, items=marks)
+
+
+def _variables(made: Design) -> Panel:
+    """Where each variable lies between its limits."""
+    chosen = made.variables[:_VALUES]
+    if not chosen:
+        return Panel([Note("no variables")], "", "", title="variables")
+    at = np.arange(1, len(chosen) + 1, dtype=float)
+    after = np.array([(v.value - v.lower) / (v.upper - v.lower) for v in chosen])
+    was = np.array([(v.before - v.lower) / (v.upper - v.lower) for v in chosen])
+    items: list[Mark] = [
+        Span("y", 0.0, 0.0, BLACK),
+        Span("y", 1.0, 1.0, BLACK),
+        dots(np.stack([at, was], axis=1), BEFORE, 4.0, name="before", hollow=True),
+        dots(np.stack([at, after], axis=1), AFTER, 5.0, name="designed"),
+    ]
+    labels = "variable [number]", "from least (0) to greatest (1)"
+    return Panel(items, *labels, title="variables", legend=BELOW, whole="x", y_range=(-0.08, 1.08))
+
+
+def _wishes(made: Design) -> Panel:
+    """The notch by notch numbers of the first wish that has several, or a note."""
+    several = [one for one in made.wishes if len(one.achieved) > 1]
+    if not several:
+        lines = [f"{w.title}: {w.achieved[0]:.4g} {w.unit}" for w in made.wishes[:6]]
+        return Panel([Note("\n".join(lines), corner=True)], "", "", title="achieved")
+    one = several[0]
+    at = np.arange(1, len(one.achieved) + 1, dtype=float)
+    items: list[Mark] = []
+    for values, colour, name in ((one.before, BEFORE, "before"), (one.achieved, AFTER, "designed")):
+        if len(values) == len(at):
+            points = np.stack([at, np.array(values)], axis=1)
+            items.append(Curve(points, colour, marker="o", name=name))
+    unit = f" [{one.unit}]" if one.unit else ""
+    return Panel(items, "number", f"{one.title}{unit}", title=one.asked, legend=BELOW, whole="x")
+
+
+__all__ = ["design_picture"]

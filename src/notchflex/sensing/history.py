@@ -1,0 +1,166 @@
+"""Forces reading by reading along a history, and the noise that they inherit.
+
+The model is followed from reading to reading with the tensions that were measured, and the force of
+every reading is found in turn: what the contacts remember of it passes on to the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.results.path import EquilibriumPath
+from notchflex.sensing.model import SensingModel, Step
+from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
+from notchflex.solver.continuation import SolverState
+
+Progress = Callable[[int, int], None]
+
+# A deviation beyond this part of the range of the search is none of first order.
+_LINEAR = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The best forces of a history.
+
+    Attributes:
+        model: The robot and its readings.
+        steps: The readings, as they are compared.
+        best: What fits best, reading by reading, up to the first that does not converge.
+        covariance: Of the deviations of each reading by the noise of all up to it, (m, m) each.
+        alone: The same by the noise of this reading alone, (m, m) each.
+        information: Whitened slopes of each reading by the force, (m, d) each.
+        gain: Change of each force by every unit of noise, (d, noises) each.
+    """
+
+    model: SensingModel
+    steps: list[Step]
+    best: list[Candidate]
+    covariance: list[Float[np.ndarray, "m m"]]
+    alone: list[Float[np.ndarray, "m m"]]
+    information: list[Float[np.ndarray, "m d"]]
+    gain: list[Float[np.ndarray, "d noises"]]
+
+
+def estimate(model: SensingModel, progress: Progress | None = None) -> History:
+    """Find the force of every reading, one after the other; without their noise yet."""
+    history = History(model, [], [], [], [], [], [])
+    state, force = None, np.zeros(model.size)
+    for number in range(len(model.readings)):
+        step, candidate = _estimate_one(model, number, state, force)
+        if not np.isfinite(candidate.misfit):
+            break
+        history.steps.append(step)
+        history.best.append(candidate)
+        state, force = candidate.state, candidate.force
+        if progress is not None:
+            progress(number + 1, len(model.readings))
+    return history
+
+
+def _estimate_one(
+    model: SensingModel, number: int, state: SolverState | None, force: Float[np.ndarray, " d"]
+) -> tuple[Step, Candidate]:
+    step = model.step(number)
+    problem = ReadingProblem(model, step, state, np.diag(step.variance**-0.5))
+    at = best_of_all(problem, force[None])
+    if not len(step.entries):
+        return step, at
+    if np.isfinite(at.misfit):
+        drives = model.slopes(at.alone, of_drives=True)[0][step.entries]
+        noise = np.diag(step.variance) + (np.nan_to_num(drives) * step.driving) @ drives.T
+        problem = replace(problem, whitening=whitening_of(noise))
+        at = best(problem, at.force[None])
+    if state is not None and np.isfinite(at.misfit):
+        way = model.between_readings(state, number, np.stack([force, at.force]))
+        step = replace(step, variance=step.variance + way[step.entries] ** 2)
+    return step, at
+
+
+def whitening_of(covariance: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
+    """Return the matrix that makes deviations of a covariance independent of unit variance."""
+    if not len(covariance):
+        return covariance
+    return np.linalg.inv(np.linalg.cholesky(covariance))
+
+
+def with_noise(history: History) -> History:
+    """Carry the noise of all readings through a history, to first order.
+
+    A noise is one number that was read in one reading. It changes the force of its own reading and,
+    by what the contacts remember, those after it.
+    """
+    model, steps, found = history.model, history.steps, history.best
+    history = History(model, steps, found, [], [], [], [])
+    if not found:
+        return history
+    forces = np.array([one.force for one in found])
+    path = model.follow(forces)
+    by_drive, by_force = _slopes_along(model, path)
+    sizes = [len(step.entries) for step in steps]
+    tendons = by_drive.shape[2]
+    first = np.cumsum([0, *sizes])
+    noises = int(first[-1]) + len(steps) * tendons
+    before = np.zeros((model.size, noises))
+    for k, step in enumerate(steps):
+        rows = step.entries
+        read = np.zeros((len(rows), noises))
+        read[np.arange(len(rows)), first[k] + np.arange(len(rows))] = np.sqrt(step.variance)
+        for j in range(k, -1, -1):
+            columns = slice(int(first[-1]) + j * tendons, int(first[-1]) + (j + 1) * tendons)
+            read[:, columns] -= by_drive[j, k][:, rows].T * np.sqrt(steps[j].driving)
+            if j == k:
+                history.alone.append(read @ read.T)
+            else:
+                read -= by_force[j, k][:, rows].T @ history.gain[j]
+        covariance = read @ read.T
+        white = whitening_of(covariance)
+        slopes = white @ by_force[k, k][:, rows].T
+        gain = _known(slopes, _LINEAR * model.largest)
+        before = before + gain @ (white @ read - slopes @ before)
+        history.covariance.append(covariance)
+        history.information.append(slopes)
+        history.gain.append(before)
+    return history
+
+
+def _known(slopes: Float[np.ndarray, "m d"], most: float) -> Float[np.ndarray, "d m"]:
+    """Return the least-squares solution, without directions whose deviation exceeds `most`.
+
+    There the tendons stick, or nothing is read: to first order the noise would move the force by
+    any amount, while what the contacts remember of it stays within the interval.
+    """
+    left, values, right = np.linalg.svd(slopes, full_matrices=False)
+    kept = values * most > 1.0
+    inverse = np.where(kept, 1.0 / np.where(kept, values, 1.0), 0.0)
+    return (right.T * inverse) @ left.T
+
+
+def _slopes_along(
+    model: SensingModel, path: EquilibriumPath
+) -> tuple[Float[np.ndarray, "s s t outputs"], Float[np.ndarray, "s s d outputs"]]:
+    """Change of each reading by the command of each tendon, and by the force, of each before."""
+    tangents = PathTangents(path, model.outputs)
+    shape = tangents.loads.shape
+    results = []
+    for changes in (model.drive_changes(path), model.force_changes(path)):
+        slopes = []
+        for step in range(len(path)):
+            row = []
+            for change in changes:
+                load = np.zeros(shape)
+                load[step] = change
+                along = tangents.along(Change(load, None))
+                parts = [along[name].reshape(len(path), -1) for name in model.outputs]
+                row.append(np.nan_to_num(np.concatenate(parts, axis=1)))
+            slopes.append(np.stack(row, axis=1))
+        results.append(np.array(slopes))
+    return results[0], results[1]
+
+
+__all__ = ["History", "Progress", "estimate", "whitening_of", "with_noise"]

@@ -1,0 +1,200 @@
+"""The model of one reading: from a state and a force to what the sensors read, with slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex._jax import constant
+from notchflex.analysis.derivatives.forward_model import ForwardModel
+from notchflex.analysis.derivatives.tangent import Change, PathTangents
+from notchflex.loads import LoadPath
+from notchflex.loads.command import make_commands
+from notchflex.results.path import EquilibriumPath
+from notchflex.robot import Robot
+from notchflex.sensing.readings import Readings
+from notchflex.sensing.unknown import UnknownForce
+from notchflex.solver.continuation import SolverState
+from notchflex.solver.newton import Settings
+
+# What readings can't resolve in the model, mm and rad: a stuck tendon of the model is not quite
+# rigid, and a solve is met to its tolerance.
+_RESOLUTION = {"stroke": 1e-5, "tip_position": 1e-5, "notch_angle": 1e-6}
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One reading: which numbers were measured, and how exactly.
+
+    Attributes:
+        number: Which reading, from 0.
+        measured: The numbers, (m,).
+        entries: Which columns of the outputs these are, (m,).
+        variance: Of their noise, and of what may have happened since the reading before, (m,).
+        driving: Variance of what drives the model, (t,).
+    """
+
+    number: int
+    measured: Float[np.ndarray, " m"]
+    entries: np.ndarray
+    variance: Float[np.ndarray, " m"]
+    driving: Float[np.ndarray, " t"]
+
+
+@dataclass(frozen=True, eq=False)
+class SensingModel:
+    """A robot whose sensors are read while an unknown force acts on it.
+
+    Attributes:
+        robot: The robot.
+        readings: What was read.
+        unknown: The force that is looked for.
+        largest: Largest component of it, N.
+        settings: Tolerance and limits of the solver.
+    """
+
+    robot: Robot
+    readings: Readings
+    unknown: UnknownForce
+    largest: float
+    settings: Settings
+
+    @property
+    def size(self) -> int:
+        """Number of unknown components."""
+        return len(self.unknown.names)
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """Quantities that were measured in any reading."""
+        read = self.readings.read
+        return tuple(name for name, values in read.items() if np.isfinite(values).any())
+
+    def step(self, number: int) -> Step:
+        """Return what was measured in a reading, counted from 0."""
+        read, deviation = self.readings.read, self.readings.deviation
+        count = self.readings.count[number]
+        values = np.concatenate([read[name][number] for name in self.outputs])
+        variance = [
+            np.full(read[name].shape[1], deviation[name] ** 2 / count + _RESOLUTION[name] ** 2)
+            for name in self.outputs
+        ]
+        entries = np.flatnonzero(np.isfinite(values))
+        driving = self.readings.driving_deviation[number] ** 2 / count
+        return Step(number, values[entries], entries, np.concatenate(variance)[entries], driving)
+
+    def load(self, steps: Iterable[int], forces: Float[np.ndarray, "k d"]) -> LoadPath:
+        """Return loads: what drives the model in some readings, each with a force."""
+        tension, stroke = self.readings.commands
+        rows = np.fromiter(steps, int)
+        external = tuple(self.unknown.load(force) for force in forces)
+        turn = np.array(self.unknown.base_rotation)
+        commands = np.where(np.isnan(stroke[rows]), tension[rows], np.nan)
+        return LoadPath.of_valid(commands, stroke[rows], turn, external)
+
+    def solve(
+        self, start: SolverState | None, number: int, forces: Float[np.ndarray, "k d"]
+    ) -> EquilibriumPath:
+        """Solve a reading with some forces, each from the same state; rest where it is None."""
+        load = self.load([number] * len(forces), forces)
+        return self._each.solve(self.robot, load, start)
+
+    def between_readings(
+        self, start: SolverState, number: int, forces: Float[np.ndarray, "2 d"]
+    ) -> Float[np.ndarray, " outputs"]:
+        """Return by how much what is read depends on the way from the reading before.
+
+        The difference of a change in two halves from one at once, where the force and what drives
+        the model change in proportion; 0 where they can't, as from slack tendons.
+
+        Args:
+            start: The state at the reading before.
+            number: The reading.
+            forces: The force before and at it.
+        """
+        rows = [number - 1, number]
+        tension, stroke = (one[rows] for one in self.readings.commands)
+        driven = np.isnan(stroke)
+        if (driven[0] != driven[1]).any() or not np.nanmax(tension[0], initial=0.0) > 0.0:
+            return np.zeros(self._width)
+        at_once = self.load(rows, forces)
+        middle = self.unknown.load(forces.mean(axis=0))
+        halves = LoadPath.of_valid(
+            np.stack([at_once.tension.mean(axis=0), at_once.tension[1]]),
+            np.stack([at_once.stroke.mean(axis=0), at_once.stroke[1]]),
+            at_once.base_rotation,
+            (middle, at_once.external[1]),
+        )
+        ways = [self._along.solve(self.robot, halves, start), self.solve(start, number, forces[1:])]
+        first, second = (self.values(way)[-1] for way in ways)
+        return np.nan_to_num(first - second)
+
+    @property
+    def _width(self) -> int:
+        read = self.readings.read
+        return sum(read[name].shape[1] for name in self.outputs)
+
+    def follow(self, forces: Float[np.ndarray, "s d"]) -> EquilibriumPath:
+        """Follow the whole history with a force in every reading."""
+        return self._along.solve(self.robot, self.load(range(len(forces)), forces))
+
+    def values(self, path: EquilibriumPath) -> Float[np.ndarray, "k outputs"]:
+        """Return what the sensors would read; NaN where it did not converge."""
+        columns = [np.asarray(path.quantity(name)) for name in self.outputs]
+        values = np.concatenate([one.reshape(len(path), -1) for one in columns], axis=1)
+        return np.where(path.converged[:, None], values, np.nan)
+
+    def slopes(
+        self, path: EquilibriumPath, *, of_drives: bool = False
+    ) -> Float[np.ndarray, "k outputs u"]:
+        """Return the change of what is read by each component, or by each tendon's command."""
+        every = self.drive_changes(path) if of_drives else self.force_changes(path)
+        tangents = PathTangents(path, self.outputs, remembers=False)
+        columns = []
+        for change in every:
+            along = tangents.along(Change(np.broadcast_to(change, tangents.loads.shape), None))
+            parts = [along[name].reshape(len(path), -1) for name in self.outputs]
+            columns.append(np.concatenate(parts, axis=1))
+        return np.stack(columns, axis=-1)
+
+    def force_changes(self, path: EquilibriumPath) -> list[Float[np.ndarray, " command"]]:
+        """Change of a packed load by a unit of each component; loads are linear in them."""
+        load, ready = path.load, path.prepared
+        kind = tuple(np.isnan(load.stroke[0]).tolist())
+        if kind not in self._changes:
+            forces = np.concatenate([np.zeros((1, self.size)), np.eye(self.size)])
+            external = tuple(map(self.unknown.load, forces))
+            tension, stroke = (
+                np.tile(one[:1], (len(forces), 1)) for one in (load.tension, load.stroke)
+            )
+            probe = LoadPath.of_valid(tension, stroke, load.base_rotation, external)
+            packed, _ = ready.padded_commands(make_commands(probe, self.robot, ready.chain))
+            self._changes[kind] = list(packed[1:] - packed[0])
+        return self._changes[kind]
+
+    @cached_property
+    def _changes(self) -> dict[tuple[bool, ...], list[Float[np.ndarray, " command"]]]:
+        return {}
+
+    def drive_changes(self, path: EquilibriumPath) -> list[Float[np.ndarray, " command"]]:
+        """Change of a packed load by a unit of what drives each tendon."""
+        packed, form = path.prepared.padded_commands(path.commands)
+        none = form.unpack(np.zeros(packed.shape[1]))
+        units = np.eye(path.chain.tendons)
+        return [np.asarray(form.pack(none._replace(target=constant(row)))) for row in units]
+
+    @cached_property
+    def _each(self) -> ForwardModel:
+        return self._model(True)
+
+    @cached_property
+    def _along(self) -> ForwardModel:
+        return self._model(False)
+
+    def _model(self, from_rest: bool) -> ForwardModel:
+        probe = self.load([0], np.full((1, self.size), 1.0))
+        return ForwardModel(self.robot, probe, self.settings, from_rest=from_rest)

@@ -1,0 +1,89 @@
+"""Which part of a force the readings determine, in numbers and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.stats import chi2
+
+from notchflex.sensing.bounds import Bounds
+from notchflex.sensing.history import History
+from notchflex.sensing.model import SensingModel
+
+# An interval this much wider than that of the noise alone is one that stuck friction leaves.
+_STUCK = 1.5
+# Components of a unit direction below this are not counted as part of it.
+_PART = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOpen:
+    """What one reading leaves open.
+
+    Attributes:
+        covariance: Of the force by noise, to first order; along a direction that changes nothing by
+            the width of the interval, or by the range of the search where nothing bounds it, N².
+        stuck: Components that friction hides within the interval, (d,).
+        hidden: Directions that are not observable, unit rows, (k, d).
+    """
+
+    covariance: Float[np.ndarray, "d d"]
+    stuck: Bool[np.ndarray, " d"]
+    hidden: Float[np.ndarray, "k d"]
+
+    @classmethod
+    def of(
+        cls, model: SensingModel, history: History, ends: Bounds, number: int, level: float
+    ) -> LeftOpen:
+        """Return what a reading, counted from 0, leaves open.
+
+        Around the best force a direction may change nothing for two reasons: the readings do not
+        depend on it, or the tendons stick. Only the first leaves the interval without an end.
+        """
+        factor = float(np.sqrt(chi2.ppf(level, 1)))
+        half = 0.5 * (ends.high[number] - ends.low[number])
+        flat = _flat(history.information[number], model.largest)
+        keeps = np.eye(model.size) - flat.T @ flat
+        gain = keeps @ history.gain[number]
+        covariance, stuck, hidden = gain @ gain.T, np.zeros(model.size, bool), []
+        for row in flat:
+            part = np.abs(row) > _PART
+            endless = bool((ends.limited[number] & part).any())
+            width = model.largest if endless else float(np.abs(row) @ half) / factor
+            covariance += width**2 * np.outer(row, row)
+            if endless:
+                hidden.append(row)
+            else:
+                stuck |= part
+        wide = half > _STUCK * factor * np.sqrt(np.diagonal(covariance))
+        rows = np.array(hidden).reshape(-1, model.size)
+        return cls(covariance, stuck | (wide & ~ends.limited[number]), rows)
+
+
+def _flat(slopes: Float[np.ndarray, "m d"], largest: float) -> Float[np.ndarray, "k d"]:
+    """Return the directions along which the noise exceeds the range, as unit rows."""
+    _, values, rows = np.linalg.svd(slopes.reshape(-1, slopes.shape[1]))
+    values = np.concatenate([values, np.zeros(len(rows) - len(values))])
+    flat = rows[values * largest < 1.0]
+    # One sign of each: the largest entry is positive.
+    signs = np.sign(flat[np.arange(len(flat)), np.abs(flat).argmax(axis=1)])
+    return flat * signs[:, None]
+
+
+def direction_in_words(names: Sequence[str], direction: Float[np.ndarray, " d"]) -> str:
+    """Describe a direction by its components.
+
+    Example:
+        >>> direction_in_words(("x", "z"), np.array([0.0, 1.0]))
+        'z'
+        >>> direction_in_words(("x", "z"), np.array([-0.6, 0.8]))
+        '-0.60 x + 0.80 z'
+    """
+    parts = [(part, name) for part, name in zip(direction, names, strict=True) if abs(part) > _PART]
+    if len(parts) == 1:
+        return parts[0][1]
+    text = " + ".join(f"{part:.2f} {name}" for part, name in parts)
+    return text.replace("+ -", "- ")

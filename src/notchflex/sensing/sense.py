@@ -1,0 +1,202 @@
+"""Forces from what the tendons read: tension and stroke, along a history."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Int
+from numpy.typing import ArrayLike
+
+from notchflex.errors import InputError
+from notchflex.loads.external import ExternalLoad
+from notchflex.loads.validation import check_is_robot, check_number
+from notchflex.robot import Robot
+from notchflex.sensing.bounds import Bounds, bounds
+from notchflex.sensing.history import History, estimate, with_noise
+from notchflex.sensing.merging import merged
+from notchflex.sensing.model import SensingModel
+from notchflex.sensing.observability import LeftOpen
+from notchflex.sensing.readings import Readings, SensorNoise, readings_of
+from notchflex.sensing.search import Candidate
+from notchflex.sensing.sensed import SensedForce
+from notchflex.sensing.unknown import unknown_force
+from notchflex.solver.newton import DEFAULT
+
+Stage = Callable[[str, int, int], None]
+
+LEVEL = 0.95
+"""Part of all cases that an interval shall contain."""
+
+# The range of the search: this many times the force that balances the largest tension at the base.
+_RANGE = 3.0
+
+
+def sense(
+    robot: Robot,
+    tensions: ArrayLike | None,
+    strokes: ArrayLike | None = None,
+    *,
+    tip: ArrayLike | None = None,
+    angles: ArrayLike | None = None,
+    noise: SensorNoise | None = None,
+    components: str | None = None,
+    place: int | str = "tip",
+    known: ExternalLoad | None = None,
+    largest: float | None = None,
+    progress: Stage | None = None,
+) -> SensedForce:
+    """Find the force on a robot from the tensions and strokes of its tendons along a history.
+
+    The history begins at rest, with slack tendons and without the force. From reading to reading
+    tendons and force change in proportion. The force may come, change and go at any reading: that
+    of every reading is found for itself, from the state that the readings before left. Consecutive
+    readings that noise explains are averaged first.
+
+    Args:
+        robot: The robot.
+        tensions: Tensions at the base, N, (s, t), NaN where not measured. They drive the model.
+        strokes: Strokes since the free robot, mm, (s, t), NaN where not measured. Where a tension
+            was measured too they are compared with the model, else they drive it.
+        tip: Positions of the tip in the world, mm, (s, 3), if measured.
+        angles: Angles of the notches, rad, (s, n), if measured.
+        noise: Noise of the sensors; `SensorNoise()` by default.
+        components: Axes of the world along which the force may act, such as "x" or "xz"; by
+            default those across the straight tube in which the robot bends.
+        place: "tip", the number of a body at whose origin the force acts, or "search".
+        known: Other loads: a `Load` with gravity, a tip mass, a turned base.
+        largest: Largest component looked for, N; by default three times the force at the tip whose
+            moment at the base is that of the largest tension.
+        progress: Called with a stage, how much of it is done, and how much there is.
+
+    Returns:
+        Forces, intervals, contact, and what the readings leave open. Where a reading has no
+        equilibrium the result ends there and says why.
+
+    Raises:
+        InputError: Readings that do not fit together or the robot, or nothing that depends on the
+            force.
+
+    Example:
+        >>> import notchflex as nf
+        >>> wrist = nf.load_robot("pacheco2021-a")
+        >>> touched = nf.simulate(wrist, nf.pull(0.1, 0.8, steps=4).loaded(tip_force=(0.02, 0, 0)))
+        >>> sensed = nf.sense(wrist, touched.tension, touched.stroke)
+        >>> f"{sensed.force[-1, 0]:.3f} N", bool(sensed.contact[-1])
+        ('0.020 N', True)
+    """
+    check_is_robot(robot)
+    sensors = SensorNoise() if noise is None else noise
+    readings, group = merged(readings_of(robot, tensions, strokes, tip, angles, sensors))
+    unknown = unknown_force(robot, components, place, known)
+    model = SensingModel(robot, readings, unknown, _largest(robot, readings, largest), DEFAULT)
+    places: dict[int | None, float] = {}
+    if place == "search":
+        model, places = _best_place(model, progress)
+    history = with_noise(estimate(model, _stage(progress, "finding the force")))
+    ends = bounds(history, LEVEL, _stage(progress, "finding the interval"))
+    return _result(model, history, ends, places, group)
+
+
+def _largest(robot: Robot, readings: Readings, largest: float | None) -> float:
+    """Return the range of the search, N."""
+    if largest is not None:
+        value = check_number(largest, "largest", "a force in N")
+        if not 0.0 < value < np.inf:
+            raise InputError.OUT_OF_RANGE(
+                f"largest is the largest force looked for, above 0 N; got {value:g}"
+            )
+        return value
+    length = float(np.linalg.norm(_straight_tip(robot)))
+    lever = max(tendon.radius for tendon in robot.tendon)
+    tension = float(np.nanmax(readings.tension, initial=0.0))
+    return _RANGE * max(tension, 1.0) * lever / length
+
+
+def _straight_tip(robot: Robot) -> np.ndarray:
+    from notchflex.analysis.kinematics import tip_from_angles
+
+    return tip_from_angles(robot, np.zeros(robot.number_of_notches))[0]
+
+
+def _stage(progress: Stage | None, name: str) -> Callable[[int, int], None] | None:
+    return None if progress is None else lambda done, count: progress(name, done, count)
+
+
+def _best_place(
+    model: SensingModel, progress: Stage | None
+) -> tuple[SensingModel, dict[int | None, float]]:
+    """Return the model with the force where it fits best, and the misfit of every place."""
+    bodies = [*range(1, model.robot.number_of_notches + 1), None]
+    report = _stage(progress, "trying places")
+    misfits: dict[int | None, float] = {}
+    for number, body in enumerate(bodies, 1):
+        found = estimate(replace(model, unknown=model.unknown.on(body))).best
+        whole = len(found) == len(model.readings)
+        misfits[body] = sum(one.misfit for one in found) if whole else np.inf
+        if report is not None:
+            report(number, len(bodies))
+    # Of places that fit as well the tip is taken: it is where robots touch.
+    least = min(misfits.values())
+    body = None if misfits[None] <= least + 1e-6 else min(misfits, key=lambda one: misfits[one])
+    return replace(model, unknown=model.unknown.on(body)), misfits
+
+
+def _result(
+    model: SensingModel,
+    history: History,
+    ends: Bounds,
+    places: dict[int | None, float],
+    group: Int[np.ndarray, " s"],
+) -> SensedForce:
+    count, size = len(model.readings), model.size
+    found = history.best
+    left_open = [LeftOpen.of(model, history, ends, number, LEVEL) for number in range(len(found))]
+    rest = count - len(found)
+    stuck = np.array([one.stuck for one in left_open] + [np.zeros(size, bool)] * rest)
+    hidden = [*(one.hidden for one in left_open), *[np.zeros((0, size))] * rest]
+    limited = np.concatenate([ends.limited, np.zeros((rest, size), bool)])
+    entries = np.array([len(model.step(number).entries) for number in range(count)])
+    covariance = [one.covariance for one in left_open]
+    return SensedForce(
+        robot=model.robot,
+        components=model.unknown.names,
+        directions=model.unknown.directions,
+        force=_filled([one.force for one in found], (count, size))[group],
+        covariance=_filled(covariance, (count, size, size))[group],
+        low=_filled(ends.low, (count, size))[group],
+        high=_filled(ends.high, (count, size))[group],
+        limited=limited[group],
+        stuck=stuck[group],
+        misfit=_filled([one.misfit for one in found], (count,))[group],
+        read=entries[group],
+        no_force=_filled(ends.no_force, (count,))[group],
+        hidden=tuple(hidden[number] for number in group),
+        group=group,
+        place=model.unknown.body,
+        places=places,
+        level=LEVEL,
+        largest=model.largest,
+        path=model.follow(np.array([one.force for one in found])) if found else None,
+        reason=_reason(model, found, group),
+    )
+
+
+def _filled(rows: object, shape: tuple[int, ...]) -> np.ndarray:
+    """Return rows as an array, NaN beyond their number."""
+    values = np.full(shape, np.nan)
+    given = np.asarray(rows, float)
+    values[: len(given)] = given.reshape(len(given), *shape[1:])
+    return values
+
+
+def _reason(model: SensingModel, found: list[Candidate], group: Int[np.ndarray, " s"]) -> str:
+    """Return why the history ended before its last reading."""
+    if len(found) == len(model.readings):
+        return ""
+    number = len(found)
+    state, force = (found[-1].state, found[-1].force) if found else (None, np.zeros(model.size))
+    path = model.solve(state, number, force[None])
+    reading = int(np.argmax(group == number)) + 1
+    return f"reading {reading} of {len(group)}: {path.reason[0]}"

@@ -1,0 +1,126 @@
+"""Readings from a CSV table, and what was sensed as columns and as a document."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+
+from notchflex._quantity import DEGREES
+from notchflex.errors import InputError
+from notchflex.results.files.csv_reading import Table, no_tendon_column, read_table, tendon_columns
+from notchflex.results.files.json import document_head
+from notchflex.results.quantities.registry import AXES, QUANTITIES
+from notchflex.robot import Robot
+from notchflex.sensing.sensed import SensedForce
+
+BESIDE = ("tip", "angles")
+"""What may be read beside tensions and strokes."""
+
+
+def read_sensor_table(
+    file: str, robot: Robot, beside: Collection[str] = ()
+) -> dict[str, np.ndarray]:
+    """Read tensions and strokes of a table, one row a reading; empty entries were not measured.
+
+    Args:
+        file: A CSV with `tendon_force_N` and `tendon_displacement_mm`, of several tendons
+            `tendon_1_force_N` and so on.
+        robot: The robot that was read.
+        beside: What else is read, of `BESIDE`: `tip_x_mm`, ... or `notch_1_deg`, ...
+
+    Returns:
+        The readings by argument of `notchflex.sense`.
+
+    Raises:
+        InputError: No such table or column, or an entry that is not a number.
+    """
+    table, tendons = read_table(file), robot.number_of_tendons
+    read: dict[str, np.ndarray] = {}
+    for argument, quantity in (("tensions", "tension"), ("strokes", "stroke")):
+        columns = tendon_columns(table.header, quantity, tendons)
+        read[argument] = _columns(table, columns, tendons)
+    if np.isnan(read["tensions"]).all() and np.isnan(read["strokes"]).all():
+        raise no_tendon_column(table, tendons)
+    if "tip" in beside:
+        names = {i: QUANTITIES["tip_position"].header(axis=axis) for i, axis in enumerate(AXES)}
+        read["tip"] = _wanted(table, names, len(AXES))
+    if "angles" in beside:
+        count = robot.number_of_notches
+        names = {i: QUANTITIES["notch_angle"].header(notch=i + 1) for i in range(count)}
+        read["angles"] = _wanted(table, names, count) / DEGREES
+    return read
+
+
+def _wanted(table: Table, names: dict[int, str], width: int) -> np.ndarray:
+    there = {place: name for place, name in names.items() if name in table.header}
+    if not there:
+        raise InputError.TABLE_COLUMNS(
+            f"{table.name}: there is no column {next(iter(names.values()))}; {table.columns}."
+        )
+    return _columns(table, there, width)
+
+
+def _columns(table: Table, columns: dict[int, str], width: int) -> np.ndarray:
+    values = np.full((len(table), width), np.nan)
+    for place, name in columns.items():
+        values[:, place] = table.numbers(name, may_miss=True)
+    return values
+
+
+def sensed_columns(sensed: SensedForce) -> dict[str, Any]:
+    """Return columns of a table: force, interval and standard deviation of every reading."""
+    columns: dict[str, Any] = {"reading": range(1, len(sensed) + 1)}
+    for which, name in enumerate(sensed.components):
+        columns |= {
+            f"force_{name}_N": sensed.force[:, which],
+            f"force_{name}_low_N": sensed.low[:, which],
+            f"force_{name}_high_N": sensed.high[:, which],
+            f"force_{name}_sd_N": sensed.deviation[:, which],
+            f"force_{name}_stuck": sensed.stuck[:, which],
+        }
+    columns["averaged_as"] = sensed.group + 1
+    columns["contact"] = sensed.contact
+    columns["contact_p"] = sensed.contact_probability
+    columns["misfit"] = sensed.misfit
+    return columns
+
+
+def sensed_document(sensed: SensedForce) -> dict[str, Any]:
+    """Return what was sensed as a document of plain values and arrays, for JSON."""
+    names = sensed.components
+    readings = [
+        {
+            "reading": number + 1,
+            "converged": bool(sensed.converged[number]),
+            "force_N": dict(zip(names, sensed.force[number], strict=True)),
+            "low_N": dict(zip(names, sensed.low[number], strict=True)),
+            "high_N": dict(zip(names, sensed.high[number], strict=True)),
+            "limited": dict(zip(names, sensed.limited[number].tolist(), strict=True)),
+            "stuck": dict(zip(names, sensed.stuck[number].tolist(), strict=True)),
+            "covariance_N2": sensed.covariance[number],
+            "contact": bool(sensed.contact[number]),
+            "contact_p": float(sensed.contact_probability[number]),
+            "misfit": float(sensed.misfit[number]),
+            "numbers_read": int(sensed.read[number]),
+            "averaged_as": int(sensed.group[number]) + 1,
+            "not_observable": sensed.hidden[number],
+        }
+        for number in range(len(sensed))
+    ]
+    return {
+        **document_head(sensed.robot),
+        "components": list(names),
+        "place": "tip" if sensed.place is None else sensed.place,
+        "places": [
+            {"place": "tip" if place is None else place, "misfit": misfit}
+            for place, misfit in sensed.places.items()
+        ],
+        "level": sensed.level,
+        "largest_N": sensed.largest,
+        "converged": not sensed.reason,
+        "reason": sensed.reason,
+        "notes": sensed.not_observable,
+        "readings": readings,
+    }

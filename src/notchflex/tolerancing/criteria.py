@@ -1,0 +1,117 @@
+"""Acceptance limits of one robot under its loads: which number of which result must lie where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex._quantity import REGISTERED, Quantity
+from notchflex.errors import InputError
+from notchflex.results.path import EquilibriumPath
+from notchflex.results.quantities.registry import holds
+from notchflex.tolerancing.spec import AXES, INDICES, AcceptanceLimit, ToleranceSpec
+
+_FIRST = {"body": 0}
+"""The number of the first entry along an axis, where it is not 1."""
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One number of a result with its limits, in mm, N, MPa and rad.
+
+    Attributes:
+        name: What it is called, such as `notch_angle[3] at pulled`.
+        quantity: Its quantity.
+        load: Name of the load.
+        step: Step of the load, from 0.
+        index: Place within the quantity of one step.
+        lower: Smallest value that is accepted; -inf where there is none.
+        upper: Largest value that is accepted; inf where there is none.
+    """
+
+    name: str
+    quantity: Quantity
+    load: str
+    step: int
+    index: tuple[int, ...]
+    lower: float
+    upper: float
+
+    def of(self, values: np.ndarray) -> Float[np.ndarray, " rows"]:
+        """Return the number of every row of what a batch returns, steps as second axis."""
+        return values[(slice(None), self.step, *self.index)]
+
+
+def criteria_of(spec: ToleranceSpec, paths: Mapping[str, EquilibriumPath]) -> list[Criterion]:
+    """Find the numbers that limits are about.
+
+    Args:
+        spec: The limits.
+        paths: The robot of the drawing under every load.
+
+    Raises:
+        InputError: A robot or a load has no such entry or step.
+    """
+    found: list[Criterion] = []
+    for limit in spec.limits:
+        load = spec.load_of(limit)
+        found += _criteria(limit, load, paths[load], len(paths) > 1)
+    return found
+
+
+def _criteria(
+    limit: AcceptanceLimit, load: str, path: EquilibriumPath, named: bool
+) -> Iterator[Criterion]:
+    quantity, steps = REGISTERED[limit.quantity], len(path)
+    step = steps if limit.step is None else limit.step
+    if step > steps:
+        raise InputError.OUT_OF_RANGE(
+            f"the limit of {limit.quantity} has step {step}, but the load {load} has {steps}."
+        )
+    if not holds(path, quantity):
+        raise InputError.UNSUPPORTED(
+            f"there is no {limit.quantity} of this robot; choose another quantity."
+        )
+    values = np.asarray(path.quantity(limit.quantity))[step - 1]
+    choices = [
+        _places(limit, axis, size) for axis, size in zip(quantity.per, values.shape, strict=True)
+    ]
+    at = [f"at {load}"] if named else []
+    at += [f"step {step}"] if limit.step is not None else []
+    lower, upper = (
+        default if end is None else float(end)
+        for end, default in ((limit.lower, -np.inf), (limit.upper, np.inf))
+    )
+    for place in np.ndindex(*map(len, choices)):
+        index = tuple(choice[one] for choice, one in zip(choices, place, strict=True))
+        if not np.isfinite(values[index]):  # beyond the end of a tendon
+            continue
+        words = " ".join([_entry(limit.quantity, quantity.per, index), ", ".join(at)]).strip()
+        yield Criterion(words, quantity, load, step - 1, index, lower, upper)
+
+
+def _places(limit: AcceptanceLimit, axis: str, size: int) -> Sequence[int]:
+    """Return the places along an axis that a limit is about."""
+    number = getattr(limit, axis) if axis in INDICES else None
+    if axis == "axis":
+        return [AXES.index(number)]
+    if number is None:
+        return range(size)
+    first = _FIRST.get(axis, 1)
+    if not first <= number < first + size:
+        raise InputError.OUT_OF_RANGE(
+            f"the limit of {limit.quantity} names {axis} {number}; "
+            f"give a number from {first} to {first + size - 1}."
+        )
+    return [number - first]
+
+
+def _entry(name: str, per: tuple[str, ...], index: tuple[int, ...]) -> str:
+    words = [
+        AXES[place] if axis == "axis" else str(place + _FIRST.get(axis, 1))
+        for axis, place in zip(per, index, strict=True)
+    ]
+    return f"{name}[{','.join(words)}]" if words else name

@@ -1,0 +1,124 @@
+"""A tolerance analysis in files: a document for JSON, and columns with a row for every robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from notchflex.results.files.json import document_head
+from notchflex.tolerancing.linear import WORST_SD
+from notchflex.tolerancing.result import ToleranceAnalysis
+from notchflex.tolerancing.study import CODES
+
+PERCENTILES = (2.5, 50.0, 97.5)
+
+
+def tolerance_document(found: ToleranceAnalysis) -> dict[str, Any]:
+    """Return a tolerance analysis as a document of plain values, at the edge units.
+
+    Args:
+        found: The analysis.
+
+    Returns:
+        `yield` (with `interval`), `limits`, one for each number that has limits, and `sources`, one
+        for each deviation. Angles in deg, lengths in mm, forces in N.
+    """
+    low, high = found.interval
+    return {
+        **document_head(found.robot),
+        "draws": found.draws,
+        "seed": found.seed,
+        "tolerances": {one.value: one.written for one in found.tolerances},
+        "assumed": list(found.assumed),
+        "yield": {
+            "accepted": found.accepted_fraction,
+            "interval": [low, high],
+            "wanted": found.wanted_yield,
+            "counts": found.counts,
+        },
+        "worst_case_sd": WORST_SD,
+        "limits": _limits(found),
+        "sources": _sources(found),
+        "sobol_robots": found.sobol.robots,
+        "sobol_failed": found.sobol.failed,
+        "control_robots": found.control.robots,
+    }
+
+
+def _limits(found: ToleranceAnalysis) -> list[dict[str, Any]]:
+    parts = [found.percentile(part / 100.0) for part in PERCENTILES]
+    below, above, linear = found.below, found.above, found.linear
+    documents: list[dict[str, Any]] = []
+    for index, one in enumerate(found.criteria):
+        scale = one.quantity.scale
+        documents.append(
+            {
+                "name": one.name,
+                "quantity": one.quantity.name,
+                "unit": one.quantity.unit,
+                "load": one.load,
+                "step": one.step + 1,
+                "lower": _number(one.lower * scale),
+                "upper": _number(one.upper * scale),
+                "drawing": linear.nominal[index] * scale,
+                "worst_case": linear.worst_case[index] * scale,
+                "rss_mean": linear.mean[index] * scale,
+                "rss_sd": linear.sd[index] * scale,
+                "percentiles": {
+                    f"{level:g}": part[index] * scale
+                    for level, part in zip(PERCENTILES, parts, strict=True)
+                },
+                "below": below[index],
+                "above": above[index],
+            }
+        )
+    return documents
+
+
+def _sources(found: ToleranceAnalysis) -> list[dict[str, Any]]:
+    """Return what is found of every deviation; lists are in the order of `limits`."""
+    factor = found.control.factor
+    documents: list[dict[str, Any]] = []
+    for index, name in enumerate(found.sources):
+        scales = np.array([one.quantity.scale for one in found.criteria])
+        documents.append(
+            {
+                "name": name,
+                "one_sd": found.linear.spread[:, index] * scales,
+                "variance_share": found.linear.share[:, index],
+                "sobol_first": found.sobol.first[:-1, index],
+                "sobol_total": found.sobol.total[:-1, index],
+                "sobol_total_of_acceptance": found.sobol.total[-1, index],
+                "yield_if_exact": found.control.exact[index],
+                "allowed_factor": None if factor is None else factor[index],
+            }
+        )
+    return documents
+
+
+def tolerance_columns(found: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
+    """Return the drawn robots as columns: their numbers, those with limits, and what became of it.
+
+    Args:
+        found: The analysis.
+
+    Returns:
+        `robot` from 1, the numbers that deviate by name (mm, N, MPa, deg), the numbers that have
+        limits with their unit, empty where there is no result, and `outcome`: accepted, rejected,
+        NOT_CONVERGED or INVALID_ROBOT.
+    """
+    outcomes = found.drawn.outcomes
+    columns: dict[str, Sequence[Any]] = {"robot": range(1, found.draws + 1)}
+    columns |= {name: values.tolist() for name, values in found.drawn.numbers.items()}
+    for one, values in zip(found.criteria, outcomes.values.T, strict=True):
+        unit = f" [{one.quantity.unit}]" if one.quantity.unit else ""
+        columns[f"{one.name}{unit}"] = (values * one.quantity.scale).tolist()
+    columns["outcome"] = [CODES[code] for code in outcomes.codes]
+    return columns
+
+
+def _number(value: float) -> float | None:
+    """Return a limit as it was given: turned to rad and back it has a rounding error."""
+    return float(f"{value:.12g}") if np.isfinite(value) else None

@@ -1,0 +1,116 @@
+"""Workspaces in files: a JSON document of what was found, and a data set of all states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from notchflex._extras import need
+from notchflex._quantity import DEGREES
+from notchflex.results.files.json import document_head
+from notchflex.results.files.writing import replacing
+from notchflex.results.quantities.registry import AXES
+from notchflex.workspaces.cloud import Workspace
+from notchflex.workspaces.comparing import Overlap
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+_PARTS = (0.05, 0.5, 0.95)
+
+
+def workspace_document(found: Workspace) -> dict[str, Any]:
+    """Return what was found as a document of plain values, at the units of files."""
+    document: dict[str, Any] = {
+        **document_head(found.robot),
+        "limits": [one.text for one in found.limits],
+        "largest_tension_N": found.largest,
+        "states": {
+            "solved": found.tried,
+            "kept": len(found),
+            "not_converged": found.failed,
+            "beyond_limits": found.beyond,
+        },
+    }
+    if not len(found):
+        return document
+    hull, voxels = found.hull, found.voxels()
+    low, high = found.extent
+    return document | {
+        "extent_mm": {axis: [low[i], high[i]] for i, axis in enumerate(AXES)},
+        "convex_hull": {"dimension": hull.dimension, "size": hull.size, "unit": hull.unit},
+        "alpha_shape": {"size": found.alpha_size(), "unit": hull.unit},
+        "total_angle_deg": _spread(found.angle * DEGREES),
+        "peak_strain": _spread(found.strain),
+        "tension_N": _spread(found.tension.max(axis=1)),
+        "hysteresis_mm": _spread(found.hysteresis),
+        "softest_stiffness_N_mm": _spread(found.stiffness),
+        "voxels": {
+            "edge_mm": voxels.size,
+            "count": len(voxels),
+            "dexterity_mean": float(voxels.dexterity.mean()),
+            "dexterity_largest": float(voxels.dexterity.max()),
+        },
+    }
+
+
+def _spread(values: np.ndarray) -> dict[str, float | None]:
+    good = values[np.isfinite(values)]
+    if not len(good):
+        return {"p5": None, "p50": None, "p95": None, "largest": None}
+    parts = np.quantile(good, _PARTS)
+    named: dict[str, float | None] = {
+        f"p{100 * part:g}": float(one) for part, one in zip(_PARTS, parts, strict=True)
+    }
+    return named | {"largest": float(good.max())}
+
+
+def overlap_documents(found: Sequence[Overlap]) -> list[dict[str, Any]]:
+    """Return comparisons as plain values."""
+    return [vars(one) for one in found]
+
+
+def dataset_of(found: Workspace) -> Dataset:
+    """Return all states as a labelled data set."""
+    need("xarray", "data", "to_xarray")
+    import xarray
+
+    states = {
+        "tension": (("state", "tendon"), found.tension, "N", "tendon tension at the base"),
+        "tip_position": (("state", "axis"), found.tip, "mm", "position of the tip in the world"),
+        "tip_direction": (("state", "axis"), found.direction, "1", "along the tube at the tip"),
+        "loading": ("state", found.loading, "1", "whether the state lies on the way up"),
+        "peak_strain": ("state", found.strain, "1", "largest strain of any fibre"),
+        "total_angle": ("state", found.angle, "rad", "total bending angle"),
+        "hysteresis": ("state", found.hysteresis, "mm", "distance to the tip on the other way"),
+        "stiffness": ("state", found.stiffness, "N/mm", "of the tip where it is softest"),
+    }
+    return xarray.Dataset(
+        {
+            name: (dims, values, {"units": unit, "long_name": text})
+            for name, (dims, values, unit, text) in states.items()
+        },
+        coords={"axis": list(AXES), "tendon": np.arange(found.tension.shape[1]) + 1},
+        attrs={
+            "robot": found.robot.name,
+            "limits": "; ".join(one.text for one in found.limits),
+            "largest_tension_N": found.largest,
+        },
+    )
+
+
+def save_netcdf(found: Mapping[str, Workspace], target: str) -> None:
+    """Write the states as NetCDF, each robot a group where there are several; whole or not at all.
+
+    Raises:
+        InputError: A package is missing, or the file cannot be written.
+    """
+    for module in ("xarray", "h5netcdf", "h5py"):
+        need(module, "data", "--nc")
+    with replacing(target) as temporary:
+        for number, (label, one) in enumerate(found.items()):
+            group = label.replace("/", "-") if len(found) > 1 else None
+            mode = "a" if number else "w"
+            dataset_of(one).to_netcdf(temporary, engine="h5netcdf", group=group, mode=mode)

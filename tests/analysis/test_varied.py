@@ -1,0 +1,117 @@
+"""Batches of robots that differ by a few numbers, against the same robots made one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.analysis.varied import varied_chains as varied
+from notchflex.analysis.varied.sparse_polynomial import fit_polynomial, leja_points
+from notchflex.robot.varied import VariedRobots
+from refusals import refused
+
+WRIST = nf.load_robot("pacheco2021-a")
+RANDOM = np.random.default_rng(5)
+OUTPUTS = ("total_angle", "notch_angle", "tip_position", "peak_strain", "tension", "converged")
+
+
+def some(robot, widths, count):
+    return VariedRobots(
+        robot,
+        {
+            name: robot_value + width * RANDOM.uniform(-1.0, 1.0, count)
+            for name, (robot_value, width) in widths.items()
+        },
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "widths", "path"),
+    [
+        (
+            "pacheco2021-a",
+            {"notch.depth": (1.4, 0.01), "tube.inner_diameter": (1.4, 0.01),
+             "material.elastic_modulus": (1e4, 500.0), "friction.coefficient": (0.13, 0.02)},
+            nf.pull(0.5, 1.0, steps=2).release(),
+        ),
+        (
+            "pacheco2021-a",
+            {f"notch[{n}].depth": (1.4, 0.005) for n in range(1, 6)}
+            | {"notch.height": (0.8, 0.01)},
+            nf.pull(0.5, 1.0, steps=2).loaded(tip_force=(0.01, 0.005, 0.0)),
+        ),
+        (
+            "two-axis-wrist",
+            {"notch.height": (0.5, 0.01), "tendon.radius": (0.7, 0.005)},
+            nf.LoadPath(tension=[[0.5, 0.2, 0.0, 0.0]], stroke=[[np.nan] * 4]),
+        ),
+    ],
+)  # fmt: skip
+def test_rows_are_those_of_the_robots(name, widths, path, monkeypatch):
+    robot = nf.load_robot(name)
+    if name == "two-axis-wrist":
+        widths = {"notch.height": (robot.notches[0].height, 0.005),
+                  "material.elastic_modulus": (robot.material.elastic_modulus, 500.0)}  # fmt: skip
+        tensions = [[0.5, 0.2, 0.0, 0.0][: robot.number_of_tendons]]
+        path = nf.LoadPath(tension=tensions, stroke=[[np.nan] * robot.number_of_tendons])
+    robots = some(robot, widths, 1200)
+    found = nf.simulate_batch(robots, path, outputs=OUTPUTS)
+    assert varied.varied_chains(robots, path, 0) is not None
+    rows = [0, 7, 1199]
+    exact = nf.simulate_batch([robots[row] for row in rows], path, outputs=OUTPUTS)
+    for name in OUTPUTS:
+        size = np.abs(exact[name]).max()
+        np.testing.assert_allclose(found[name][rows], exact[name], rtol=0.0, atol=1e-5 * size)
+
+
+def test_few_robots_are_made_one_by_one():
+    robots = some(WRIST, {"notch.depth": (1.4, 0.01)}, 8)
+    load = nf.Load(tension=1.0)
+    assert varied.varied_chains(robots, nf.pull(1.0, 1.0, steps=1), 0) is None
+    found = nf.solve_batch(robots, load)
+    assert found["total_angle"][3] == nf.solve_batch(robots[3], load)["total_angle"][0]
+
+
+def test_a_depth_that_changes_the_form_is_no_polynomial():
+    # Past the tube axis the farthest fibre is another one: a kink.
+    robots = some(WRIST, {"notch.depth": (0.81, 0.2)}, 1000)
+    assert varied.varied_chains(robots, nf.pull(1.0, 1.0, steps=1), 0) is None
+
+
+def test_numbers_that_make_no_robot_are_found():
+    depths = [1.4, 1.7, 1.3]  # of 1.62
+    assert VariedRobots(WRIST, {"notch.depth": depths}).valid().tolist() == [True, False, True]
+    corner = VariedRobots(WRIST, {"notch[2].depth": depths[::2], "tube.inner_diameter": [1.3, 1.4]})
+    assert corner.valid().all()
+
+
+def test_numbers_that_cannot_be_varied():
+    with refused("UNKNOWN_NAME"):
+        VariedRobots(WRIST, {"notch.dept": [1.0]})
+    with refused("WRONG_SHAPE"):
+        VariedRobots(WRIST, {"notch.depth": [1.4, 1.39], "notch.height": [0.8]})
+
+
+def test_a_polynomial_finds_what_a_polynomial_is():
+    def exact(x):
+        return np.array([x[0] ** 3 * x[1] + 2.0, x[1] * x[2], 5.0])
+
+    made = fit_polynomial(
+        exact, np.array([0.5, 1.0, -1.0]), np.array([1.0, 2.0, 3.0]), [[0, 1, 2]],
+        lambda sizes: np.maximum(sizes, 1e-6), [np.array([0]), np.array([1]), np.array([2])],
+        tolerance=1e-9, aim=1e-10, most=500, checks=np.array([[0.7, 1.3, 2.0]]),
+    )  # fmt: skip
+    assert made is not None
+    assert made.entries.tolist() == [0, 1]
+    numbers = RANDOM.uniform([0.5, 1.0, -1.0], [1.0, 2.0, 3.0], (50, 3))
+    both = np.stack([exact(row)[:2] for row in numbers], axis=-1)
+    np.testing.assert_allclose(made.varied(numbers), both, rtol=1e-10)
+    # Only the products that are needed: 3 and 1 degrees in the first, 1 and 1 in the second.
+    assert len(made.terms.powers) <= 4 * 2 + 2 * 2
+
+
+def test_leja_points_are_apart():
+    points = leja_points()
+    assert points[:3].tolist() == [0.0, -1.0, 1.0]
+    assert np.min(np.diff(np.sort(points))) > 0.01

@@ -1,0 +1,247 @@
+"""Decks of finite elements: their mesh, their tendons, and CalculiX running them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from fem_wrists import solid, wrist
+from notchflex.export.finite_elements.deck import ring_layers
+from notchflex.export.finite_elements.half_tube import half_tube
+from notchflex.export.finite_elements.options import DeckOptions
+from notchflex.export.finite_elements.rings import RingMotion, read_rings
+from notchflex.export.finite_elements.tendon_spans import tendon_spans
+from reference_data import named_rows
+from refusals import refused
+
+COARSE = DeckOptions.of_mesh("coarse")
+MEDIUM = DeckOptions.of_mesh("medium")
+
+needs_ccx = pytest.mark.skipif(
+    shutil.which("ccx") is None, reason="needs ccx, of Debian's package calculix-ccx"
+)
+
+
+def one_notch(**keys: Any) -> nf.Robot:
+    """One off-axis notch between two rings, linear elastic."""
+    notch = {"depth": 1.4, "height": 0.8, "uncut_length": 1.2}
+    return nf.Robot(
+        name="one notch",
+        tube=nf.Tube(1.62, 1.40, base_length=1.2),
+        notch=(nf.ArcNotch("off-axis", **(notch | keys)),),
+        tendon=(nf.Tendon(0.70, path="straight"),),
+        material=nf.Linear(60_000.0, poisson_ratio=0.33),
+        friction=nf.Frictionless(),
+    )
+
+
+def run(subject: Any, options: DeckOptions, folder: Path) -> RingMotion:
+    """Write a deck, run CalculiX as the deck says, read the rings."""
+    robot = subject if isinstance(subject, nf.Robot) else subject.robot
+    nf.export_robot(subject, folder / "deck.inp", options)
+    alone = {**os.environ, "OMP_NUM_THREADS": "1"}
+    subprocess.run(["ccx", "deck"], cwd=folder, env=alone, check=True, capture_output=True)
+    return read_rings(half_tube(robot, options), (folder / "deck.dat").read_text())
+
+
+def jacobians(mesh: Any) -> np.ndarray:
+    """Return 8 times the determinant at 27 Gauss points of every element, with their weights."""
+    corners = np.array(
+        [
+            *[(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1)],
+            *[(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)],
+            *[(0, -1, -1), (1, 0, -1), (0, 1, -1), (-1, 0, -1)],
+            *[(0, -1, 1), (1, 0, 1), (0, 1, 1), (-1, 0, 1)],
+            *[(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)],
+        ]
+    )
+    at, weight = np.polynomial.legendre.leggauss(3)
+    points = np.stack(np.meshgrid(at, at, at, indexing="ij"), -1).reshape(-1, 3)
+    weights = np.einsum("i,j,k->ijk", weight, weight, weight).ravel()
+
+    def shape(x: np.ndarray) -> np.ndarray:
+        own = 1.0 + corners * x
+        middle = corners == 0
+        value = np.where(middle, 1.0 - x**2, own).prod(axis=1)
+        at_corner = ~middle.any(axis=1)
+        return np.where(at_corner, value * ((corners * x).sum(axis=1) - 2.0) / 8.0, value / 4.0)
+
+    step = 1e-5
+    slopes = [
+        np.stack([(shape(x + e) - shape(x - e)) / (2 * step) for e in step * np.eye(3)])
+        for x in points
+    ]
+    place = mesh.place[mesh.elements - 1]
+    found = [np.linalg.det(np.einsum("an,mnb->mab", slope, place)) for slope in slopes]
+    return np.array(found) * weights[:, None]
+
+
+@pytest.mark.parametrize("cut", ["on-axis", "off-axis"])
+def test_the_mesh_fills_half_of_the_tube(cut):
+    robot = one_notch().replace(
+        notch=tuple(
+            nf.ArcNotch(cut, depth=depth, height=0.8, uncut_length=1.2) for depth in (1.3, 1.42)
+        )
+    )
+    mesh = half_tube(robot, MEDIUM)
+    parts = jacobians(mesh)
+    assert parts.min() > 0.0
+    tube = np.pi * (0.81**2 - 0.70**2)
+    section = nf.annular_sector if cut == "on-axis" else nf.annular_segment
+    areas = [float(section(0.81, 0.70, depth).area) for depth in (1.3, 1.42)]
+    volume = 0.5 * (3 * 1.2 * tube + 0.8 * sum(areas))
+    assert parts.sum() == pytest.approx(volume, rel=1e-4)
+    assert len(np.unique(mesh.elements)) == len(mesh.place)
+
+
+def test_nodes_lie_on_the_cuts():
+    mesh = half_tube(one_notch(), MEDIUM)
+    middle = mesh.faces[0].sum() // 2
+    edge = mesh.nodes[:, mesh.opening, middle]
+    assert mesh.place[edge - 1, 0] == pytest.approx(0.81 - 1.4)
+    assert (mesh.nodes[:, mesh.opening + 1 :, middle] == -1).all()
+    assert mesh.heights[mesh.faces[0]] == pytest.approx([1.2, 2.0])
+
+
+def test_tendons_run_from_edge_to_edge():
+    robot = wrist("A", 0.13)
+    mesh = half_tube(robot, COARSE)
+    tension = np.linspace(1.0, 0.9, 10)
+    spans = tendon_spans(robot, mesh, 0, tension)
+    assert [span.tension for span in spans] == pytest.approx(tension)
+    ends = np.array([[mesh.place[node - 1] for node in span.nodes] for span in spans])
+    assert ends[..., 0] == pytest.approx(0.70)
+    edges = np.array([0.0, 1.2, 2.0, 3.2, 4.0, 5.2, 6.0, 7.2, 8.0, 9.2, 10.0])
+    assert ends[:, 0, 2] == pytest.approx(edges[:-1])
+    assert ends[:, 1, 2] == pytest.approx(edges[1:])
+
+
+def test_without_a_base_the_tendon_starts_at_rest(wrist):
+    path = nf.simulate(wrist, nf.pull(0.0, 1.0, 3))
+    straight = wrist.replace(tendon=(nf.Tendon(0.70, path="straight"),))
+    mesh = half_tube(straight, COARSE)
+    spans = tendon_spans(straight, mesh, 0, path.span_tension[-1, 0])
+    assert spans[0].fixed == pytest.approx((0.70, 0.0, 0.0))
+    assert spans[0].tension == pytest.approx(path.span_tension[-1, 0, 1])
+
+
+def test_rings_are_read_as_rigid_motions():
+    robot = wrist("A")
+    mesh = half_tube(robot, COARSE)
+    turn, shift = 0.3, np.array([0.5, 0.0, -0.2])
+    c, s = np.cos(turn), np.sin(turn)
+    rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    rows = ["displacements (vx,vy,vz) for set NRINGS and time  1.0", ""]
+    for index in ring_layers(mesh):
+        for number in mesh.layer(index).tolist():
+            place = mesh.place[number - 1]
+            moved = rotation @ place + shift - place
+            rows.append(f" {number} " + " ".join(f"{value:.12e}" for value in moved))
+    found = read_rings(mesh, "\n".join(rows))
+    assert found.angle == pytest.approx(turn)
+    height = mesh.heights[ring_layers(mesh)]
+    middle = np.stack([0 * height, 0 * height, height], axis=1)
+    assert found.position == pytest.approx(middle @ rotation.T + shift)
+    with refused("NO_DATA", ".dat"):
+        read_rings(mesh, "")
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda: nf.load_robot("gao2017"), "u-link"),
+        (lambda: nf.load_robot("two-axis-wrist"), "notch 2"),
+        (lambda: one_notch(precurvature_deg=3.0), "precurvature"),
+        (lambda: one_notch(depth=1.55), "solid strip"),
+        (lambda: one_notch().with_value("tendon[1].radius", 0.4), "tendon[1].radius"),
+        (lambda: one_notch().with_value("tendon[1].direction_deg", 20.0), "20 deg"),
+        (lambda: one_notch(uncut_length=0.0), "uncut_length"),
+    ],
+    ids=["u-link", "direction", "precurvature", "strip", "radius", "beside", "no wall"],
+)
+def test_robots_that_the_mesh_cannot_have_are_refused(make, name):
+    robot = make()
+    with refused("UNSUPPORTED", name):
+        tendon_spans(robot, half_tube(robot, COARSE), 0, np.ones(2))
+
+
+def test_nothing_is_written_of_a_robot_that_is_refused(tmp_path):
+    with refused("UNSUPPORTED", "u-link"):
+        nf.export_robot(nf.load_robot("gao2017"), tmp_path / "a.inp", COARSE)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_deck_needs_a_load(tmp_path):
+    with refused("MISSING_VALUE", "tension"):
+        nf.export_robot(one_notch(), tmp_path / "a.inp", COARSE)
+
+
+def test_loads_that_a_deck_does_not_carry_are_refused(wrist, tmp_path):
+    path = nf.simulate(wrist, nf.pull(0.0, 0.5, 2))
+    path = replace(path, load=path.load.loaded(tip_force=(0.01, 0.0, 0.0)))
+    with refused("UNSUPPORTED", "forces"):
+        nf.export_robot(path, tmp_path / "a.inp", COARSE)
+
+
+@pytest.mark.parametrize(
+    ("keys", "code"),
+    [
+        ({"wall": 0}, "OUT_OF_RANGE"),
+        ({"notch": 2.5}, "OUT_OF_RANGE"),
+        ({"uncut": True}, "OUT_OF_RANGE"),
+        ({"tip_moment": float("nan")}, "NOT_FINITE"),
+    ],
+)
+def test_bad_options_are_refused(keys, code):
+    with refused(code, next(iter(keys))):
+        DeckOptions(**keys)
+
+
+def test_an_unknown_mesh_is_refused():
+    with refused("UNKNOWN_NAME", "coarse"):
+        DeckOptions.of_mesh("finest")  # type: ignore[arg-type]
+
+
+@needs_ccx
+@pytest.mark.nightly
+def test_single_notch_under_a_moment(tmp_path, margin):
+    """Between rigid plates, as a single notch of other meshes and of another program's set-up."""
+    moment, ring = 1e-3, 1.2
+    rows = named_rows("fem_notch_clamped.csv")
+    row = next(r for r in rows if (r["cut"], r["depth"], r["height"]) == ("off-axis", 1.3932, 0.8))
+    second = float(nf.annular_segment(0.81, 0.70, 1.3932).second_moment_weak)
+    known = moment * (0.8 + row["delta_weak"]) / (60e3 * second)
+    options = DeckOptions.of_mesh("medium", tip_moment=moment)
+    found = run(one_notch(depth=1.3932), options, tmp_path).notch_angle[0]
+    # The known rotation is that of the plates: half of each ring, as a beam, lies outside ours.
+    found += moment * ring / (60e3 * np.pi / 4 * (0.81**4 - 0.70**4))
+    margin.within("rotation", found / known - 1.0, 0.01)
+
+
+@needs_ccx
+@pytest.mark.nightly
+def test_wrist_a_on_a_coarse_mesh(tmp_path, margin):
+    case = solid("A_lin_mu013_medium")
+    level = [round(float(load.tension), 6) for load in case.loads].index(1.0)  # type: ignore[arg-type]
+    path = nf.simulate(case.robot, nf.pull(0.0, 1.0, 5))
+    found = np.degrees(run(path, COARSE, tmp_path).notch_angle)
+    margin.within("notch angles", found / case.angles[level] - 1.0, 0.03)
+
+
+@needs_ccx
+@pytest.mark.nightly
+def test_closed_notches_press_on_each_other(tmp_path):
+    """Beyond closing the angle stays near that of the chain; without contact it goes far on."""
+    robot = one_notch(height=0.2, ends="shell", closing="elastic")
+    path = nf.simulate(robot, nf.pull(0.0, 6.0, 11))
+    assert path.closed[-1, 0]
+    angle = run(path, COARSE, tmp_path).notch_angle[0]
+    assert angle == pytest.approx(path.notch_angle[-1, 0], rel=0.04)
