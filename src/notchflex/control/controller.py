@@ -196,7 +196,7 @@ class Controller:
             low = np.maximum(problem.low, self._command - self._rate)
             high = np.minimum(problem.high, self._command + self._rate)
             problem = problem._replace(low=np.minimum(low, high), high=high)
-        alone = np.count_nonzero(self._command) < 2
+        alone = bool(np.count_nonzero(self._command) < 2)
         found = find(problem, self._before, self._command, goal, self._known, over_bands=alone)
         failure, good = found.failure, found.response.converged and np.isfinite(found.error)
         code = failure.name if failure else ""
