@@ -78,7 +78,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize("target", BAD, ids=repr)
+@pytest.mark.parametrize("target", BAD, ids=range(len(BAD)))
 def test_a_bad_target_holds_the_last_command(target):
     controller = nf.Controller(WRIST)
     good = controller.step((2.4, 0.0, 9.307))

@@ -272,3 +272,16 @@ def test_workspace_within_limits():
     state = nf.solve(wrist, nf.Load(tension=float(careful.tension.max())))
     assert state.peak_strain.max() == pytest.approx(0.04, rel=2e-3)
     assert careful.angle.max() == pytest.approx(state.total_angle, abs=1e-6)
+
+
+def test_follow_with_hysteresis(margin):
+    """The tensions found are those at which a fine loop has the angles, on its own branch."""
+    names, _ = ran(14)
+    wrist, found, angle = names["wrist"], names["found"], names["angle"]
+    peak = float(found.tension[2, 0])
+    loop = nf.simulate(wrist, nf.pull(0.0, peak, steps=4001).release())
+    total, tension = loop.total_angle, loop.tension[:, 0]
+    for target, branch in ((0, slice(0, 4001)), (1, slice(0, 4001)), (3, slice(4001, None))):
+        at = np.argsort(total[branch], kind="stable")
+        expected = np.interp(angle[target], total[branch][at], tension[branch][at])
+        margin.within("tension", found.tension[target, 0] - expected, 1e-4, "N")

@@ -132,7 +132,7 @@ def find_anyhow(
     is not the deepest.
     """
     # Where other tendons move, a tendon slides within its dead band too.
-    alone = np.count_nonzero(start[problem.driven]) < 2
+    alone = bool(np.count_nonzero(start[problem.driven]) < 2)
     best = find(problem, before, start, goal, known, over_bands=alone)
     solves = best.solves
     if best.failure is not None:

@@ -71,7 +71,7 @@ class Controller:
         >>> from notchflex import load_robot
         >>> controller = Controller(load_robot("pacheco2021-a"), "total_angle")
         >>> [round(float(controller.step(angle)[0]), 3) for angle in (0.3, 0.6, 0.3)]
-        [0.318, 0.643, 0.275]
+        [0.322, 0.66, 0.307]
     """
 
     def __init__(
@@ -196,7 +196,7 @@ class Controller:
             low = np.maximum(problem.low, self._command - self._rate)
             high = np.minimum(problem.high, self._command + self._rate)
             problem = problem._replace(low=np.minimum(low, high), high=high)
-        alone = np.count_nonzero(self._command) < 2
+        alone = bool(np.count_nonzero(self._command) < 2)
         found = find(problem, self._before, self._command, goal, self._known, over_bands=alone)
         failure, good = found.failure, found.response.converged and np.isfinite(found.error)
         code = failure.name if failure else ""
