@@ -72,7 +72,7 @@ def test_half_the_points_have_the_same_hull(wrist):
 @pytest.mark.nightly
 def test_half_the_points_of_two_axes_have_the_same_hull():
     robot = nf.load_robot("two-axis-wrist")
-    one, half = (workspace(robot, states=count, tension=1.5) for count in (40_000, 20_000))
+    one, half = (workspace(robot, states=count, tension=6.9) for count in (40_000, 20_000))
     assert half.hull.size == pytest.approx(one.hull.size, rel=0.01)
     assert one.hull.dimension == 3
 
