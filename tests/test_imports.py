@@ -60,7 +60,6 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("results.equilibrium", "results.files.json"): _FILES,
     ("results.path", "results.files.dataframe"): _FILES,
     ("results.path", "results.files.dataset"): _FILES,
-    ("workspaces.cloud", "workspaces.files"): _FILES,
     ("results.equilibrium", "results.path"): _TYPE,
     ("results.reason", "results.path"): _TYPE,
     ("results.quantities.path_formulas", "results.path"): _TYPE,
