@@ -20,7 +20,7 @@ def test_nothing_is_said_within_bounds_or_without_them():
     linear = robot.with_values({"material.kind": "linear"})
     assert linear.material.allowed_strain == 0.08  # what both kinds share is kept
     assert (
-        path_warnings(fake_path(2, robot=linear.with_value("material.allowed_strain", 1.0))) == []
+        path_warnings(fake_path(2, robot=linear.with_value("material.allowed_strain", 0.5))) == []
     )
 
 

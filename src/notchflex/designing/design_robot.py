@@ -56,8 +56,8 @@ def design(
         >>> wish = {"quantity": "closing_angle", "take": "sum", "equal": 120.0}
         >>> height = {"value": "notch.height", "lower": 0.3, "upper": 1.2}
         >>> made = design({"robot": "pacheco2021-a", "variable": [height], "constraint": [wish]})
-        >>> f"{made.robot.notches[0].height:.4f} mm"
-        '0.6268 mm'
+        >>> f"{made.robot.notches[0].height:.3f} mm"
+        '0.627 mm'
     """
     asked, first = given(spec, robot)
     problems = problems_of(asked, first)

@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import array_module, constant, jax, jnp
 
-PLANE, IN_PLANE = np.array([1, 3, 5]), np.array([0, 2])
+PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 
 # Coefficients of sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 as polynomials in a^2, used for
 # angles up to one radian: with eleven terms the first one left out is below 1e-22 there. The

@@ -36,9 +36,9 @@ def flattened(rods: Rod, frame: Float[np.ndarray, "3 3"]) -> Rod:
     def own(name: str) -> Array:
         return constant(turned[name]) if name in turned else getattr(rods, name)
 
-    kept = {name: constant(np.take(getattr(rods, name), PLANE, axis=2)) for name in _TWISTS}
+    kept = {name: constant(getattr(rods, name)[:, :, PLANE]) for name in _TWISTS}
     kept |= {name: constant(getattr(rods, name)[:, :, 1:2]) for name in _TURNS}
-    kept["step"] = constant(np.take(rods.step, IN_PLANE, axis=2))
+    kept["step"] = constant(rods.step[:, :, IN_PLANE])
     kept |= {name: planar_points(own(name)) for name in _POINTS}
     kept |= {name: planar_rotations(own(name)) for name in _ROTATIONS}
     return dataclasses.replace(rods, **kept, turn_pair=None)
