@@ -1,0 +1,99 @@
+"""Finding a robot in a photograph: many starts, small first, then the few best in full."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.contrast import Contrast
+from notchflex.photographs.fitting import Fit, cost, refine
+from notchflex.photographs.outline import NUMBERS, OutlineModel
+from notchflex.photographs.start import COARSE, starts, with_tilts
+
+NEAR = 1.5
+"""Distance from the outline within which an edge counts as its own, px."""
+
+_COARSE_WIDTH = 40.0  # of the tube in the first fits, px
+_COARSE_REACHES = [14.0, 14, 12, 12, 10, 10, 8, 8, 6, 6, 5, 4, 4]
+_FINE_REACHES = [8.0, 8, 6, 6, 5, 5, 4, 4]
+_LAST_REACHES = [4.0, 4.0]
+_KEPT = 3
+_TILT = 0.06
+_SAME = math.radians(1.5)
+
+
+class Located(NamedTuple):
+    """The best fit of a robot, its model, and the next best that differs from it.
+
+    Attributes:
+        fit: The best.
+        model: The outline that was fitted.
+        cost: How badly it lies.
+        rival: Costs of other fits whose angles differ, with the largest difference, rad.
+    """
+
+    fit: Fit
+    model: OutlineModel
+    cost: float
+    rival: tuple[tuple[float, float], ...]
+
+
+def locate(table: ChainTable, contrast: Contrast) -> Located | None:
+    """Find a robot in a photograph; None if nothing there looks like a tube of its proportions."""
+    height, width = contrast.value.shape
+    middle = np.array([width - 1.0, height - 1.0]) / 2.0
+    factor = min(1.0, COARSE / max(width, height))
+    coarse = _coarse(table, contrast, factor, middle)
+    if not coarse:
+        return None
+    model = OutlineModel(table, base=1.2 * table.outer)
+    fits: list[tuple[float, Fit]] = []
+    for numbers in coarse:
+        for start in with_tilts(numbers, _TILT)[::2]:
+            quick = refine(model, contrast, start, _FINE_REACHES, middle, NEAR, quick=True)
+            fit = refine(model, contrast, quick.numbers, _LAST_REACHES, middle, NEAR)
+            fits.append((cost(fit, model), fit))
+    fits.sort(key=lambda one: one[0])
+    best_cost, best = fits[0]
+    rivals = [(other_cost, _differ(best, other)) for other_cost, other in fits[1:]]
+    return Located(best, model, best_cost, tuple(one for one in rivals if one[1] > _SAME))
+
+
+def _coarse(
+    table: ChainTable, contrast: Contrast, factor: float, middle: Numbers
+) -> list[Numbers]:
+    model = OutlineModel(table, 8, 6, base=1.2 * table.outer)
+    found: list[tuple[float, Numbers]] = []
+    low = contrast.reduced(factor)
+    low_middle = (middle + 0.5) * factor - 0.5
+    images: dict[float, Contrast] = {}
+    for start in starts(table, low, low_middle):
+        wide = 2.0 * table.outer * math.exp(start[3]) / factor
+        rough = min(1.0, _COARSE_WIDTH / wide)
+        rough = min(1.0, 2.0 ** (round(2.0 * math.log2(rough)) / 2.0))
+        image = images.setdefault(rough, contrast.reduced(rough))
+        numbers = _scaled(start, rough / factor)
+        fit = refine(
+            model, image, numbers, _COARSE_REACHES, (middle + 0.5) * rough - 0.5, NEAR, quick=True
+        )
+        found.append((cost(fit, model), _scaled(fit.numbers, 1.0 / rough)))
+    found.sort(key=lambda one: one[0])
+    kept: list[Numbers] = []
+    for _, numbers in found:
+        if all(np.abs(numbers - other)[NUMBERS:].max() > _SAME for other in kept):
+            kept.append(numbers)
+    return kept[:_KEPT]
+
+
+def _scaled(numbers: Numbers, factor: float) -> Numbers:
+    made = numbers.copy()
+    made[:2] *= factor
+    made[3] += math.log(factor)
+    return made
+
+
+def _differ(one: Fit, other: Fit) -> float:
+    return float(np.abs(one.numbers - other.numbers)[NUMBERS:].max())
