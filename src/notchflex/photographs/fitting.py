@@ -21,6 +21,7 @@ _PRIOR_KERF, _PRIOR_CUT = 0.01, 0.006  # of the outer diameter: how well notches
 _PRIOR_NEAR, _NEAR = 0.006, 0.006  # inverse distance of the camera, per outer diameter
 _EDGE = 0.25  # px: noise of an edge, against which the priors are weighed
 _LEAST_NOISE = 0.05  # px
+_CAP, _ALIKE = 4.0, 4.0  # residuals over their noise; edges that err as one
 LINE_SHIFT, ALL_SHIFT = 0.25, 0.5
 """How far the edges of one line, and all edges, are shifted together, px (standard deviations)."""
 
@@ -218,6 +219,16 @@ def cost(fit: Fit, model: OutlineModel) -> float:
     """Return how badly a fit lies, 0 to 1: edges that are missed count 1."""
     far = np.nan_to_num(np.abs(_without_shifts(fit, model)), nan=1.0)
     return float(np.minimum(far[fit.edges.looked], 1.0).mean()) if fit.edges.looked.any() else 1.0
+
+
+def misfit(fit: Fit, model: OutlineModel, noise: float) -> float:
+    """Return the capped sum of squares of residuals over an edge's noise; missed edges count most.
+
+    Neighbouring edges err alike, so that only some of them count.
+    """
+    far = np.abs(_without_shifts(fit, model)) / noise
+    capped = np.minimum(np.nan_to_num(far, nan=np.inf), _CAP) ** 2
+    return float(capped[fit.edges.looked].sum()) / _ALIKE
 
 
 def _without_shifts(fit: Fit, model: OutlineModel) -> Numbers:

@@ -18,7 +18,7 @@ MOST_SPREAD = math.radians(0.5)
 
 _LEAST_SCORE, _LEAST_SIDE, _LEAST_BASE, _LEAST_TIP, _LEAST_FACES = 0.7, 0.5, 0.35, 0.5, 0.35
 _MOST_NOISE = 0.6
-_RIVAL = 1.25
+_RIVAL = 12.0  # by how much the misfit of another shape must be larger
 _MADE = 0.04  # of the outer diameter: how far notches may differ from the robot file
 
 
@@ -90,8 +90,8 @@ def _of_spread(located: Located, deviation: Numbers, noise: float) -> str:
             f"the angle of notch {worst + 1} is uncertain by {math.degrees(deviation[worst]):.1f} "
             "deg (standard deviation)"
         )
-    for cost, differs in located.rival:
-        if cost < _RIVAL * located.cost + 0.01:
+    for worse, differs in located.rival:
+        if worse < _RIVAL:
             return (
                 "two shapes fit nearly alike; their angles differ by up to "
                 f"{math.degrees(differs):.1f} deg"

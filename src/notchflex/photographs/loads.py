@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from notchflex.errors import InputError
+from notchflex.photographs.measured import PHOTOGRAPH
 from notchflex.results.files.csv_reading import read_table
 from notchflex.robot import Robot
 
-PHOTOGRAPH = "photograph"
 _FIELDS = {"tension": r"(?P<tension>\d+(?:[.,]\d+)?)", "pull": r"(?P<pull>[^_]+?)"}
 
 

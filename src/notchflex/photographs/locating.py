@@ -9,7 +9,7 @@ import numpy as np
 
 from notchflex.photographs.chain_table import ChainTable, Numbers
 from notchflex.photographs.contrast import Contrast
-from notchflex.photographs.fitting import Fit, cost, refine
+from notchflex.photographs.fitting import Fit, cost, covariance, misfit, refine
 from notchflex.photographs.outline import NUMBERS, OutlineModel
 from notchflex.photographs.start import COARSE, starts, with_tilts
 
@@ -20,8 +20,9 @@ _COARSE_WIDTH = 40.0  # of the tube in the first fits, px
 _COARSE_REACHES = [14.0, 14, 12, 12, 10, 10, 8, 8, 6, 6, 5, 4, 4]
 _FINE_REACHES = [8.0, 8, 6, 6, 5, 5, 4, 4]
 _LAST_REACHES = [4.0, 4.0]
-_KEPT = 3
+_KEPT = 4
 _TILT = 0.06
+_EDGE_NOISE = 0.08  # px: no edge is known better
 _SAME = math.radians(1.5)
 
 
@@ -32,7 +33,8 @@ class Located(NamedTuple):
         fit: The best.
         model: The outline that was fitted.
         cost: How badly it lies.
-        rival: Costs of other fits whose angles differ, with the largest difference, rad.
+        rival: By how much more other fits whose angles differ miss the edges (`misfit`), with the
+            largest difference, rad.
     """
 
     fit: Fit
@@ -56,9 +58,12 @@ def locate(table: ChainTable, contrast: Contrast) -> Located | None:
             quick = refine(model, contrast, start, _FINE_REACHES, middle, NEAR, quick=True)
             fit = refine(model, contrast, quick.numbers, _LAST_REACHES, middle, NEAR)
             fits.append((cost(fit, model), fit))
-    fits.sort(key=lambda one: one[0])
-    best_cost, best = fits[0]
-    rivals = [(other_cost, _differ(best, other)) for other_cost, other in fits[1:]]
+    best_cost, best = min(fits, key=lambda one: one[0])
+    noise = max(_EDGE_NOISE, covariance(best, model)[1])
+    least = misfit(best, model, noise)
+    rivals = [
+        (misfit(other, model, noise) - least, _differ(best.numbers, other.numbers)) for _, other in fits
+    ]
     return Located(best, model, best_cost, tuple(one for one in rivals if one[1] > _SAME))
 
 
@@ -83,7 +88,7 @@ def _coarse(
     found.sort(key=lambda one: one[0])
     kept: list[Numbers] = []
     for _, numbers in found:
-        if all(np.abs(numbers - other)[NUMBERS:].max() > _SAME for other in kept):
+        if all(_differ(numbers, other) > _SAME for other in kept):
             kept.append(numbers)
     return kept[:_KEPT]
 
@@ -95,5 +100,8 @@ def _scaled(numbers: Numbers, factor: float) -> Numbers:
     return made
 
 
-def _differ(one: Fit, other: Fit) -> float:
-    return float(np.abs(one.numbers - other.numbers)[NUMBERS:].max())
+def _differ(one: Numbers, other: Numbers) -> float:
+    """Return by how much angles differ, rad: toward the same side of the photograph."""
+    seen = [np.sign(math.cos(numbers[4])) * numbers[NUMBERS:] for numbers in (one, other)]
+    apart = float(np.abs(seen[0] - seen[1]).max())
+    return apart if math.cos(one[4]) * math.cos(other[4]) > 0.0 else max(apart, 2.0 * _SAME)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex.fit.measurements.columns import measured_columns
+from notchflex.results.files.csv import write_csv
 from notchflex.robot import Robot
+
+PHOTOGRAPH = "photograph"
+"""Column with the name of the file; `calibrate` passes over it."""
 
 Numbers = NDArray[np.float64]
 
@@ -90,9 +96,20 @@ class MeasuredPhotographs:
 
     def columns(self) -> dict[str, list[Any]]:
         """Return the columns of the CSV that `calibrate` reads, the measured photographs only."""
-        from notchflex.photographs.tables import measured_columns
-
-        return measured_columns(self)
+        rows = [number for number, one in enumerate(self.photographs) if one.measured]
+        table: dict[str, list[Any]] = {PHOTOGRAPH: [one.source for one in self.measured]}
+        for name, texts in self.loads.items():
+            table[name] = [texts[row] for row in rows]
+        notches, tendons = self.robot.number_of_notches, self.robot.number_of_tendons
+        for column in measured_columns(notches, tendons, ()):
+            if column.quantity != "notch_angle":
+                continue
+            (notch,) = column.index
+            table[column.name] = [math.degrees(one.notch_angle[notch]) for one in self.measured]
+            table[column.deviation] = [
+                math.degrees(one.notch_angle_deviation[notch]) for one in self.measured
+            ]
+        return table
 
     def write_csv(self, target: str) -> None:
         """Write the measured photographs as the CSV that `calibrate` reads, `-` for output.
@@ -100,7 +117,5 @@ class MeasuredPhotographs:
         Raises:
             InputError: The file cannot be written.
         """
-        from notchflex.results.files.csv import write_csv
-
         table = self.columns()
         write_csv(target, list(table), zip(*table.values(), strict=True))

@@ -29,11 +29,7 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
     name = os.fspath(source)
     data = _bytes(name)
     _check_size(name, *_size_in_head(data))
-    cv2.setLogLevel(0)
-    try:
-        image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    except cv2.error:
-        image = None
+    image = _decoded(data)
     if image is None or image.ndim != 3:
         raise InputError.FILE_FORMAT(
             f"{name} is no photograph that can be read; give a PNG, JPEG or TIFF file"
@@ -42,21 +38,38 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
     return image
 
 
+def _decoded(data: bytes) -> Any:
+    """Return the picture, or None; OpenCV's own words on bad files are not shown."""
+    import cv2
+
+    logging: Any = getattr(cv2.utils, "logging", None)
+    level = None if logging is None else logging.setLogLevel(logging.LOG_LEVEL_SILENT)
+    try:
+        return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:
+        return None
+    finally:
+        if level is not None:
+            logging.setLogLevel(level)
+
+
 def _bytes(name: str) -> bytes:
     try:
         path = Path(name)
-        if path.is_dir():
-            raise InputError.FILE_FORMAT(f"{name} is a folder; name the photographs in it")
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError.OUT_OF_RANGE(
-                f"{name} is larger than {LARGEST_FILE / 1e6:.0f} MB; give a smaller photograph"
-            )
-        return path.read_bytes()
+        is_folder, size = path.is_dir(), path.stat().st_size
+        data = b"" if is_folder or size > LARGEST_FILE else path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
         raise InputError.FILE_NOT_FOUND(f"there is no photograph {name}") from None
     except (OSError, ValueError) as problem:
         words = getattr(problem, "strerror", None) or problem
         raise InputError.FILE_UNREADABLE(f"{name} cannot be read: {words}") from None
+    if is_folder:
+        raise InputError.FILE_FORMAT(f"{name} is a folder; name the photographs in it")
+    if size > LARGEST_FILE:
+        raise InputError.OUT_OF_RANGE(
+            f"{name} is larger than {LARGEST_FILE / 1e6:.0f} MB; give a smaller photograph"
+        )
+    return data
 
 
 def _size_in_head(data: bytes) -> tuple[int, int]:

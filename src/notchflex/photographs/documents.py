@@ -1,4 +1,4 @@
-"""Tables and documents of measured photographs."""
+"""The JSON document of measured photographs."""
 
 from __future__ import annotations
 
@@ -7,31 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.fit.measurements import columns
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.results.files.json import document_head
-
-PHOTOGRAPH = "photograph"
-"""Column with the name of the file; `calibrate` passes over it."""
-
-
-def measured_columns(found: MeasuredPhotographs) -> dict[str, list[Any]]:
-    """Return the columns of the CSV, one row for each photograph that was measured."""
-    rows = [number for number, one in enumerate(found.photographs) if one.measured]
-    kept = [found.photographs[row] for row in rows]
-    table: dict[str, list[Any]] = {PHOTOGRAPH: [one.source for one in kept]}
-    for name, texts in found.loads.items():
-        table[name] = [texts[row] for row in rows]
-    notches, tendons = found.robot.number_of_notches, found.robot.number_of_tendons
-    for column in columns.measured_columns(notches, tendons, ()):
-        if column.quantity == "notch_angle":
-            (notch,) = column.index
-            table[column.name] = [math.degrees(one.notch_angle[notch]) for one in kept]
-            table[column.deviation] = [
-                math.degrees(one.notch_angle_deviation[notch]) for one in kept
-            ]
-    return table
-
 
 def measured_document(found: MeasuredPhotographs) -> dict[str, Any]:
     """Return the JSON document: all photographs, the refused with their reasons."""
