@@ -1,6 +1,7 @@
 """Rendered photographs of known wrists against what `notchflex measure` finds in them.
 
-`python benchmarks/measured_photographs.py [COUNT] [FIRST]` prints one line per photograph and the totals.
+`python benchmarks/measured_photographs.py [COUNT] [FIRST]` prints one line per photograph and the
+totals.
 """
 
 import math

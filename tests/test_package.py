@@ -36,6 +36,7 @@ NAMES = [
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
     "DeckOptions", "Exported", "SimulatorOptions", "export_robot",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
+    "MeasuredPhotograph", "MeasuredPhotographs", "measure",
     "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
     "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
     "read_tolerance_spec",

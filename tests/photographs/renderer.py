@@ -87,7 +87,7 @@ def _camera(point: Numbers, scene: Scene) -> Numbers:
     turned = _turn(point, scene)
     width, height = scene.size
     offset = (np.array(scene.place) - [(width - 1) / 2, (height - 1) / 2]) / scene.scale
-    return turned + [offset[0], offset[1], scene.distance]
+    return turned + np.array([*offset, scene.distance])
 
 
 def _turn(vector: Numbers, scene: Scene) -> Numbers:
@@ -185,7 +185,10 @@ def _ring(frame, t, radius):
 
 
 def _sheet(frames, t, first, last, sign):
-    rows = [_ring(frame, t, r) for frame, r in zip(frames, np.linspace(first, last, len(frames)))]
+    rows = [
+        _ring(frame, t, r)
+        for frame, r in zip(frames, np.linspace(first, last, len(frames)), strict=True)
+    ]
     p, n = (np.stack(one) for one in zip(*rows, strict=True))
     corners = np.stack([p[:-1, :-1], p[:-1, 1:], p[1:, 1:], p[1:, :-1]], axis=2)
     normals = sign * 0.25 * (n[:-1, :-1] + n[:-1, 1:] + n[1:, 1:] + n[1:, :-1])

@@ -34,7 +34,9 @@ class Contrast:
 
         if factor >= 1.0:
             return self
-        small: Any = cv2.resize(self.value, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        small: Any = cv2.resize(
+            self.value, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA
+        )
         return Contrast(small, self.threshold, self.noise)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.results.files.json import document_head
 
+
 def measured_document(found: MeasuredPhotographs) -> dict[str, Any]:
     """Return the JSON document: all photographs, the refused with their reasons."""
     photographs = []

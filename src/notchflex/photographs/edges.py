@@ -14,6 +14,7 @@ STEP = 0.5
 """Distance of samples along a normal, px."""
 
 _BESIDE = 3.0  # how far out the background is looked at, px
+_BLURRED = 0.35  # contrast outside over that inside: what blur leaves of a sharp edge
 _LEAST_ROOM = 5.0  # gaps that are narrower show no background, px
 
 
@@ -64,8 +65,8 @@ def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbe
     place = steps[2:-2]
     far = round(_BESIDE / STEP)
     outside = np.minimum(np.arange(2, len(steps) - 2) + far, len(steps) - 1)
-    clear = smooth[:, outside] < contrast.threshold
     within = smooth[:, np.maximum(np.arange(2, len(steps) - 2) - far, 0)]
+    clear = smooth[:, outside] < np.maximum(contrast.threshold, _BLURRED * within)
     strong = within - smooth[:, outside] > 0.5 * contrast.threshold
     limit = np.minimum(reach, 0.6 * room)[:, None]
     allowed = peak & clear & strong & (np.abs(place)[None] <= limit)

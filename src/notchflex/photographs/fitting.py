@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +13,15 @@ from notchflex.photographs.contrast import Contrast
 from notchflex.photographs.edges import Edges, find_edges
 from notchflex.photographs.outline import NUMBERS, Numbers, Outline, OutlineModel
 
-ROBUST = 0.35
-"""Residual beyond which an edge counts less, px."""
+ROBUST = (0.35, 2.0)
+"""Least and largest residual beyond which an edge counts less, px."""
 
 _PRIOR_ROLL, _PRIOR_TILT = math.radians(10.0), math.radians(8.0)
 _PRIOR_KERF, _PRIOR_CUT = 0.01, 0.006  # of the outer diameter: how well notches are made
 _PRIOR_NEAR, _NEAR = 0.006, 0.006  # inverse distance of the camera, per outer diameter
 _EDGE = 0.25  # px: noise of an edge, against which the priors are weighed
 _LEAST_NOISE = 0.05  # px
+_FAR = 3.0  # px: an edge farther away belongs to something else
 _CAP, _ALIKE = 4.0, 4.0  # residuals over their noise; edges that err as one
 LINE_SHIFT, ALL_SHIFT = 0.25, 0.5
 """How far the edges of one line, and all edges, are shifted together, px (standard deviations)."""
@@ -76,7 +77,10 @@ def refine(
         if quick:
             numbers = _stepped(model, numbers, outline, edges, 0.25 * reach)
         else:
-            numbers = _solved(model, numbers, outline, edges, ROBUST)
+            typical = float(np.nanmedian(np.abs(edges.offset)))
+            numbers = _solved(
+                model, numbers, outline, edges, float(np.clip(2.5 * typical, *ROBUST))
+            )
     outline = model.outline(numbers)
     edges = find_edges(contrast, outline, max(reaches[-1], 3.0), middle)
     jacobian = _jacobian(model, numbers, outline.normal)
@@ -123,10 +127,11 @@ def _solved(
         seen = (model.outline(x[:count]).point[0][found] * normal).sum(axis=1)
         return np.concatenate([seen + columns @ x[count:] - target_along, (x - centre) / spread])
 
-    def jacobian(x: Numbers) -> Numbers:
+    def slopes(x: Numbers) -> Numbers:
         rows = _jacobian(model, x[:count], outline.normal)[found]
         return np.concatenate([np.hstack([rows, columns]), np.diag(1.0 / spread)])
 
+    jacobian: Any = slopes  # SciPy's types know its names of differences only
     low, high = (
         np.append(one, np.full(len(shift_spread), sign * np.inf))
         for one, sign in zip(_bounds(model, numbers), (-1.0, 1.0), strict=True)
@@ -206,7 +211,7 @@ def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], floa
     inverse_spread = np.append(1.0 / (spread * _EDGE), 1.0 / shift_spread)
     residual = _without_shifts(fit, model)[found]
     noise = max(1.4826 * float(np.median(np.abs(residual))), _LEAST_NOISE)
-    weight = 1.0 / (1.0 + (residual / max(ROBUST, noise)) ** 2)
+    weight = 1.0 / (1.0 + (residual / max(ROBUST[0], noise)) ** 2)
     normal = (rows * weight[:, None]).T @ rows / (noise**2 * _correlation(fit, model))
     normal += np.diag(inverse_spread**2)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
@@ -217,7 +222,7 @@ def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], floa
 
 def cost(fit: Fit, model: OutlineModel) -> float:
     """Return how badly a fit lies, 0 to 1: edges that are missed count 1."""
-    far = np.nan_to_num(np.abs(_without_shifts(fit, model)), nan=1.0)
+    far = np.nan_to_num(np.abs(_without_shifts(fit, model)) / _FAR, nan=1.0)
     return float(np.minimum(far[fit.edges.looked], 1.0).mean()) if fit.edges.looked.any() else 1.0
 
 

@@ -17,7 +17,7 @@ MOST_SPREAD = math.radians(0.5)
 """Standard deviation of an angle beyond which it is not reported, rad."""
 
 _LEAST_SCORE, _LEAST_SIDE, _LEAST_BASE, _LEAST_TIP, _LEAST_FACES = 0.7, 0.5, 0.35, 0.5, 0.35
-_MOST_NOISE = 0.6
+_MOST_NOISE = 1.0
 _RIVAL = 12.0  # by how much the misfit of another shape must be larger
 _MADE = 0.04  # of the outer diameter: how far notches may differ from the robot file
 
@@ -36,13 +36,10 @@ def doubt(located: Located, deviation: Numbers, noise: float) -> str:
 
 def _of_view(located: Located) -> str:
     fit, table = located.fit, located.model.table
-    x, _, _, log_scale, roll, tilt, _, kerf, cut = fit.numbers[:NUMBERS]
+    _, _, _, log_scale, roll, tilt, _, kerf, cut = fit.numbers[:NUMBERS]
     width = 2.0 * table.outer * math.exp(log_scale)
-    del x
     if width < LEAST_WIDTH:
-        return (
-            f"the tube is {width:.0f} pixels wide; it needs {LEAST_WIDTH:.0f} or more, go nearer"
-        )
+        return f"the tube is {width:.0f} pixels wide; it needs {LEAST_WIDTH:.0f} or more, go nearer"
     if abs(math.remainder(roll, math.pi)) > math.radians(25) or abs(tilt) > math.radians(18):
         return "the robot is not seen from the side: it is rolled or tilted too far"
     if max(abs(kerf), abs(cut)) > 2.0 * _MADE * table.outer:

@@ -33,9 +33,7 @@ def loads_of(
     return {} if pattern is None else _from_names(names, robot, pattern)
 
 
-def _from_table(
-    names: Sequence[str], source: str | os.PathLike[str]
-) -> dict[str, tuple[str, ...]]:
+def _from_table(names: Sequence[str], source: str | os.PathLike[str]) -> dict[str, tuple[str, ...]]:
     table = read_table(source)
     if PHOTOGRAPH not in table.header:
         raise InputError.TABLE_COLUMNS(

@@ -13,13 +13,14 @@ from notchflex.photographs.fitting import Fit, cost, covariance, misfit, refine
 from notchflex.photographs.outline import NUMBERS, OutlineModel
 from notchflex.photographs.start import COARSE, starts, with_tilts
 
-NEAR = 1.5
+NEAR = 2.0
 """Distance from the outline within which an edge counts as its own, px."""
 
 _COARSE_WIDTH = 40.0  # of the tube in the first fits, px
+_FINE_WIDTH = 100.0  # of the tube in the last fits, px: edges of sharp photographs are then sharp
 _COARSE_REACHES = [14.0, 14, 12, 12, 10, 10, 8, 8, 6, 6, 5, 4, 4]
 _FINE_REACHES = [8.0, 8, 6, 6, 5, 5, 4, 4]
-_LAST_REACHES = [4.0, 4.0]
+_LAST_REACHES = [5.0, 4.0, 4.0]
 _KEPT = 4
 _TILT = 0.06
 _EDGE_NOISE = 0.08  # px: no edge is known better
@@ -35,12 +36,14 @@ class Located(NamedTuple):
         cost: How badly it lies.
         rival: By how much more other fits whose angles differ miss the edges (`misfit`), with the
             largest difference, rad.
+        factor: By how much the photograph was made smaller for it.
     """
 
     fit: Fit
     model: OutlineModel
     cost: float
     rival: tuple[tuple[float, float], ...]
+    factor: float
 
 
 def locate(table: ChainTable, contrast: Contrast) -> Located | None:
@@ -51,10 +54,13 @@ def locate(table: ChainTable, contrast: Contrast) -> Located | None:
     coarse = _coarse(table, contrast, factor, middle)
     if not coarse:
         return None
+    wide = 2.0 * table.outer * math.exp(coarse[0][3])
+    fine = min(1.0, _FINE_WIDTH / wide)
+    contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
     model = OutlineModel(table, base=1.2 * table.outer)
     fits: list[tuple[float, Fit]] = []
     for numbers in coarse:
-        for start in with_tilts(numbers, _TILT)[::2]:
+        for start in with_tilts(_scaled(numbers, fine), _TILT)[::2]:
             quick = refine(model, contrast, start, _FINE_REACHES, middle, NEAR, quick=True)
             fit = refine(model, contrast, quick.numbers, _LAST_REACHES, middle, NEAR)
             fits.append((cost(fit, model), fit))
@@ -62,14 +68,13 @@ def locate(table: ChainTable, contrast: Contrast) -> Located | None:
     noise = max(_EDGE_NOISE, covariance(best, model)[1])
     least = misfit(best, model, noise)
     rivals = [
-        (misfit(other, model, noise) - least, _differ(best.numbers, other.numbers)) for _, other in fits
+        (misfit(other, model, noise) - least, _differ(best.numbers, other.numbers))
+        for _, other in fits
     ]
-    return Located(best, model, best_cost, tuple(one for one in rivals if one[1] > _SAME))
+    return Located(best, model, best_cost, tuple(one for one in rivals if one[1] > _SAME), fine)
 
 
-def _coarse(
-    table: ChainTable, contrast: Contrast, factor: float, middle: Numbers
-) -> list[Numbers]:
+def _coarse(table: ChainTable, contrast: Contrast, factor: float, middle: Numbers) -> list[Numbers]:
     model = OutlineModel(table, 8, 6, base=1.2 * table.outer)
     found: list[tuple[float, Numbers]] = []
     low = contrast.reduced(factor)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,17 +88,17 @@ def measure_picture(picture: NDArray[np.uint8], table: ChainTable, name: str) ->
 
     factor = min(1.0, math.sqrt(WORKED_ON / (picture.shape[0] * picture.shape[1])))
     if factor < 1.0:
-        picture = np.asarray(
-            cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-        )
+        smaller: Any = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        picture = smaller
     located = locate(table, contrast(picture))
     if located is None:
         return _refused(name, table, "no tube of the proportions of the robot is seen")
+    factor *= located.factor
     both, noise = covariance(located.fit, located.model)
     deviation = np.sqrt(np.maximum(np.diag(both)[NUMBERS:], 0.0))
-    shape = picture.shape[:2]
     reason = doubt(located, deviation, noise)
-    return _measured(name, located, both[NUMBERS:, NUMBERS:], (reason, noise, factor), shape)
+    middle = (np.array([picture.shape[1], picture.shape[0]]) * located.factor - 1.0) / 2.0
+    return _measured(name, located, both[NUMBERS:, NUMBERS:], (reason, noise, factor), middle)
 
 
 def _measured(
@@ -105,14 +106,13 @@ def _measured(
     located: Located,
     spread: Numbers,
     judged: tuple[str, float, float],
-    shape: tuple[int, int],
+    middle: Numbers,
 ) -> MeasuredPhotograph:
     reason, noise, factor = judged
     fit, table = located.fit, located.model.table
     angles = fit.numbers[NUMBERS:]
-    middle = np.array([shape[1] - 1.0, shape[0] - 1.0]) / 2.0
     outline = (fit.outline.point[0] + middle + 0.5) / factor - 0.5
-    view = {
+    view: dict[str, Any] = {
         "scale": math.exp(fit.numbers[3]) / factor,
         "roll": math.remainder(fit.numbers[4], math.pi),
         "tilt": float(fit.numbers[5]),
@@ -133,6 +133,6 @@ def _measured(
     )
 
 
-def _refused(name: str, table: ChainTable, reason: str, **view: object) -> MeasuredPhotograph:
+def _refused(name: str, table: ChainTable, reason: str, **view: Any) -> MeasuredPhotograph:
     nothing, nowhere = np.full(table.notches, np.nan), np.full(3, np.nan)
-    return MeasuredPhotograph(name, reason, nothing, nothing, nowhere, nowhere, **view)  # type: ignore[arg-type]
+    return MeasuredPhotograph(name, reason, nothing, nothing, nowhere, nowhere, **view)

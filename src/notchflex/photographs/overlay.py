@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ LONGEST = 1800
 _FOUND, _MISSED, _REFUSED = (60, 200, 60), (40, 140, 255), (40, 40, 230)
 
 
-def overlay_names(sources: list[str]) -> list[str]:
+def overlay_names(sources: Sequence[str]) -> list[str]:
     """Return a name for the overlay of each photograph, no two alike.
 
     Example:
@@ -33,7 +34,9 @@ def overlay_names(sources: list[str]) -> list[str]:
     return names
 
 
-def write_overlay(target: str | Path, picture: NDArray[np.uint8], found: MeasuredPhotograph) -> None:
+def write_overlay(
+    target: str | Path, picture: NDArray[np.uint8], found: MeasuredPhotograph
+) -> None:
     """Draw the fitted outline and the angles over a photograph, and write it as PNG.
 
     Green points lie on an edge, orange ones on none. The photograph is made smaller.

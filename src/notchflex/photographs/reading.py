@@ -24,8 +24,6 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
         InputError: There is no such file, it is no photograph, or it is too large or too small.
     """
     need("cv2", "photographs", "measuring photographs")
-    import cv2
-
     name = os.fspath(source)
     data = _bytes(name)
     _check_size(name, *_size_in_head(data))
@@ -49,7 +47,7 @@ def _decoded(data: bytes) -> Any:
     except cv2.error:
         return None
     finally:
-        if level is not None:
+        if logging is not None:
             logging.setLogLevel(level)
 
 

@@ -1,4 +1,4 @@
-"""Where a robot may lie in a photograph: starts of the fit, from the centre line of what is seen."""
+"""Where a robot may lie in a photograph: starts of the fit, from a centre line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from scipy.sparse.csgraph import dijkstra
 
 from notchflex.photographs.chain_table import ChainTable, Numbers
 from notchflex.photographs.contrast import Contrast
-from notchflex.photographs.outline import NUMBERS
 
 COARSE = 360
 """Longer side of the photograph in which robots are searched, px."""
@@ -66,8 +65,7 @@ def _ribbons(table: ChainTable, contrast: Contrast) -> Iterator[Ribbon]:
     mask = (contrast.value > contrast.threshold).astype(np.uint8)
     for radius in _CLOSINGS:
         disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
-        room = cv2.copyMakeBorder(mask, *[radius + 1] * 4, cv2.BORDER_CONSTANT, value=0)
-        closed: Any = cv2.morphologyEx(room, cv2.MORPH_CLOSE, disc)
+        closed: Any = cv2.morphologyEx(np.pad(mask, radius + 1), cv2.MORPH_CLOSE, disc)
         closed = closed[radius + 1 : -radius - 1, radius + 1 : -radius - 1]
         count, labels, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
         by_area = np.argsort(-stats[1:count, cv2.CC_STAT_AREA])[:_MOST_PARTS] + 1
@@ -139,7 +137,9 @@ def _stretches(table: ChainTable, centre: Numbers, width: Numbers) -> Iterator[R
             yield Ribbon(centre[begin:end], own, float(even.mean()))
 
 
-def _numbers(table: ChainTable, ribbon: Ribbon, side: float, slip: float, middle: Numbers) -> Numbers | None:
+def _numbers(
+    table: ChainTable, ribbon: Ribbon, side: float, slip: float, middle: Numbers
+) -> Numbers | None:
     """Return the numbers of a robot along a ribbon, its notches on one side of it.
 
     Args:
@@ -173,18 +173,21 @@ def _numbers(table: ChainTable, ribbon: Ribbon, side: float, slip: float, middle
         return None
     roll = math.radians(5.0) if side > 0.0 else math.pi + math.radians(5.0)
     view = [*(place - middle), at[0], math.log(scale), roll, 0.0, 0.003 / table.outer, 0.0, 0.0]
-    assert len(view) == NUMBERS
     return np.array([*view, *np.clip(angles, -0.3, 1.6)])
 
 
 def _smoothed(points: Numbers, half: int) -> Numbers:
-    padded = np.concatenate(
-        [
-            2.0 * points[0] - points[half:0:-1],
-            points,
-            2.0 * points[-1] - points[-2 : -half - 2 : -1],
-        ]
-    ) if len(points) > half + 1 else points
+    padded = (
+        np.concatenate(
+            [
+                2.0 * points[0] - points[half:0:-1],
+                points,
+                2.0 * points[-1] - points[-2 : -half - 2 : -1],
+            ]
+        )
+        if len(points) > half + 1
+        else points
+    )
     if len(padded) == len(points):
         return points
     kernel = np.ones(2 * half + 1) / (2 * half + 1)

@@ -90,9 +90,9 @@ def measure(
 def _write(
     found: MeasuredPhotographs, outputs: Outputs, output: str | None, files: tuple[Path, ...]
 ) -> None:
+    from notchflex.photographs.documents import measured_document
     from notchflex.photographs.overlay import write_overlay
     from notchflex.photographs.reading import read_photograph
-    from notchflex.photographs.documents import measured_document
 
     if files:
         files[0].parent.mkdir(exist_ok=True)
@@ -129,5 +129,3 @@ def _print(found: MeasuredPhotographs) -> None:
         rows.append(row)
     if rows:
         console.print(terminal.table(heads, rows))
-
-
