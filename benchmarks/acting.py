@@ -55,6 +55,8 @@ class State:
     Attributes:
         forces: Force by force, but for tendons on the wall and lips opposite a spine.
         gap: Narrowest opening between edges of pieces at every notch, mm; inf where there is none.
+        node_length: Length that each node of every notch stands for, mm; 0 for none.
+        fibres: Those that the solver sums up, of every notch and node; None without.
         undecided: Whether a contact force is reported that may stand on either of two edges.
     """
 
@@ -62,6 +64,8 @@ class State:
         self.robot, self.step = robot, step
         self.origin, self.rotation = path.body_position[step], path.body_rotation[step]
         self.load = path.load.external[step]
+        self.node_length = path.chain.rods.length
+        self.fibres = path.chain.rods.section.fibres
         self.tension = path.span_tension[step]
         around = [*robot.notches[1:], None]
         behind = [one.spacing(after) for one, after in zip(robot.notches, around, strict=True)]
@@ -95,18 +99,34 @@ class State:
         """A point of a body in the world."""
         return self.origin[body] + self.rotation[body] @ inside
 
-    def way(self, side: float) -> list[Stop]:
-        """The bodies that a line along the wall passes through, the base first."""
+    def way(self, side: float, radius: float | None = None) -> list[Stop]:
+        """The bodies that a line along the wall passes through, the base first.
+
+        Args:
+            side: Its direction, deg.
+            radius: Its distance from the tube axis, mm: edges may lean. None is on the surface.
+        """
         around = (None, *self.robot.notches, None)
         stops = [Stop(0, 0.0, self.length[0], False)]
         for body in range(1, len(around) - 1):
             for opening in around[body].openings(around[body - 1], around[body + 1]):
                 if opening.admits(side):
-                    last = stops[-1]
-                    stops[-1] = last._replace(leaves=last.leaves + opening.leaves)
+                    last, inside = stops[-1], 0.0
+                    if radius is not None and opening.side_deg is not None:
+                        turn = np.radians(side - opening.side_deg)
+                        inside = self.robot.tube.outer_radius - radius * np.cos(turn)
+                    leaves = last.leaves + opening.leaves + inside * opening.leaves_rise
+                    stops[-1] = last._replace(leaves=leaves)
+                    enters = opening.enters + inside * opening.enters_rise
                     faces = opening.faces(side)
-                    stops.append(Stop(body, opening.enters, self.length[body], faces))
+                    stops.append(Stop(body, enters, self.length[body], faces))
         return stops
+
+    def stops(self, number: int) -> list[Stop]:
+        """The bodies that a tendon passes through."""
+        tendon = self.robot.tendon[number]
+        way = self.way(tendon.direction_deg, tendon.radius)
+        return [one for one in way if one.body <= self.end_body(number)]
 
     def beyond(self, body: int, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment of all that acts on a body and those beyond it, about a point."""
@@ -161,7 +181,7 @@ class State:
         if tendon.path == "wall-arc":
             return []
         place, none, spans = self.tendon_place(number), np.zeros(3), []
-        stops = [one for one in self.way(tendon.direction_deg) if one.body <= self.end_body(number)]
+        stops = self.stops(number)
         for i, (before, behind) in enumerate(pairwise(stops)):
             leaves = self.point(before.body, place + before.leaves * _Z)
             enters = self.point(behind.body, place + behind.enters * _Z)

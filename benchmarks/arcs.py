@@ -4,8 +4,9 @@ An arc notch is a rod along its neutral axis with five strains: bending toward i
 sideways, each constant and linear along the rod, and a constant twist about the shear centre.
 Pose of the distal body against the proximal one: six numbers. So the strains follow from the two
 poses that are reported, with one number left that must fit. From the strains follow by the law of
-the material the moments inside, and these must balance, in the mean over the notch, what acts on
-everything beyond (acting.py) and what tendons on the wall and closed lips do to the notch.
+the material and of the ends the moments inside (moments.py), and these must balance, in the mean
+over the notch, what acts on everything beyond (acting.py) and what tendons on the wall and closed
+lips do to the notch. Elastic ends also shear, in the ratio in which one force bends and shears.
 
 A mode whose strain is nil may be one that the solver left out for these loads; its balance is not
 asked for. (What is left out is told by `moment_error`.)
@@ -13,16 +14,16 @@ asked for. (What is left out is told by `moment_error`.)
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from acting import State
+from fibres import Memory, memory_of
+from moments import ArcLaw, arc_law, bending
 from numpy.polynomial.legendre import leggauss
 
 import notchflex as nf
 
-_SECTIONS = {"on-axis": nf.annular_sector, "off-axis": nf.annular_segment}
 # Seven Gauss nodes all along, those of the solver: where the law of the material has a kink within
 # the notch, the mean over other nodes would differ.
 _POINTS, _HALVES = leggauss(7)
@@ -51,12 +52,14 @@ class Arcs(NamedTuple):
         modes: Bending toward the side (elastic; constant, linear), sideways, and twist, rad.
         misfit: What of the relative poses no strains explain, rad and heights.
         problems: What does not hold.
+        laws: How each of them bends.
     """
 
     notches: list[int]
     modes: np.ndarray
     misfit: np.ndarray
     problems: list[str]
+    laws: list[ArcLaw]
 
 
 def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
@@ -69,13 +72,11 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
     robot, step = state.robot, state.step
     chosen = [i for i, notch in enumerate(robot.notches) if isinstance(notch, nf.ArcNotch)]
     if not chosen:
-        return Arcs([], np.zeros((0, 5)), np.zeros(0), [])
+        return Arcs([], np.zeros((0, 5)), np.zeros(0), [], [])
     notches = [robot.notches[i] for i in chosen]
-    outer = robot.tube.outer_radius
-    left = [left_by(one, robot.tube) for one in notches]
-    centroid = np.array([float(one.centroid) for one in left])
-    shear = np.array([float(one.shear_centre) for one in left]) - centroid
-    height = np.array([one.height for one in notches])
+    laws = [arc_law(state, i) for i in chosen]
+    centroid, height = (np.array([getattr(one, k) for one in laws]) for k in ("centroid", "height"))
+    shear = np.array([(one.twist, -one.push[0], one.sway[0]) for one in laws])
     precurved = np.radians([one.precurvature_deg for one in notches])
     frames = np.array([about_z(one.direction_deg) for one in notches])
     before, behind = np.array(chosen), np.array(chosen) + 1
@@ -87,21 +88,22 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
     ends = state.origin[behind] + _turned(end, axis)
     turn = np.swapaxes(start, 1, 2) @ end
     move = _turned(np.swapaxes(start, 1, 2), ends - begins) / height[:, None]
-    modes, misfit = _fit(turn, move, precurved, shear / height)
-    rotations, places = (one[:-1] for one in _rods(modes, precurved, shear / height))
+    modes, misfit = _fit(turn, move, precurved, shear / height[:, None])
+    rotations, places = (one[:-1] for one in _rods(modes, precurved, shear / height[:, None]))
     problems = [
         f"notch {i + 1}: no strains of an arc lead to its pose (by {miss:.1e})"
         for i, miss in zip(chosen, misfit, strict=True)
         if miss > POSE
     ]
-    for k, i in enumerate(chosen):
+    memory = memory_of(path, step)
+    for k, (i, law) in enumerate(zip(chosen, laws, strict=True)):
         node_at = begins[k] + height[k] * places[:, k] @ start[k].T
         node_turn = start[k] @ rotations[:, k]
         force, about, size = state.beyond_with_size(i + 1, node_at[2])
         asked = about + np.cross(node_at[2] - node_at, force)
         local = np.einsum("gba,gb->ga", node_turn, asked)
         across = np.einsum("gba,b->ga", node_turn, force)
-        local[:, 2] += shear[k] * across[:, 1]
+        local[:, 2] += law.twist * across[:, 1]
         scale = size[1]
         for number, tendon in enumerate(robot.tendon):
             if tendon.path == "wall-arc" and i < state.end_body(number):
@@ -110,30 +112,38 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
                 local[:, 0] -= pull * place[1]
                 local[:, 1] += pull * place[0]
                 scale += abs(pull) * float(np.hypot(place[0], place[1]))
-        lip = path.contact_force[step, i] * (outer + centroid[k])
+        lip = path.contact_force[step, i] * law.closure
         local[:, 1] -= lip
         scale += abs(lip)
-        inside = _inside(robot.material, left[k], modes[k], height[k])
-        floor = _SMALL * robot.material.elastic_modulus * float(left[k].second_moment_weak)
+        inside, found = _inside(state, i, law, modes[k], memory)
+        problems += found
+        floor = _SMALL * robot.material.elastic_modulus * float(law.section.second_moment_weak)
         scale += floor / height[k]
-        problems += _out_of_balance(i, modes[k], inside, local, scale)
-        problems += _disagreeing(state, path, i, modes[k], precurved[k], outer + centroid[k])
+        forces = np.stack(
+            [
+                law.push[1] * modes[k, 1] + across[:, 0],  # of the rings' shear
+                law.sway[1] * modes[k, 3] - across[:, 1],
+            ],
+            axis=-1,
+        )
+        sheared = [law.push[0] * (_WEIGHTS @ forces[:, 0]), law.sway[0] * (_WEIGHTS @ forces[:, 1])]
+        problems += _out_of_balance(i, modes[k], inside - local, sheared, scale)
+        problems += _disagreeing(state, path, i, modes[k], precurved[k], law)
         largest = inside[np.abs(inside[:, 1]).argmax(), 1]
         if abs(largest - path.notch_moment[step, i]) > BALANCE * scale:
             problems.append(f"notch {i + 1}: notch_moment is not that of its strains")
-    return Arcs(chosen, modes, misfit, problems)
+    return Arcs(chosen, modes, misfit, problems, laws)
 
 
 def _out_of_balance(
-    notch: int, modes: np.ndarray, inside: np.ndarray, local: np.ndarray, scale: float
+    notch: int, modes: np.ndarray, missing: np.ndarray, sheared: list[float], scale: float
 ) -> list[str]:
     """Means over the notch of moment inside less moment asked for, by each mode that is used."""
-    missing = inside - local
     left = {
         "bending": _WEIGHTS @ missing[:, 1],
-        "linear bending": _WEIGHTS @ (_LINEAR * missing[:, 1]),
+        "linear bending": _WEIGHTS @ (_LINEAR * missing[:, 1]) + sheared[0],
         "sideways bending": _WEIGHTS @ missing[:, 0],
-        "linear sideways bending": _WEIGHTS @ (_LINEAR * missing[:, 0]),
+        "linear sideways bending": _WEIGHTS @ (_LINEAR * missing[:, 0]) + sheared[1],
         "twist": _WEIGHTS @ missing[:, 2],
     }
     return [
@@ -149,53 +159,36 @@ def _disagreeing(
     notch: int,
     modes: np.ndarray,
     precurved: float,
-    lip: float,
+    law: ArcLaw,
 ) -> list[str]:
-    """Gap as the lips' fibre has it."""
-    height = state.robot.notches[notch].height
-    gap = height - lip * (precurved + modes[0])
-    if abs(gap - path.gap[state.step, notch]) > POSE * height:
-        return [f"notch {notch + 1}: gap {path.gap[state.step, notch]:.3g} mm, not {gap:.3g}"]
-    return []
+    """Gap as the lips' fibre has it and as they yield; angle of the edges."""
+    step, found = state.step, []
+    gap = law.height - law.closure * (precurved + modes[0])
+    gap += law.lips * path.contact_force[step, notch]
+    if abs(gap - path.gap[step, notch]) > POSE * law.height:
+        found.append(f"notch {notch + 1}: gap {path.gap[step, notch]:.3g} mm, not {gap:.3g}")
+    edge = path.notch_angle[step, notch] - law.edge * (path.notch_angle[step, notch] - precurved)
+    if abs(edge - path.edge_angle[step, notch]) > POSE:
+        found.append(f"notch {notch + 1}: its edge angle is not {edge:.6g}")
+    return found
 
 
 def _inside(
-    material: nf.Linear | nf.Superelastic, left: nf.Section, modes: np.ndarray, height: float
-) -> np.ndarray:
-    """Moments about x, y, z at the nodes by the law of the material, N mm."""
-    bend = (modes[0] + modes[1] * _LINEAR) / height
-    sideways = (modes[2] + modes[3] * _LINEAR) / height
-    twist = np.full(len(_NODES), modes[4] / height)
+    state: State, i: int, law: ArcLaw, modes: np.ndarray, memory: Memory | None
+) -> tuple[np.ndarray, list[str]]:
+    """Moments about x, y, z at the nodes by the laws of material and ends, N mm; and problems."""
+    section, material = law.section, state.robot.material
     modulus = material.elastic_modulus
     shear = modulus / (2.0 * (1.0 + material.poisson_ratio))
-    weak, spine = float(left.second_moment_weak), float(left.edge_spine)
-    return np.stack(
-        [
-            modulus * float(left.second_moment_strong) * sideways,
-            weak / spine * stress(material, bend * spine),
-            shear * float(left.torsion_constant) * twist,
-        ],
-        axis=-1,
-    )
-
-
-@lru_cache(maxsize=256)
-def left_by(notch: nf.ArcNotch, tube: nf.Tube) -> nf.Section:
-    """What the cut of an arc notch leaves of the tube."""
-    return _SECTIONS[notch.cut](tube.outer_radius, tube.inner_radius, notch.depth)
-
-
-def stress(material: nf.Linear | nf.Superelastic, strain: np.ndarray) -> np.ndarray:
-    """Stress of a fibre (Pacheco 2021, eq. 13), MPa."""
-    if isinstance(material, nf.Linear):
-        return material.elastic_modulus * strain
-    size = np.abs(strain)
-    first = np.minimum(size, material.transition_strain)
-    second = np.clip(size, material.transition_strain, material.plastic_strain)
-    third = np.maximum(size - material.plastic_strain, 1e-300)
-    hardening = material.plastic_modulus * np.exp(material.plastic_exponent / third)
-    flat = material.superelastic_modulus * (second - material.transition_strain)
-    return np.sign(strain) * (material.elastic_modulus * first + flat + hardening)
+    sideways = (modes[2] + modes[3] * _LINEAR) / law.height
+    bent = bending(state, i, law, modes[0] + modes[1] * _LINEAR, memory)
+    twist = np.full(len(_NODES), modes[4] / law.height)
+    moments = [
+        modulus * float(section.second_moment_strong) * sideways / law.strong,
+        bent.moment,
+        shear * float(section.torsion_constant) * twist / law.torsion,
+    ]
+    return np.stack(moments, axis=-1), bent.problems
 
 
 def _fit(
@@ -233,7 +226,9 @@ def _rods(
     """Rotations and places (over the height) of the rods at all nodes and, last, at their ends."""
     constant, linear = np.zeros((2, len(modes), 6))
     constant[:, 1], constant[:, 0] = precurved + modes[:, 0], modes[:, 2]
-    constant[:, 2], constant[:, 4], constant[:, 5] = modes[:, 4], shear * modes[:, 4], 1.0
+    constant[:, 2], constant[:, 5] = modes[:, 4], 1.0
+    constant[:, 3] = shear[:, 1] * modes[:, 1]
+    constant[:, 4] = shear[:, 0] * modes[:, 4] + shear[:, 2] * modes[:, 3]
     linear[:, 1], linear[:, 0] = 2.0 * modes[:, 1], 2.0 * modes[:, 3]
     size = np.diff(_STOPS)[:, None, None]
     middle = constant + (0.5 * (_STOPS[1:] + _STOPS[:-1]) - 0.5)[:, None, None] * linear

@@ -6,12 +6,14 @@ a wider range than is usual. Loads are sized by the robot (drawn_loads.py).
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from drawn_loads import Numbers, Size, drawn_loads
-from shapes import SHAPES, Rope, Shape
+from drawn_materials import drawn_material, softened
+from shapes import DRAWN, SHAPES, Rope, Shape
 
 import notchflex as nf
 
@@ -62,10 +64,13 @@ def _robot(numbers: Numbers, shape: Shape, number: int) -> tuple[nf.Robot, list[
     arcs = _arcs(numbers, shape, tube, modulus)
     strips = _strips(numbers, tube, modulus)
     links = _links(numbers, tube, modulus)
+    finish = _as_drawn(numbers, shape, tube, material) if shape in DRAWN else None
     notches, sizes = [], []
     for i, kind in enumerate(shape.notches):
         made = {"p": strips, "u": links}.get(kind, arcs)
         notch, size = made(kind, shape.notches[:i].count("u"))
+        if finish is not None:
+            notch, size = finish(notch, size)
         notches.append(notch)
         sizes.append(size)
     least = 0.52 * max([one.strip_length for one in notches if isinstance(one, nf.ULink)] or [0.0])
@@ -149,6 +154,45 @@ def _links(numbers: Numbers, tube: nf.Tube, modulus: float):
     return make
 
 
+def _as_drawn(numbers: Numbers, shape: Shape, tube: nf.Tube, material: Any):
+    """Notches as the tube makes them; arcs of half of the robots about as they were checked."""
+    usual = numbers.chance(0.5)
+    outer = tube.outer_diameter
+    depth, uncut = outer * numbers.uniform(0.75, 0.9), outer * numbers.uniform(0.4, 1.5)
+    precurved = numbers.uniform(0.0, 0.3) if numbers.chance(0.3) else 0.0
+    read_at = str(numbers.choice(("outer", "outer", "mid-wall", "inner")))
+    ends = {"elastic": "shell"}.get(shape.ends, shape.ends)
+
+    def finish(notch: Any, size: Size) -> tuple[Any, Size]:
+        if not isinstance(notch, nf.ArcNotch):
+            length = getattr(notch, "strip_length", None) or 0.5 * outer
+            strain = 0.5 * notch.strip_thickness * size.angle / length
+            if isinstance(notch, nf.StripNotch):
+                notch = dataclasses.replace(notch, uncut_length=notch.height if usual else 0.0)
+            made = dataclasses.replace(notch, ends=shape.ends)
+            return made, size._replace(moment=size.moment * softened(material, strain))
+        given: dict[str, Any] = {"ends": ends, "closing": shape.closing}
+        if usual:
+            given |= {"depth": depth, "uncut_length": uncut}
+            given["precurvature_deg"] = float(np.degrees(precurved * notch.height / outer))
+        made = dataclasses.replace(notch, **given)
+        # Read at another surface the edges of some cuts would not meet the tube.
+        deep = abs(made.depth / outer - 0.5) < 0.45 * tube.inner_radius / tube.outer_radius
+        if made.cut == "on-axis" and deep:
+            made = dataclasses.replace(made, depth_at=read_at)
+        shape_of = tube.outer_radius, tube.inner_radius, made.section_depth(tube)
+        left = SECTIONS["o" if made.cut == "on-axis" else "s"](*shape_of)
+        lever, height = float(left.centroid), made.height
+        angle = height / (tube.outer_radius + lever) - np.radians(made.precurvature_deg)
+        torsion = 0.375 * float(left.torsion_constant) if shape.loads == "space" else np.inf
+        softest = min(float(left.second_moment_weak), float(left.second_moment_strong), torsion)
+        moment = material.elastic_modulus * softest * angle / height
+        strain = angle * float(left.edge_spine) / height
+        return made, Size(angle, moment * softened(material, strain), lever)
+
+    return finish
+
+
 def _tendon(
     numbers: Numbers, rope: Rope, radius: float, notches: list, sizes: list[Size]
 ) -> nf.Tendon:
@@ -175,8 +219,10 @@ def _stops(notches: list, side: float) -> Iterator[tuple[int, float, float]]:
                 yield body, opening.enters, opening.leaves
 
 
-def _material(numbers: Numbers, shape: Shape) -> nf.Linear | nf.Superelastic:
+def _material(numbers: Numbers, shape: Shape) -> Any:
     density = float(numbers.choice((6450.0, 1200.0)))
+    if shape.material in ("nitinol", "hysteresis", "table"):
+        return drawn_material(numbers, shape.material, density)
     if shape.material == "linear":
         return nf.Linear(numbers.log(1e3, 2e5), density=density)
     modulus = numbers.log(5e3, 8e4)

@@ -8,8 +8,8 @@ the loads. Asked for:
 - holder, drives and loads balance on the whole robot;
 - every arc notch is in balance (arcs.py), strips and U-links in a plane are (strips.py);
 - tensions and contact forces are not negative, gaps neither, one of force and gap is nil;
-- tendons turn as the poses say, friction is within its bound there, and tensions fall by it;
-  strokes are those of the poses (ropes.py).
+- tendons turn as the poses say, friction is within its bound there, opposes what slides, and
+  tensions fall by it; strokes are those of the poses (ropes.py).
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def drawn(seed: int) -> tuple[np.ndarray, Scene]:
         roll=random.uniform(-15, 15),
         tilt=random.uniform(-10, 10),
         direction=random.uniform(0, 360),
-        scale=random.uniform(45, 75),
+        scale=random.uniform(45, 68),
         distance=random.uniform(60, 300),
         blur=random.uniform(0.5, 2),
         noise=random.uniform(1, 5),
@@ -48,18 +48,24 @@ def drawn(seed: int) -> tuple[np.ndarray, Scene]:
         bright=90 if is_dark else 225,
         stripe=random.uniform(50, 160) if is_dark else 60,
     )
-    side = 1.0
     if random.random() < 0.5:  # seen from the other side
         scene.roll += 180
-        side = -1.0
-    turn = math.radians(scene.direction)
-    along, across = (math.cos(turn), math.sin(turn)), (-math.sin(turn), math.cos(turn))
-    back = scene.scale * (3.5 if total < 80 else 1.75)
-    aside = side * scene.scale * min(3.0, total / 35)
-    scene.place = tuple(
-        half - back * a - aside * b for half, a, b in zip((600, 450), along, across, strict=True)
-    )
+    scene.place = _framed(angles, scene)
     return angles, scene
+
+
+def _framed(angles: np.ndarray, scene: Scene) -> tuple[float, float]:
+    """Return the place of the first notch that puts the whole robot into the photograph."""
+    bodies, _ = nf.bodies_from_angles(nf.load_robot("pacheco2021-a"), angles[None])
+    tip, _ = nf.tip_from_angles(nf.load_robot("pacheco2021-a"), angles[None])
+    points = np.vstack([[0.0, 0.0, -1.0], bodies[0], tip])
+    side = math.copysign(1.0, math.cos(math.radians(scene.roll)))
+    turn = math.radians(scene.direction)
+    along = np.array([math.cos(turn), math.sin(turn)])
+    across = side * np.array([-math.sin(turn), math.cos(turn)])
+    seen = scene.scale * (points[:, 2:] * along + points[:, :1] * across)
+    x, y = np.array([600.0, 450.0]) - 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    return float(x), float(y)
 
 
 def main(count: int, first: int) -> None:

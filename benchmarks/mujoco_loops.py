@@ -3,13 +3,16 @@
     python mujoco_loops.py
 
 Prints, for the first tendon, the errors that each file states, and the error of the total angle
-over loops inside the range, which nothing was fitted to.
+over loops inside the range, which nothing was fitted to; then those of wrist A with a force on its
+tip.
 """
 
 from __future__ import annotations
 
 import time
+from importlib import import_module
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +43,32 @@ def inner_error(model: JointModel, text: str) -> float:
     return float(np.abs(found - known).max() / np.ptp(model.pulls[0].angle.sum(axis=1)))
 
 
+def with_tip_force(force: float) -> str:
+    """Pull wrist A with a constant force (N) on its tip, along x; compare total angle and area."""
+    mujoco: Any = import_module("mujoco")
+    robot = nf.load_robot("pacheco2021-a")
+    model = mujoco.MjModel.from_xml_string(mjcf(joint_model(robot, 2.35)))
+    data = mujoco.MjData(model)
+    body, site = model.body("body_5").id, model.site("tip").id
+    levels = np.concatenate([np.linspace(0.0, 1.6, 17), np.linspace(1.6, 0.0, 17)])
+    angle, before = [], 0.0
+    for level in levels.tolist():
+        for control in [*np.linspace(before, level, 200), *[level] * 2000]:
+            data.ctrl[0] = control
+            data.qfrc_applied[:] = 0.0
+            at, along = data.site_xpos[site], np.array([force, 0.0, 0.0])
+            mujoco.mj_applyFT(model, data, along, np.zeros(3), at, body, data.qfrc_applied)
+            mujoco.mj_step(model, data)
+        before = level
+        angle.append(data.qpos[:5].sum())
+    loads = [nf.Load(tension=level, tip_force=(force, 0.0, 0.0)) for level in levels.tolist()]
+    known = nf.simulate(robot, loads).total_angle
+    error = np.abs(np.array(angle) - known).max() / np.ptp(known)
+    area = np.trapezoid(angle, levels) / np.trapezoid(known, levels)
+    alone = np.degrees(known[0])
+    return f"{force} N ({alone:.1f} deg alone): total {error:.1%}, loop area {area - 1.0:+.1%}"
+
+
 def main() -> None:
     """Print the table."""
     print("robot, largest tension N, total, notch, tip, loop area, inner loops, fit s, run s")
@@ -57,6 +86,8 @@ def main() -> None:
             f", {fitted - start:.1f}, {run - fitted:.1f}",
             flush=True,
         )
+    for force in (0.0, 0.02, 0.05, -0.05):
+        print(f"wrist A, tip force {with_tip_force(force)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,9 @@ which reason, how many failed silently (NaN in a state that is called solved, an
 failure without a reason), how many are wrong, and how long a state took. Wrong is what does not
 balance when it is added up outside the solver (judge.py).
 
-    python benchmarks/robustness.py [--count 640] [--seed 1] [--json FILE] [--shape NAME]
+    python benchmarks/robustness.py [--count 640] [--seed 1] [--drawn] [--json FILE] [--shape NAME]
+
+With `--drawn` the shapes are those of a drawing: elastic ends, fibres, memory of the material.
 
 Draw i of a seed is the same whatever the count; `--first I --count 1` runs it alone if the shape
 is left to its number. Exit code 1: something silent or wrong. The first robot of a shape compiles
@@ -26,7 +28,7 @@ from pathlib import Path
 import numpy as np
 from draw import Draw, draws
 from judge import plain, wrong
-from shapes import SHAPES
+from shapes import DRAWN, SHAPES
 
 import notchflex as nf
 
@@ -164,14 +166,16 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=640, help="robots to draw")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first draw")
+    parser.add_argument("--drawn", action="store_true", help="shapes as the tube makes them")
     parser.add_argument("--shape", help="only draws of this shape")
     parser.add_argument("--json", type=Path, help="write rows and every state that is not good")
     given = parser.parse_args()
-    outcomes: dict[str, list[Outcome]] = {shape.name: [] for shape in SHAPES}
+    shapes = DRAWN if given.drawn else SHAPES
+    outcomes: dict[str, list[Outcome]] = {shape.name: [] for shape in shapes}
     names: dict[int, str] = {}
     compiled: dict[str, float] = {}
     last = given.first + given.count
-    for one in draws(last, given.seed):
+    for one in draws(last, given.seed, shapes):
         name = one.shape.name
         if one.number < given.first or given.shape not in (None, name):
             continue

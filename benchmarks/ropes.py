@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 from acting import State, Stop
-from arcs import Arcs, about_z, left_by
+from arcs import Arcs, about_z
+from moments import arc_law
 
 import notchflex as nf
 
@@ -14,6 +15,8 @@ EXACT = 1e-8  # relative, of tensions; of log ratios
 # Relative, of what all gaps are shorter or longer by: strains are fitted to poses (arcs.py). And
 # rounding, of lengths.
 STROKE, LENGTH = 1e-6, 1e-11
+# A slip, of the height of a notch, that must bring friction to its bound, and how near.
+_SLIDES, _OPPOSES = 1e-7, 1e-6
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -33,6 +36,24 @@ def judge_ropes(state: State, path: nf.EquilibriumPath, arcs: Arcs) -> list[str]
             shortening, turning, lengths = _straight(state, number)
         found += _stroke(state, path, number, shortening, lengths)
         found += _friction(state, path, number, turning)
+    return [*found, *_opposed(state, path)]
+
+
+def _opposed(state: State, path: nf.EquilibriumPath) -> list[str]:
+    """Friction opposes what a tendon slides: from the last state that entered the history on."""
+    run, step, found = path.run, state.step, []
+    last = path.prepared.state.unpack(run.between).memory
+    now, groups = run.solved.memory, path.chain.groups
+    height = np.array([notch.height for notch in state.robot.notches])[:, None, None]
+    for k, group in enumerate(groups):
+        slip = (np.asarray(now.slid[k][step]) - np.asarray(last.slid[k][step])) / height
+        ratio, bound = (np.asarray(part[k][step]) for part in (now.log_ratio, now.bound))
+        taut = path.tension[step, list(group.numbers)] > 1e6 * state.rounding
+        slides = (np.abs(slip) > _SLIDES) & (bound > 0.0) & taut[None, :, None]
+        against = slides & (np.sign(slip) * ratio < bound - _OPPOSES)
+        for notch, tendon, _ in np.argwhere(against)[:1]:
+            name = f"tendon {group.numbers[tendon] + 1} at notch {notch + 1}"
+            found.append(f"{name}: friction does not oppose its sliding")
     return found
 
 
@@ -42,14 +63,14 @@ def _on_wall(state: State, arcs: Arcs, number: int) -> tuple[np.ndarray, np.ndar
     place = state.tendon_place(number)
     shorter, turning, lengths = [], [], [tube.base_length]
     # It ends at the far edge of the wall on its side, as a straight one does.
-    stops = state.way(state.robot.tendon[number].direction_deg)
+    tendon = state.robot.tendon[number]
+    stops = state.way(tendon.direction_deg, tendon.radius)
     for k, i in enumerate(arcs.notches):
         if i >= state.end_body(number):
             break
         notch, modes = notches[i], arcs.modes[k]
-        left = left_by(notch, tube)
         side, free = np.radians(notch.direction_deg), np.radians(notch.precurvature_deg)
-        toward = place @ [np.cos(side), np.sin(side), 0.0] + float(left.centroid)
+        toward = place @ [np.cos(side), np.sin(side), 0.0] + arcs.laws[k].centroid
         beside = place @ [-np.sin(side), np.cos(side), 0.0]
         shorter.append(toward * modes[0] - beside * modes[2])
         turning += [0.5 * np.hypot(free + modes[0], modes[2])] * 2
@@ -59,8 +80,7 @@ def _on_wall(state: State, arcs: Arcs, number: int) -> tuple[np.ndarray, np.ndar
 
 def _straight(state: State, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Straight tendon: the same, its lengths at rest from the free robot."""
-    tendon, spans = state.robot.tendon[number], state.spans[number]
-    stops = [one for one in state.way(tendon.direction_deg) if one.body <= state.end_body(number)]
+    spans, stops = state.spans[number], state.stops(number)
     free = _free_lengths(state, number, stops)
     turning = [angle for span in spans for angle in (span.exit_turning, span.entry_turning)]
     lengths = [stops[0].leaves]
@@ -78,9 +98,10 @@ def _free_lengths(state: State, number: int, stops: list[Stop]) -> list[float]:
         origin, rotation = bodies[-1]
         # The origin of the next body lies a notch's height beyond this one: of a strip level with
         # its middle, of a link at its proximal face.
-        over, turn = np.array([0.0, 0.0, notch.height]), np.eye(3)
+        rise = getattr(notch, "rise", 0.0)
+        over, turn = np.array([0.0, 0.0, notch.height + rise]), np.eye(3)
         if notch.precurvature_deg:
-            over, turn = _free_arc(notch, state.robot.tube)
+            over, turn = _free_arc(notch, arc_law(state, len(bodies) - 1).centroid)
         bodies.append((origin + rotation @ (over + length * _Z), rotation @ turn))
     leaves, enters = (
         [
@@ -94,9 +115,9 @@ def _free_lengths(state: State, number: int, stops: list[Stop]) -> list[float]:
     ]
 
 
-def _free_arc(notch: nf.ArcNotch, tube: nf.Tube) -> tuple[np.ndarray, np.ndarray]:
+def _free_arc(notch: nf.ArcNotch, off: float) -> tuple[np.ndarray, np.ndarray]:
     """From the near face of a free arc notch, whose neutral axis is a circle, to its far one."""
-    off, frame = float(left_by(notch, tube).centroid), about_z(notch.direction_deg)
+    frame = about_z(notch.direction_deg)
     angle = np.radians(notch.precurvature_deg)
     cosine, sine = np.cos(angle), np.sin(angle)
     turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])

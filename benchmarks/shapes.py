@@ -2,7 +2,8 @@
 
 What is listed here (how many notches of which kinds, which tendons run how, which laws, loads in
 the plane or in space) decides which program is compiled; it is the same for all robots of a shape.
-Everything else is drawn in draw.py.
+Everything else is drawn in draw.py. `SHAPES` have the laws of the papers, `DRAWN` what a drawing
+of the tube gives: elastic ends, elastic closing, fibres with and without hysteresis.
 """
 
 from __future__ import annotations
@@ -34,8 +35,11 @@ class Shape(NamedTuple):
         directions: Sides to which the arcs bend: "one", "both" (0 and 180 deg), "four", "any".
         tendons: The tendons; the first ends in the last body that has wall on its side.
         friction: "frictionless", "geometric", "whole-before", "slope" or "chord".
-        material: "linear" or "superelastic".
+        material: "linear", "superelastic", "nitinol", "hysteresis" (nitinol that unloads on a
+            plateau of its own) or "table" (stress over strain).
         loads: "tendons" alone, other loads in the "plane", or in "space".
+        ends: "rigid", or "elastic": the notches as the tube makes them.
+        closing: Of arcs, "rigid" or "elastic".
     """
 
     name: str
@@ -45,6 +49,8 @@ class Shape(NamedTuple):
     friction: str
     material: str
     loads: str
+    ends: str = "rigid"
+    closing: str = "rigid"
 
 
 def _straight(*sides: float, path: str = "straight") -> tuple[Rope, ...]:
@@ -95,5 +101,106 @@ SHAPES = (
         "geometric",
         "superelastic",
         "space",
+    ),
+)
+
+DRAWN = (
+    Shape(
+        "drawn wrist", "ooooo", "one", _straight(0), "geometric", "nitinol", "tendons", "elastic"
+    ),
+    Shape(
+        "with hysteresis",
+        "ooooo",
+        "one",
+        _straight(0),
+        "geometric",
+        "hysteresis",
+        "tendons",
+        "elastic",
+        "elastic",
+    ),
+    Shape("drawn saw cuts", "ssss", "one", _wall(0), "geometric", "linear", "plane", "elastic"),
+    Shape(
+        "drawn in space", "ooo", "one", _straight(0, 180), "slope", "nitinol", "space", "elastic"
+    ),
+    Shape(
+        "both sides, loops",
+        "oooo",
+        "both",
+        _wall(0, 180),
+        "frictionless",
+        "hysteresis",
+        "plane",
+        "elastic",
+    ),
+    Shape(
+        "drawn, of a table",
+        "soos",
+        "one",
+        _straight(0),
+        "whole-before",
+        "table",
+        "tendons",
+        "elastic",
+        "elastic",
+    ),
+    Shape(
+        "rigid, loops",
+        "osos",
+        "any",
+        _wall(0, 120, 240),
+        "geometric",
+        "hysteresis",
+        "tendons",
+        "rigid",
+        "elastic",
+    ),
+    Shape(
+        "loops in space",
+        "oooo",
+        "four",
+        _straight(0, 90, 180, 270),
+        "geometric",
+        "hysteresis",
+        "space",
+        "elastic",
+        "elastic",
+    ),
+    Shape(
+        "drawn, superelastic",
+        "oooo",
+        "one",
+        _straight(0),
+        "chord",
+        "superelastic",
+        "plane",
+        "elastic",
+        "elastic",
+    ),
+    Shape("drawn strips", "pppp", "one", _straight(0, 180), "slope", "linear", "plane", "elastic"),
+    Shape(
+        "drawn strips in space",
+        "ppp",
+        "one",
+        _straight(0, 180),
+        "geometric",
+        "nitinol",
+        "space",
+        "elastic",
+    ),
+    Shape("drawn links", "uuuuuu", "one", _straight(0, 180), "slope", "linear", "plane", "elastic"),
+    Shape(
+        "drawn links in space", "uuuuu", "one", _straight(0), "chord", "table", "space", "elastic"
+    ),
+    Shape(
+        "all kinds, drawn",
+        "oospuu",
+        "one",
+        _straight(0, 180),
+        "slope",
+        "hysteresis",
+        "plane",
+        "elastic",
+        "elastic",
     ),
 )

@@ -5,15 +5,15 @@ acting.py) its curve is integrated anew by Runge and Kutta from its far end back
 clamped, by the law of the material alone, and must arrive there. The solver has a few polynomials
 for the curvature; what these miss is `moment_error`, and so much is allowed for.
 
-A U-link of Gao 2017 has another section everywhere. Of it is asked that its bending moment is one
-that the forces beyond it have about some point of the link.
+A U-link of Gao 2017 has another section everywhere, and so have strips with elastic ends. Of these
+is asked that the bending moment is one that the forces beyond have about some point of the strip.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from acting import State
-from arcs import stress
+from moments import stress
 from numpy.polynomial.legendre import leggauss
 
 import notchflex as nf
@@ -42,10 +42,11 @@ def judge_strips(state: State, path: nf.EquilibriumPath) -> list[str]:
     largest = float(np.abs(path.notch_moment[step]).max())
     problems = []
     for i, notch in enumerate(robot.notches):
-        if isinstance(notch, nf.StripNotch) and notch.deflection == "large":
-            problems += _strip(state, i, notch, float(path.notch_moment[step, i]), error)
-        if isinstance(notch, nf.ULink):
-            moment = float(path.notch_moment[step, i])
+        moment = float(path.notch_moment[step, i])
+        elastic = notch.has_elastic_ends
+        if isinstance(notch, nf.StripNotch) and notch.deflection == "large" and not elastic:
+            problems += _strip(state, i, notch, moment, error)
+        elif not isinstance(notch, nf.ArcNotch):
             problems += _link(state, i, notch, moment, 2.0 * error * largest)
     return problems
 
@@ -145,12 +146,19 @@ class _Curvature:
         return float(stress(self.material, np.array(strain)))
 
 
-def _link(state: State, i: int, notch: nf.ULink, moment: float, missed: float) -> list[str]:
-    """Compare the moment of a link with those that the forces have about its points."""
+def _link(
+    state: State, i: int, notch: nf.ULink | nf.StripNotch, moment: float, missed: float
+) -> list[str]:
+    """Compare the moment of a strip with those that the forces have about its points."""
     _, axis = _axes(state, i + 1, notch.direction_deg)
-    middle = state.point(i + 1, 0.5 * notch.strip_thickness * _Z)
+    rise = 0.5 * notch.strip_thickness if isinstance(notch, nf.ULink) else 0.0
+    middle = state.point(i + 1, rise * _Z)
     force, about, size = state.beyond_with_size(i + 1, middle)
-    reach = 0.5 * notch.span + notch.slot_radius + notch.strip_thickness
+    reach = state.robot.tube.outer_radius + 2.0 * notch.strip_thickness
+    if isinstance(notch, nf.ULink):
+        reach = 0.5 * notch.span + notch.slot_radius + notch.strip_thickness
+        if notch.has_elastic_ends:
+            reach += 2.0 * notch.strip_thickness + notch.slot_radius
     rounding = state.rounding * state.reach
     allowed = np.linalg.norm(force) * reach + missed + MOMENT * size[1] + rounding
     off = abs(moment - about @ axis)

@@ -61,11 +61,13 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("results.equilibrium", "results.files.json"): _FILES,
     ("results.path", "results.files.dataframe"): _FILES,
     ("results.path", "results.files.dataset"): _FILES,
+    ("workspaces.cloud", "workspaces.files"): _FILES,
     ("results.equilibrium", "results.path"): _TYPE,
     ("results.reason", "results.path"): _TYPE,
     ("results.quantities.path_formulas", "results.path"): _TYPE,
     ("fit.estimation.calibration", "fit.documents"): _SHOWN,
     ("designing.result", "designing.files"): "a design writes its files by a method",
+    ("designing.files", "designing.front"): _TYPE,
     ("comparison.comparison", "comparison.tables"): _SHOWN,
     ("viewer.viewer", "viewer.page.page"): "the viewer makes its page; the page acts on the viewer",
 }

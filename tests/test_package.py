@@ -28,18 +28,21 @@ NAMES = [
     "ConvergenceError", "ErrorCode", "Failure", "Settings",
     "BodyForce", "save_path", "read_path", "read_table",
     "reach", "follow", "read_targets", "Reach", "Following", "Limits", "TargetSearch", "Targets",
+    "Controller", "ControlStatus", "Observer",
     "StripNotch", "ULink", "Corner",
     "Elastica", "elastica", "modulus_from_single_notch",
     "FrictionReadings", "FrictionRig", "friction_rig", "read_friction_rig",
     "Measurements", "read_measurements", "write_measurements",
     "Calibration", "Constant", "LeastSquares", "SumOfDistances", "SumOfRobotErrors", "leave_out",
     "next_measurement", "sample_posterior", "simulate_measurements", "diagnose",
-    "DeckOptions", "Exported", "SimulatorOptions", "export_robot",
+    "DeckOptions", "Exported", "PatternOptions", "SimulatorOptions",
+    "SolidOptions", "export_robot",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
     "MeasuredPhotograph", "MeasuredPhotographs", "measure",
     "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
     "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
     "read_tolerance_spec",
+    "design", "Design", "DesignSpec", "design_front", "DesignFront",
 ]
 # fmt: on
 

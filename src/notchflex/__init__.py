@@ -129,8 +129,10 @@ _HOME = {
     **dict.fromkeys(
         (
             "Design",
+            "DesignFront",
             "DesignSpec",
             "design",
+            "design_front",
         ),
         "notchflex.designing",
     ),
@@ -166,8 +168,11 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "ControlStatus",
+            "Controller",
             "Following",
             "Limits",
+            "Observer",
             "Reach",
             "TargetSearch",
             "Targets",
@@ -191,7 +196,9 @@ _HOME = {
         (
             "DeckOptions",
             "Exported",
+            "PatternOptions",
             "SimulatorOptions",
+            "SolidOptions",
             "export_robot",
         ),
         "notchflex.export",

@@ -22,8 +22,11 @@ from notchflex.analysis import tip_response as tip_response
 from notchflex.analysis import uncertain as uncertain
 from notchflex.comparison import Comparison as Comparison
 from notchflex.comparison import compare as compare
+from notchflex.control import Controller as Controller
+from notchflex.control import ControlStatus as ControlStatus
 from notchflex.control import Following as Following
 from notchflex.control import Limits as Limits
+from notchflex.control import Observer as Observer
 from notchflex.control import Reach as Reach
 from notchflex.control import Targets as Targets
 from notchflex.control import TargetSearch as TargetSearch
@@ -31,8 +34,10 @@ from notchflex.control import follow as follow
 from notchflex.control import reach as reach
 from notchflex.control import read_targets as read_targets
 from notchflex.designing import Design as Design
+from notchflex.designing import DesignFront as DesignFront
 from notchflex.designing import DesignSpec as DesignSpec
 from notchflex.designing import design as design
+from notchflex.designing import design_front as design_front
 from notchflex.errors import ConvergenceError as ConvergenceError
 from notchflex.errors import ErrorCode as ErrorCode
 from notchflex.errors import Failure as Failure
@@ -40,7 +45,9 @@ from notchflex.errors import InputError as InputError
 from notchflex.errors import RobotFileError as RobotFileError
 from notchflex.export import DeckOptions as DeckOptions
 from notchflex.export import Exported as Exported
+from notchflex.export import PatternOptions as PatternOptions
 from notchflex.export import SimulatorOptions as SimulatorOptions
+from notchflex.export import SolidOptions as SolidOptions
 from notchflex.export import export_robot as export_robot
 from notchflex.fit import Calibration as Calibration
 from notchflex.fit import Constant as Constant

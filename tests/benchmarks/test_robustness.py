@@ -10,6 +10,7 @@ import pytest
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 # One shape of each kind of notch, friction and load; all of them are drawn by the benchmark.
 NUMBERS = (0, 1, *(pytest.param(one, marks=pytest.mark.nightly) for one in (2, 5, 8, 13)))
+DRAWN = (1, 2)  # with hysteresis; linear under loads in the plane
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +25,18 @@ def robustness():
 @pytest.mark.nightly
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_draw_is_solved_or_says_why(robustness, number):
+    follow_draws(robustness, __import__("shapes").SHAPES, number)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("number", DRAWN)
+def test_a_draw_as_the_tube_makes_it_is_solved_or_says_why(robustness, number):
+    follow_draws(robustness, __import__("shapes").DRAWN, number)
+
+
+def follow_draws(robustness, shapes, number):
+    """Follow two draws of a shape."""
     draw = __import__("draw")
-    shapes = __import__("shapes").SHAPES
     for row in range(2):
         one = draw.draw(number + row * len(shapes), 7, shapes[number])
         for outcome in robustness.follow(one):

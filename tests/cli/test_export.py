@@ -23,6 +23,12 @@ def test_files_of_one_call_agree(call, tmp_path):
     assert not ezdxf.readfile(tmp_path / "a.dxf").audit().errors
 
 
+def test_an_old_version_of_dxf_says_nothing_more(call, caplog):
+    code, out, err = call("export", "york2015", "--dxf", "a.dxf", "--dxf-version", "R12")
+    assert (code, out, err) == (0, "Wrote a.dxf.\n", "")
+    assert not caplog.records
+
+
 def test_json_can_be_printed_alone(call):
     code, out, _ = call("export", "york2015", "--dxf", "a.dxf", "--json", "-")
     assert code == 0

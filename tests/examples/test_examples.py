@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import notchflex as nf
 from balance import left_over
 from oracles import frames
 from oracles.wrist import A, Wrist
@@ -209,6 +210,22 @@ def test_what_friction_does(margin):
         margin.within("loop", loop - (angle[::-1] - angle)[:31].max(), 1e-6, "deg")
 
 
+def test_from_robot_to_cut_file(margin):
+    pytest.importorskip("ezdxf", reason="needs the extra export")
+    names = ran(12)[0]
+    half = np.arccos(1.0 - 1.4 / 0.81)
+    wanted = np.array([0.8, 2.0 * 0.81 * half]) - names["kerf"]
+    margin.within("path of the beam", names["window"] - wanted, 1e-9, "mm")
+    wide = half + 0.5 * names["kerf"] / 0.81
+    larger = A.with_(
+        depth=(0.81 * (1.0 - np.cos(wide)),) * 5,
+        height=(0.8 + names["kerf"],) * 5,
+        uncut=(1.2 - names["kerf"],) * 5,
+    )
+    expected = [np.degrees(one.pull(1.0)[0].sum()) for one in (A, larger)]
+    margin.within("bends", names["bends"] - np.array(expected), 1e-6, "deg")
+
+
 def test_run_it_in_mujoco(margin):
     """MuJoCo shares no code with the chain."""
     pytest.importorskip("mujoco", reason="needs the extra robotics")
@@ -216,3 +233,55 @@ def test_run_it_in_mujoco(margin):
     chain, angle = names["chain"], names["angle"]
     margin.within("total angle, part of its range", (angle - chain) / np.ptp(chain), 0.02)
     assert "area of the loop: 1.0" in printed
+
+
+def test_which_dimension_to_control():
+    names, printed = ran(11)
+    found = names["found"]
+    # Steeper than any other: a deviation of 5 % of the modulus, by its own difference.
+    bends = [
+        nf.solve(names["wrist"].with_value("material.elastic_modulus", modulus), nf.Load(0.9))
+        for modulus in (9990.0, 10010.0)
+    ]
+    spread = 500.0 * abs(bends[1].total_angle - bends[0].total_angle) / 20.0
+    index = found.sources.index("material.elastic_modulus")
+    assert abs(found.linear.spread[0, index]) == pytest.approx(spread, rel=1e-4)
+    assert found.order[0] == index
+    assert "check material.elastic_modulus" in printed
+
+
+def test_what_pushes_at_the_tip():
+    names, printed = ran(15)
+    sensed, push = names["sensed"], np.array(names["push"])
+    assert ((sensed.low[:, 0] <= push) & (sensed.high[:, 0] >= push)).all()
+    assert sensed.contact.tolist() == (push > 0.0).tolist()
+    # Where the tendon sticks another force, solved by itself, gives the same stroke.
+    other = names["read"].load.part(0, 5)
+    moved = (nf.Load(tip_force=(0.0165, 0.0, 0.0)).external,)
+    changed = nf.LoadPath(other.tension, other.stroke, external=(*other.external[:4], *moved))
+    stroke = nf.simulate(names["wrist"], changed).stroke[-1, 0]
+    assert abs(stroke - names["read"].stroke[4, 0]) < 1e-5
+    assert "sticks" in printed.splitlines()[4]
+
+
+def test_workspace_within_limits():
+    names, _ = ran(16)
+    careful, wrist = names["careful"], names["wrist"]
+    assert careful.strain.max() <= 0.04
+    # The last robot, pulled as far by itself, is at the limit.
+    state = nf.solve(wrist, nf.Load(tension=float(careful.tension.max())))
+    assert state.peak_strain.max() == pytest.approx(0.04, rel=2e-3)
+    assert careful.angle.max() == pytest.approx(state.total_angle, abs=1e-6)
+
+
+def test_follow_with_hysteresis(margin):
+    """The tensions found are those at which a fine loop has the angles, on its own branch."""
+    names, _ = ran(14)
+    wrist, found, angle = names["wrist"], names["found"], names["angle"]
+    peak = float(found.tension[2, 0])
+    loop = nf.simulate(wrist, nf.pull(0.0, peak, steps=4001).release())
+    total, tension = loop.total_angle, loop.tension[:, 0]
+    for target, branch in ((0, slice(0, 4001)), (1, slice(0, 4001)), (3, slice(4001, None))):
+        at = np.argsort(total[branch], kind="stable")
+        expected = np.interp(angle[target], total[branch][at], tension[branch][at])
+        margin.within("tension", found.tension[target, 0] - expected, 1e-4, "N")

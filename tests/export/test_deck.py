@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +182,13 @@ def test_nothing_is_written_of_a_robot_that_is_refused(tmp_path):
 def test_a_deck_needs_a_load(tmp_path):
     with refused("MISSING_VALUE", "tension"):
         nf.export_robot(one_notch(), tmp_path / "a.inp", COARSE)
+
+
+def test_loads_that_a_deck_does_not_carry_are_refused(wrist, tmp_path):
+    path = nf.simulate(wrist, nf.pull(0.0, 0.5, 2))
+    path = replace(path, load=path.load.loaded(tip_force=(0.01, 0.0, 0.0)))
+    with refused("UNSUPPORTED", "forces"):
+        nf.export_robot(path, tmp_path / "a.inp", COARSE)
 
 
 @pytest.mark.parametrize(

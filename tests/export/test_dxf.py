@@ -11,7 +11,7 @@ import notchflex as nf
 from notchflex.export.document import Subject
 from notchflex.export.flat.pattern import flat_pattern
 from notchflex.export.options import PatternOptions
-from notchflex.robot.digest import robot_digest
+from notchflex.results.same_robot import robot_digest
 
 LAYERS = ("CUT", "CUT_OFF", "REFERENCE", "TEXT")
 

@@ -16,10 +16,11 @@ from notchflex.export.solids.stl import stl_solid
 from refusals import refused
 
 
-def written(robot, tmp_path, **options):
-    """The solid as another program reads it."""
+def written(robot, tmp_path, warning="", **options):
+    """The solid as another program reads it; `warning` is a part of one, where one is given."""
     file = tmp_path / "solid.stl"
     done = nf.export_robot(robot, file, SolidOptions(**options))
+    assert warning in "".join(done.warnings)
     mesh = trimesh.load(file)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
@@ -101,6 +102,13 @@ def test_the_tip_ring_of_a_bent_solid_is_at_the_tip_of_the_chain(bent, tmp_path)
     assert middle == pytest.approx(np.array(bent.tip_position), abs=1e-4)
 
 
+@pytest.mark.parametrize("shank", [0.0, 0.5, 5000.0])
+def test_a_bent_solid_has_few_triangles_where_the_tube_is_straight(bent, tmp_path, shank):
+    mesh = written(bent, tmp_path, shank=shank)
+    assert mesh.bounds[0, 2] == pytest.approx(-shank, abs=1e-3 if shank > 100 else 1e-5)
+    assert len(mesh.faces) < 40_000
+
+
 def test_the_free_shape_has_the_precurvature(bent, tmp_path):
     robot = bent.robot
     free = np.radians([[notch.precurvature_deg for notch in robot.notches]])
@@ -142,6 +150,6 @@ def test_every_robot_bends_into_a_closed_solid(name, tension, most, tmp_path):
     robot = nf.load_robot(name)
     state = nf.solve(robot, nf.Load(tension=tension))
     straight = stl_solid(Subject(robot), SolidOptions())
-    mesh = written(state, tmp_path)
+    mesh = written(state, tmp_path, warning="stretched" if most > 1e-3 else "")
     assert mesh.volume == pytest.approx(straight.facts["volume_mm3"], rel=most)
     assert mesh.euler_number == 2 - 2 * straight.solid.genus()

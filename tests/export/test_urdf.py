@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import notchflex as nf
 from notchflex.export.simulators.joint_model import joint_model
 from notchflex.export.simulators.options import SimulatorOptions
-from notchflex.export.simulators.text import quaternion, roll_pitch_yaw
+from notchflex.export.simulators.text import inertia, quaternion, roll_pitch_yaw
 from notchflex.export.simulators.transmission import transmission_table
 
 
@@ -65,6 +65,21 @@ def test_the_tip_stands_where_the_chain_has_it(wrist, tmp_path):
 @pytest.mark.nightly
 def test_the_tip_of_a_wrist_bent_when_free(bent_wrist, tmp_path):
     check_tip(bent_wrist, tmp_path / "a.urdf")
+
+
+def test_names_with_signs_of_xml_are_written(wrist, tmp_path):
+    named = wrist.replace(name='a--b <&> \x01 "c"')
+    nf.export_robot(named, tmp_path / "a.urdf", SimulatorOptions(1.2))
+    nf.export_robot(named, tmp_path / "a.xml", SimulatorOptions(1.2))
+    for name in ("a.urdf", "a.xml"):
+        root = ElementTree.parse(tmp_path / name).getroot()
+        assert "<&>" in str(root.attrib)
+
+
+def test_a_body_without_length_has_an_inertia_that_simulators_take(wrist):
+    own = inertia(joint_model(wrist, 1.2), 0)
+    assert own.mass > 0.0
+    assert 2.0 * own.across > 1.01 * own.along
 
 
 def test_masses_add_up(wrist, tmp_path):

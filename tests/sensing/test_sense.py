@@ -6,6 +6,7 @@ import pytest
 import notchflex as nf
 from notchflex.sensing import SensorNoise, sense
 from notchflex.sensing.history import estimate, with_noise
+from notchflex.sensing.merging import merged
 from notchflex.sensing.model import SensingModel
 from notchflex.sensing.readings import readings_of
 from notchflex.sensing.tables import sensed_document
@@ -115,6 +116,32 @@ def test_the_standard_deviation_is_that_of_repeated_readings(wrist):
     # The deviation of 60 draws is itself known to a tenth: three of its deviations.
     assert forces.std(ddof=1) == pytest.approx(deviations.mean(), rel=0.3)
     assert abs(forces.mean() - 0.02) < 3.0 * deviations.mean() / np.sqrt(60)
+
+
+def test_readings_that_noise_explains_are_averaged():
+    robot = nf.load_robot("pacheco2021-a")
+    tension = [0.50, 0.51, 0.49, 0.80, 0.81, 0.50]
+    stroke = [0.60, 0.61, 0.59, 0.98, 0.98, 0.98]
+    made, group = merged(readings_of(robot, tension, stroke, None, None, SensorNoise()))
+    assert group.tolist() == [0, 0, 0, 1, 1, 2]
+    assert made.count.tolist() == [3.0, 2.0, 1.0]
+    assert made.tension[:, 0] == pytest.approx([0.5, 0.805, 0.5])
+    assert made.stroke[:, 0] == pytest.approx([0.6, 0.98, 0.98])
+    _, apart = merged(readings_of(robot, tension, stroke, None, None, EXACT))
+    assert apart.tolist() == [0, 1, 2, 3, 4, 5]
+
+
+def test_holding_still_does_not_make_the_force_drift(wrist):
+    # Noise that a model followed would pull the contacts to and fro, and the force with it.
+    tensions = np.append(np.linspace(0.1, 0.8, 6), np.full(25, 0.8))
+    forces = np.append(np.zeros(3), np.full(28, 0.02))
+    path = read(wrist, tensions, forces)
+    noise = 0.01 * np.random.default_rng(0).normal(size=(2, 31, 1))
+    sensed = sense(wrist, path.tension + noise[0], path.stroke + noise[1])
+    assert sensed.low[-1, 0] <= 0.02 <= sensed.high[-1, 0]
+    assert abs(sensed.force[-1, 0] - 0.02) < 0.005
+    assert sensed.deviation[-1, 0] < 0.5 * sensed.deviation[4, 0]
+    assert len(sensed.path) < 12
 
 
 def test_contact_is_shown_by_a_force_and_not_by_noise(wrist):

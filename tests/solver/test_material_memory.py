@@ -64,6 +64,10 @@ def test_a_saved_state_continues_as_the_uninterrupted_path(
         path.material_dissipation[-1],
         rtol=1e-12,
     )
+    # A path that is read back counts from the state that it continued, too.
+    nf.save_path(rest, tmp_path / "rest.json")
+    read = nf.read_path(tmp_path / "rest.json")
+    np.testing.assert_allclose(read.material_dissipation, rest.material_dissipation, rtol=1e-12)
 
 
 @pytest.mark.nightly

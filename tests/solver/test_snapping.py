@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -74,3 +76,32 @@ def test_random_wrists_return_to_rest():
         path = nf.simulate(robot, loads)
         assert path.converged.all(), path.reason
         assert np.abs(path.notch_angle[-1]).max() < 1e-9
+
+
+def test_strokes_pass_limit_points_and_return():
+    random = np.random.default_rng(0)
+    for _ in range(8):
+        robot = wrist(
+            random.uniform(0.0, 0.3),
+            plateau_stress=random.uniform(200.0, 500.0),
+            plateau_modulus=random.uniform(2000.0, 9000.0),
+        )
+        most, steps = random.uniform(1.5, 3.4), int(random.integers(3, 30))
+        strokes = most * np.append(np.arange(1, steps + 1), np.arange(steps)[::-1]) / steps
+        path = nf.simulate(robot, [nf.Load(stroke=float(stroke)) for stroke in strokes])
+        assert path.converged.all(), path.reason
+        assert np.abs(path.notch_angle[-1]).max() < 1e-6
+
+
+def test_friction_opposes_what_slides_through_a_closed_notch():
+    # The closed first notch is rigid: where the history were lost on the way, the tension before it
+    # could be anything that friction holds there.
+    held = wrist(0.27822717858736795, plateau_stress=490.37785697, plateau_modulus=2102.94413476)
+    robot = dataclasses.replace(held, tube=nf.Tube(1.62, 1.40, base_length=0.0))
+    strokes = 3.0909202707367274 * np.arange(1, 5) / 6
+    path = nf.simulate(robot, [nf.Load(stroke=float(stroke)) for stroke in strokes])
+    assert path.converged.all(), path.reason
+    assert path.contact_force[3, 0] > 0.0
+    first = (slice(3, 4), 0, slice(0, 2))
+    assert (np.diff(path.contact_slid, axis=0)[2, 0, :2] > 0.0).all()
+    np.testing.assert_allclose(path.contact_log_ratio[first], path.contact_bound[first])

@@ -28,11 +28,11 @@ def test_states_are_those_of_a_simulation_with_its_history(wrist, found, margin)
         rows = slice(32 * ray, 32 * ray + 32)
         tension = found.tension[rows]
         path = nf.simulate(wrist, nf.LoadPath(tension, np.full_like(tension, np.nan)))
-        margin.within("tip", found.tip[rows] - path.tip_position, 1e-8, "mm")
-        margin.within("direction", found.direction[rows] - path.tip_rotation[:, :, 2], 1e-8)
+        margin.within("tip", found.tip[rows] - path.tip_position, 1e-6, "mm")
+        margin.within("direction", found.direction[rows] - path.tip_rotation[:, :, 2], 1e-6)
         assert found.loading[rows].tolist() == [True] * 16 + [False] * 16
         apart = np.linalg.norm(path.tip_position - path.tip_position[::-1], axis=1)
-        margin.within("hysteresis", found.hysteresis[rows] - apart, 1e-8, "mm")
+        margin.within("hysteresis", found.hysteresis[rows] - apart, 1e-6, "mm")
         assert apart.max() > 0.01
 
 
@@ -72,7 +72,7 @@ def test_half_the_points_have_the_same_hull(wrist):
 @pytest.mark.nightly
 def test_half_the_points_of_two_axes_have_the_same_hull():
     robot = nf.load_robot("two-axis-wrist")
-    one, half = (workspace(robot, states=count, tension=1.5) for count in (40_000, 20_000))
+    one, half = (workspace(robot, states=count, tension=6.9) for count in (40_000, 20_000))
     assert half.hull.size == pytest.approx(one.hull.size, rel=0.01)
     assert one.hull.dimension == 3
 

@@ -7,6 +7,7 @@ the arc within 5e-6 of its radius up to 45 degrees. It depends on the poses of t
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -63,8 +64,7 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
         [0.5, -1.0]
     """
     at = np.atleast_1d(np.asarray(axis_at, float))
-    straight, _ = bodies_from_angles(robot, np.zeros((1, robot.number_of_notches)))
-    start, length = straight[0, :, 2], body_lengths(robot.tube, robot.notches)
+    start, length = _straight(robot)
     tip = float(start[-1] + length[-1])
     wrong = at[~((at >= -_BEYOND * tip) & (at <= (1.0 + _BEYOND) * tip))]
     if len(wrong):
@@ -82,6 +82,15 @@ def axis_places(robot: Robot, axis_at: ArrayLike) -> AxisPlaces:
     inside = (after > body) & (across > _BEYOND * tip) & (gap > 0.0)
     fraction = np.where(inside, across / np.where(gap > 0.0, gap, 1.0), -1.0)
     return AxisPlaces(body, along, after, length[body], fraction)
+
+
+@lru_cache(maxsize=8)
+def _straight(
+    robot: Robot,
+) -> tuple[Float[np.ndarray, " bodies"], Float[np.ndarray, " bodies"]]:
+    """Where the bodies of the straight robot begin, and their lengths, mm."""
+    straight, _ = bodies_from_angles(robot, np.zeros((1, robot.number_of_notches)))
+    return straight[0, :, 2], body_lengths(robot.tube, robot.notches)
 
 
 def points_on_axis(

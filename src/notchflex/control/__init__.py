@@ -1,15 +1,20 @@
 """Control: what to command so that the robot meets a target, with friction history."""
 
+from notchflex.control.controller import Controller, ControlStatus
 from notchflex.control.csv import read_targets
 from notchflex.control.following import Following, Reach
 from notchflex.control.inverse import follow, reach
 from notchflex.control.limits import Limits
+from notchflex.control.observer import Observer
 from notchflex.control.problem import TargetSearch
 from notchflex.control.targets import Targets
 
 __all__ = [
+    "ControlStatus",
+    "Controller",
     "Following",
     "Limits",
+    "Observer",
     "Reach",
     "TargetSearch",
     "Targets",

@@ -24,7 +24,10 @@ Approach = Literal["direct", "loading", "unloading", "least"]
 _BEYOND = 0.05
 # Limits count as kept within this part of them.
 _KEPT = 1e-6
-# Where the search from the present drives fails, it starts again from these parts of them,
+# Where the search from the present drives fails, it starts again just beyond their dead bands, by
+# this part of them,
+_BEYOND_BAND = 1e-3
+# from these parts of them,
 _STARTS = (0.5, 0.1, 0.0)
 # from each tendon pulled alone by this part of what about closes a notch,
 _ALONE = 0.15
@@ -128,12 +131,18 @@ def find_anyhow(
     The tip of a robot that bends far moves to and fro: from afar a search may end in a trough that
     is not the deepest.
     """
-    best = find(problem, before, start, goal, known)
+    # Where other tendons move, a tendon slides within its dead band too.
+    alone = bool(np.count_nonzero(start[problem.driven]) < 2)
+    best = find(problem, before, start, goal, known, over_bands=alone)
     solves = best.solves
-    for other_start in _other_starts(problem, start):
+    if best.failure is not None:
+        other = find(problem, before, start, goal, known, over_bands=not alone)
+        solves += other.solves
+        best = min(best, other, key=_quality)
+    for other_start, over_bands in _other_starts(problem, before, start):
         if best.failure is None:
             return best._replace(solves=solves)
-        other = find(problem, before, other_start, goal)
+        other = find(problem, before, other_start, goal, over_bands=over_bands)
         solves += other.solves
         best = min(best, other, key=_quality)
     if best.failure is not None:
@@ -148,14 +157,26 @@ def find_anyhow(
     return best._replace(solves=solves)
 
 
-def _other_starts(problem: Problem, start: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield parts of some drives, and then each tendon pulled alone."""
+def _other_starts(
+    problem: Problem, before: np.ndarray, start: np.ndarray
+) -> Iterator[tuple[np.ndarray, bool]]:
+    """Yield drives to start from, and whether the search leaves dead bands out.
+
+    Drives just beyond the dead band of each tendon, parts of all, and each tendon pulled alone.
+    """
+    driven = np.flatnonzero(problem.driven)
+    taut = [tendon for tendon in driven if start[tendon] > 0.0]
+    for tendon in taut if len(taut) > 1 else ():
+        for side, edge in zip((-1.0, 1.0), problem.model.dead_band(before), strict=True):
+            beyond = start.copy()
+            beyond[tendon] = (1.0 + side * _BEYOND_BAND) * edge[tendon]
+            yield beyond, False
     for part in _STARTS:
-        yield part * start
-    for tendon in np.flatnonzero(problem.driven):
+        yield part * start, True
+    for tendon in driven:
         alone = np.maximum(problem.low, 0.0)
         alone[tendon] += _ALONE * problem.unit
-        yield alone
+        yield alone, True
 
 
 def _quality(attempt: Attempt) -> tuple[bool, bool, float]:

@@ -32,6 +32,8 @@ def find(
     start: Float[np.ndarray, " t"],
     goal: Float[np.ndarray, " m"],
     known: Response | None = None,
+    *,
+    over_bands: bool = True,
 ) -> Attempt:
     """Search drives that meet a target.
 
@@ -41,12 +43,14 @@ def find(
         start: Drives to start from.
         goal: The target; NaN where an entry is free.
         known: Values and slopes at `start`, where they are known.
+        over_bands: Whether dead bands of the drives are left out.
 
     Returns:
         The best that was found within the budget.
     """
     rows = np.flatnonzero(~np.isnan(goal))
-    walk = Walk(problem, before, problem.entries[rows], problem.weights[rows], goal[rows])
+    aim = problem.entries[rows], problem.weights[rows], goal[rows]
+    walk = Walk(problem, before, *aim, over_bands)
     walk.begin(start, known)
     damping, budget = 0.0, problem.search.solves
     while not walk.done and walk.solves < budget:

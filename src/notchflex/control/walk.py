@@ -28,6 +28,11 @@ _PENALTY = 1e4
 _STUCK = 1e-8
 # Changes by these parts of the drives tell what a tendon does that slides.
 _ASIDE = (1e-6, -1e-6, 0.3, -0.3)
+# Where a step moves nothing the next one is so many times longer; where it then moves something it
+# may increase the error so many times.
+_STRIDE, _ACROSS = 4.0, 30.0
+# Tensions below this part of what about closes a notch are none.
+_SLACK = 1e-10
 # An error whose slope by the drives is this part of what it could be is as small as it gets.
 _FLAT = 1e-6
 
@@ -75,7 +80,8 @@ class Walk:
     """One search: its points one after the other.
 
     Within a dead band, between turning round and the first slip of a contact, a tendon moves
-    nothing. The search leaves these bands out: its variables are what the drives move beyond.
+    nothing, if the others stay as they are. A search can leave these bands out: its variables are
+    what the drives move beyond.
 
     Args:
         problem: What is aimed at, and the limits.
@@ -83,6 +89,7 @@ class Walk:
         entries: Which numbers of a response are aimed at.
         weights: What an error of each counts.
         goal: What they are to become.
+        over_bands: Whether dead bands are left out.
     """
 
     point: SearchPoint
@@ -94,17 +101,20 @@ class Walk:
         entries: Int[np.ndarray, " m"],
         weights: Float[np.ndarray, " m"],
         goal: Float[np.ndarray, " m"],
+        over_bands: bool,
     ) -> None:
         """Take the target; nothing is solved."""
         self.problem, self.before, self.goal = problem, before, goal
         self.entries, self.weights = entries, weights
         self.free = np.flatnonzero(problem.driven)
-        self.solves, self.settled = 0, False
+        self.solves, self.settled, self._stride = 0, False, 1.0
         self._sliding: np.ndarray | None = None
         model, driven = problem.model, problem.driven
         self._present = np.where(driven, model.drives(before), problem.low)
-        low, high = model.dead_band(before)
-        self._band = np.where(driven, low, self._present), np.where(driven, high, self._present)
+        self._band = self._present, self._present
+        if over_bands:
+            low, high = model.dead_band(before)
+            self._band = np.where(driven, low, self._present), np.where(driven, high, self._present)
         self._low, self._high = self._outside(problem.low), self._outside(problem.high)
         self._eye = np.eye(len(self.free))
         self._usual = 1.0 + size_of(weights * goal)
@@ -146,7 +156,8 @@ class Walk:
         reach = _GROWTH * self.scale
         low = np.maximum((self._low - here.moved)[free], -reach)
         high = np.minimum((self._high - here.moved)[free], reach)
-        step[free] = least_step(hessian, gradient, low, high, here.limits, here.room)
+        least = least_step(hessian, gradient, low, high, here.limits, here.room)
+        step[free] = np.minimum(np.maximum(self._stride * least, low), high)
         return step
 
     def go(self, step: Float[np.ndarray, " t"], least: float) -> float:
@@ -168,9 +179,16 @@ class Walk:
         gain = (here.merit - there.merit) / promised if promised > 0.0 else -1.0
         on_its_way = bool(there.stuck[step[self.free] != 0.0].any())
         on_its_way = on_its_way and there.merit <= here.merit * (1.0 + 1e-9)
+        if here.stuck.any() and not there.stuck.any() and there.error <= _ACROSS * here.error:
+            # Beyond the band, and too far: from there slopes show the way back.
+            self.point, self.scale, self._stride = there, self._scale(moved), 1.0
+            return max(gain, least)
         if gain >= least or on_its_way or there.error <= self.problem.search.tolerance:
             self.point, self.scale = there, self._scale(moved)
+            # A notch that is pressed together moves as little as a tendon that sticks.
+            self._stride = _STRIDE * self._stride if on_its_way else 1.0
             return max(gain, 1.0 if on_its_way else least)
+        self._stride = 1.0
         # A kink lies between: what the step has shown turns the next one along it.
         self.point = replace(here, slopes=self._secant(moved, response, here))
         return gain
@@ -195,7 +213,10 @@ class Walk:
     def _drive(self, moved: np.ndarray) -> np.ndarray:
         low, high = self._band
         drive = np.where(moved > 0.0, high, np.where(moved < 0.0, low, self._present)) + moved
-        return np.minimum(np.maximum(drive, self.problem.low), self.problem.high)
+        drive = np.minimum(np.maximum(drive, self.problem.low), self.problem.high)
+        if self.problem.by_tension:  # rounding leaves tensions that are none, but not slack
+            drive[drive < _SLACK * self.problem.unit] = 0.0
+        return drive
 
     def _scale(self, moved: np.ndarray) -> float:
         """Size of the drives, that of the first step at least."""

@@ -1,8 +1,11 @@
 """Design: from what is asked of a robot to its dimensions."""
 
-from notchflex.designing.design import design as design
+from notchflex.designing.design_robot import design as design
 from notchflex.designing.documents import design_document as design_document
 from notchflex.designing.files import write_design as write_design
+from notchflex.designing.files import write_front as write_front
+from notchflex.designing.front import DesignFront as DesignFront
+from notchflex.designing.front import design_front as design_front
 from notchflex.designing.result import Design as Design
 from notchflex.designing.result import VariableResult as VariableResult
 from notchflex.designing.result import WishResult as WishResult

@@ -21,8 +21,29 @@ _PART = 0.05
 _NOTHING = 1e-9
 
 
+def curves_missed(outcome: Outcome) -> tuple[str, ...]:
+    """Return a sentence for every curve with points that the axis does not reach."""
+    one = outcome.found.evaluation
+    assert one is not None
+    told: list[str] = []
+    for curve in {id(w.curve): w.curve for w in outcome.problem.wishes if w.curve}.values():
+        far = one.point.plain.curve(curve).values
+        missed = np.flatnonzero(far > curve.within) + 1
+        if len(missed):
+            shown = ", ".join(map(str, missed[:10].tolist())) + (" ..." if len(missed) > 10 else "")
+            told.append(
+                f"curve.{curve.name} is not reached at {len(missed)} of {len(far)} points "
+                f"({shown}), up to {short(float(far.max()))} mm away; asked {curve.within:g} mm."
+            )
+    return tuple(told)
+
+
 def explain(outcome: Outcome) -> tuple[str, ...]:
     """Return sentences about the best robot of a design."""
+    return (*curves_missed(outcome), *_about_limits(outcome))
+
+
+def _about_limits(outcome: Outcome) -> tuple[str, ...]:
     one = outcome.found.evaluation
     assert one is not None
     problem = outcome.problem
@@ -101,6 +122,8 @@ def _objective_name(problem: Problem) -> tuple[str, str, float] | None:
     assert isinstance(asked, DesignObjective)
     if asked.target is not None:
         return f"the squared distance of {wish.title} from {asked.target:g}", "", 1.0
+    if wish.take == "rms":
+        return f"the square of {wish.title}", f"{wish.unit}²" if wish.unit else "", 1.0
     return wish.title, wish.unit, 1.0 if asked.goal == "minimise" else -1.0
 
 

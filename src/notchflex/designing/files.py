@@ -8,6 +8,7 @@ import io
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from notchflex.designing.documents import HEADS, design_document, wish_rows
 from notchflex.designing.result import Design, numbers
@@ -17,6 +18,10 @@ from notchflex.results.files.writing import check_folder, write_text
 from notchflex.robot.robot import source_of
 from notchflex.robot.writing import robot_text
 
+if TYPE_CHECKING:
+    from notchflex.designing.front import DesignFront
+
+FRONT_TABLE, FRONT_PICTURE = "front.csv", "front.svg"
 ROBOT, TABLE, DOCUMENT, PICTURE = "robot.toml", "wishes.csv", "design.json", "design.svg"
 
 
@@ -52,6 +57,34 @@ def write_design(
         from notchflex._plot import plot
 
         plot(made).save(files[3])
+    return files
+
+
+def write_front(
+    front: DesignFront, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+) -> tuple[Path, ...]:
+    """Write a front into a folder: point_01.toml and so on, the table and the picture.
+
+    Raises:
+        InputError: A file cannot be written.
+    """
+    robots = [f"point_{number:02d}.toml" for number in range(1, len(front.points) + 1)]
+    drawn = [FRONT_PICTURE] if PICTURE in file_names() else []
+    files = check_folder(os.fspath(folder), (*robots, FRONT_TABLE, *drawn), "-o", inputs=inputs)
+    make_folder(folder)
+    for file, point in zip(files, front.points, strict=False):
+        write_text(file, designed_text(point))
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    names = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in front.points[0].variables]
+    writer.writerow(["robot", *front.titles, *names])
+    for name, point, values in zip(robots, front.points, front.objectives.tolist(), strict=True):
+        writer.writerow([name, *values, *(v.value for v in point.variables)])
+    write_text(files[len(robots)], out.getvalue())
+    if drawn:
+        from notchflex._plot import plot
+
+        plot(front).save(files[-1])
     return files
 
 

@@ -55,6 +55,8 @@ def export_robot(
         >>> nf.export_robot(nf.load_robot("pacheco2021-a"), "wrist.pdf").file
         'wrist.pdf'
     """
+    if not isinstance(file, (str, PathLike)):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError.WRONG_TYPE(f"file must be a path; got {type(file).__name__}.")
     target = fspath(file)
     name = format_of(target)
     check_output(target, "export_robot")
@@ -79,6 +81,10 @@ def build(name: str, subject: Subject, options: object | None = None) -> Documen
         raise InputError.CONFLICT(
             f"a {one.text} shows the robot as it is cut, without loads; give the robot instead "
             "of a result."
+        )
+    if subject.path is not None and not subject.path.converged[subject.step]:
+        raise InputError.NOT_CONVERGED(
+            f"the state that is exported did not converge: {subject.path.reason[subject.step]}."
         )
     return one.build(subject, options)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Literal, get_args
 
 from notchflex.errors import InputError
@@ -16,8 +17,9 @@ _LONGEST = 1e4  # mm; longer than any tube
 
 
 def _check_number(name: str, value: object, low: float, high: float, unit: str = "mm") -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError.WRONG_TYPE(f"{name} must be a number; got {value!r}.")
+    value = float(value)
     if not math.isfinite(value):
         raise InputError.NOT_FINITE(f"{name} must be finite; got {value}.")
     if not low <= value <= high:
@@ -78,6 +80,8 @@ class PatternOptions:
         _check_number("seam_deg", self.seam_deg, -360.0, 360.0, "deg")
         _check_number("shank", self.shank, 0.0, _LONGEST)
         _check_number("chord", self.chord, 1e-5, 1.0)
+        if self.two_axis not in (True, False):
+            raise InputError.WRONG_TYPE(f"two_axis must be True or False; got {self.two_axis!r}.")
         _check_word("seam", self.seam, Seam)
         _check_word("y_unit", self.y_unit, AngleUnit)
         _check_word("dxf_version", self.dxf_version, DxfVersion)

@@ -15,7 +15,7 @@ from notchflex.results.files.writing import replacing
 LONGEST = 1800
 """Longer side of an overlay, px."""
 
-_FOUND, _MISSED, _REFUSED = (60, 200, 60), (40, 140, 255), (40, 40, 230)
+_FOUND, _MISSED, _REFUSED = (60, 200, 60), (40, 140, 255), (120, 160, 255)
 
 
 def overlay_names(sources: Sequence[str]) -> list[str]:
@@ -59,11 +59,15 @@ def write_overlay(
     colour = _REFUSED if found.reason else (255, 255, 255)
     height = round(26 * size)
     for number, text in enumerate(lines, 1):
-        for shade, thick in (((0, 0, 0), 4), (colour, 1)):
-            cv2.putText(
-                small, text, (height // 2, number * height), cv2.FONT_HERSHEY_SIMPLEX,
-                0.62 * size, shade, max(1, round(thick * size)), cv2.LINE_AA,
-            )  # fmt: skip
+        corner = (
+            (0, round((number - 0.85) * height)),
+            (small.shape[1], round((number + 0.25) * height)),
+        )
+        cv2.rectangle(small, *corner, (40, 40, 40), -1)
+        cv2.putText(
+            small, text, (height // 2, number * height), cv2.FONT_HERSHEY_SIMPLEX,
+            0.62 * size, colour, max(1, round(size)), cv2.LINE_AA,
+        )  # fmt: skip
     done, data = cv2.imencode(".png", small)
     assert done
     with replacing(target) as path:

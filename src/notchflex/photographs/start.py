@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_closing
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
@@ -20,6 +21,7 @@ COARSE = 360
 
 _CLOSINGS = (2, 4, 7, 11, 16)
 _BIN = 2.0
+_BREAK = 5  # bins: shorter breaks, by highlights, do not end a stretch
 _MOST_PARTS = 4
 _LEAST_WIDTH = 3.0
 _SLIPS = (0.0, -0.4, -0.8, 0.4)
@@ -125,6 +127,7 @@ def _stretches(table: ChainTable, centre: Numbers, width: Numbers) -> Iterator[R
     ratio = table.length / (2.0 * table.outer)
     for wanted in _WIDTHS:
         fits = (width > 0.6 * wanted) & (width < 1.35 * wanted)
+        fits = binary_closing(fits, np.ones(_BREAK), border_value=0) | fits
         changes = np.flatnonzero(np.diff(np.concatenate([[0], fits.astype(int), [0]])))
         for begin, end in zip(changes[::2], changes[1::2], strict=True):
             if (end - begin) * _BIN < 0.75 * wanted * ratio:

@@ -27,6 +27,7 @@ _KINDS = {
     "Calibration": "fits.calibration:calibration_picture",
     "FrictionRig": "fits.friction:friction_picture",
     "Design": "designs.design:design_picture",
+    "DesignFront": "designs.front:front_picture",
     "ToleranceAnalysis": "tolerances.tolerances:tolerance_picture",
     "Following": "control.following:following_picture",
     "SensedForce": "sensing.sensed:sensed_picture",

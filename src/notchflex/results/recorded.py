@@ -18,6 +18,9 @@ REPORTED = (*Shape._fields, *STATE)
 BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
 """What is needed of the state before the first one: work is integrated from there."""
 
+MATERIAL = "material"
+"""Memory of the material in that state, where it has any."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
@@ -26,7 +29,8 @@ class Recorded:
     Attributes:
         solved: The last solved state at each load.
         reported: What is reported of each state, by the names of `REPORTED`.
-        first: What is reported of the state before the first load, by the names of `BEFORE`.
+        first: What is reported of the state before the first load, by the names of `BEFORE`;
+            and the memory of the material, as `MATERIAL`.
         held: Smallest eigenvalue of every stiffness, and the sign of its determinant.
         residual: Largest scaled imbalance of the last attempt.
         iterations: Newton iterations.
@@ -50,7 +54,7 @@ class Recorded:
         return self.reported[name]
 
     def before(self, name: str) -> np.ndarray:
-        """Return a quantity of the state before the first load, by its name in `BEFORE`."""
+        """Return a quantity of the state before the first load, by name."""
         return self.first[name]
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ import difflib
 import functools
 import types
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Union, cast
 
 from pydantic import ValidationError
@@ -203,7 +203,7 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
     if kind == "number_wanted":
         return f"it must be a number{' in' if unit else ''}{unit}, without quotes"
     if kind == "literal_error":
-        allowed = typing.get_args(place.field.annotation)
+        allowed = list(_words_in(place.field.annotation))
         return f"allowed: {_quoted(allowed)}{nearest(str(got), allowed)}"
     if is_list(place.field) and not place.kinds:
         if kind in ("too_short", "too_long"):
@@ -217,6 +217,15 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
         return f"write it as a list, one [[{place.name}]] table for each"
     table = f"it must be a table: [{place.name.partition('[')[0]}] and its keys below"
     return _RULES.get(kind, table)
+
+
+def _words_in(annotation: Any) -> Iterator[str]:
+    """Yield the words that an annotation of a field allows, which may be left out or not."""
+    if typing.get_origin(annotation) is Literal:
+        yield from typing.get_args(annotation)
+    elif typing.get_origin(annotation) in (Annotated, Union, types.UnionType):
+        for one in typing.get_args(annotation):
+            yield from _words_in(one)
 
 
 _BOUNDS = {

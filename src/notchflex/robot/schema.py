@@ -27,14 +27,27 @@ def json_schema() -> dict[str, Any]:
         >>> sorted(json_schema()["required"])
         ['friction', 'material', 'name', 'notch', 'tendon', 'tube']
     """
-    schema = TypeAdapter(Robot).json_schema()
+    return schema_of(
+        Robot, "notchflex robot file", "A tendon-driven notched tube, in mm, N, MPa and deg."
+    )
+
+
+def schema_of(cls: type, title: str, description: str) -> dict[str, Any]:
+    """Return the JSON Schema of a file that a part describes.
+
+    Args:
+        cls: The part.
+        title: What the file is called.
+        description: What it holds.
+    """
+    schema = TypeAdapter(cls).json_schema()
     for one in [schema, *schema["$defs"].values()]:
         _tidy(one)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **schema,
-        "title": "notchflex robot file",
-        "description": "A tendon-driven notched tube, in mm, N, MPa and deg.",
+        "title": title,
+        "description": description,
     }
 
 

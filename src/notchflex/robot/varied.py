@@ -9,6 +9,7 @@ from typing import overload
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
 from notchflex.robot.robot import Robot
@@ -30,17 +31,24 @@ class VariedRobots(Sequence[Robot]):
         (2, 1.41)
     """
 
-    def __init__(self, robot: Robot, values: Mapping[str, Sequence[float]]) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        values: Mapping[str, ArrayLike],
+        ranges: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
         """Hold a robot and, by name, the numbers of every robot.
 
         Args:
             robot: The robot that the others are made of.
             values: Numbers by name (see `Robot.with_value`), equally many for each name.
+            ranges: By name, between what the numbers of these robots and of others that follow
+                lie: what is prepared for these then serves for those. None where none follow.
 
         Raises:
             InputError: There is no such number, or there are not equally many for each name.
         """
-        self.robot = robot
+        self.robot, self.ranges = robot, ranges
         self.values: dict[str, Float[np.ndarray, " robots"]] = {
             name: np.asarray(each, float) for name, each in values.items()
         }
@@ -60,6 +68,16 @@ class VariedRobots(Sequence[Robot]):
     def table(self) -> Float[np.ndarray, "robots d"]:
         """The numbers, names as columns."""
         return np.stack(list(self.values.values()), axis=-1)
+
+    @property
+    def box(self) -> tuple[Float[np.ndarray, " d"], Float[np.ndarray, " d"]]:
+        """Lower and upper ends of the numbers, or of their ranges if all lie inside."""
+        low, high = self.table.min(axis=0), self.table.max(axis=0)
+        if self.ranges is None:
+            return low, high
+        ends = np.array([self.ranges[name] for name in self.values]).T
+        inside = (ends[0] <= low).all() and (high <= ends[1]).all()
+        return (ends[0], ends[1]) if inside else (low, high)
 
     @property
     def notch_of(self) -> list[int | None]:
@@ -87,7 +105,9 @@ class VariedRobots(Sequence[Robot]):
 
     def take(self, rows: Int[np.ndarray, " k"] | Bool[np.ndarray, " robots"]) -> VariedRobots:
         """Take some of the robots, by number from 0 or by a mask."""
-        return VariedRobots(self.robot, {name: each[rows] for name, each in self.values.items()})
+        return VariedRobots(
+            self.robot, {name: each[rows] for name, each in self.values.items()}, self.ranges
+        )
 
     def at(self, numbers: Mapping[str, float]) -> Robot:
         """Make the robot with other numbers."""

@@ -8,14 +8,14 @@ reading. The ends of the interval are the extremes of all of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
 from notchflex.sensing.history import History, Progress, whitening_of
-from notchflex.sensing.search import ReadingProblem, best, extreme
+from notchflex.sensing.search import ReadingProblem, bad_fit, best, best_of_all, extreme
 from notchflex.solver.continuation import SolverState
 
 
@@ -60,9 +60,10 @@ def bounds(history: History, level: float, progress: Progress | None = None) -> 
             covariance = history.covariance if tracker.direction is None else history.alone
             white = whitening_of(covariance[number])
             problem = ReadingProblem(model, history.steps[number], tracker.state, white)
-            at = best(problem, np.stack([tracker.force, found.force]))
-            if not np.isfinite(at.misfit):
-                continue
+            at = best_of_all(problem, np.stack([tracker.force, found.force]))
+            if bad_fit(at):  # no force makes this history fit: it was none, the best goes on
+                problem = replace(problem, start=before)
+                at = best(problem, found.force[None])
             for which, direction in enumerate(every):
                 own = direction is tracker.direction
                 if not own and size > 1 and tracker.direction is not None:

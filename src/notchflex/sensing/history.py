@@ -15,15 +15,13 @@ from jaxtyping import Float
 from notchflex.analysis.derivatives.tangent import Change, PathTangents
 from notchflex.results.path import EquilibriumPath
 from notchflex.sensing.model import SensingModel, Step
-from notchflex.sensing.search import Candidate, ReadingProblem, best
+from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
 from notchflex.solver.continuation import SolverState
 
 Progress = Callable[[int, int], None]
 
-# A fit that misses the readings by more than this, in squares of the noise for each number that
-# was read, is tried again from all over the range.
-_BAD_FIT = 12.0
-_STARTS = 9
+# A deviation beyond this part of the range of the search is none of first order.
+_LINEAR = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +68,7 @@ def _estimate_one(
 ) -> tuple[Step, Candidate]:
     step = model.step(number)
     problem = ReadingProblem(model, step, state, np.diag(step.variance**-0.5))
-    at = best(problem, force[None])
+    at = best_of_all(problem, force[None])
     if not len(step.entries):
         return step, at
     if np.isfinite(at.misfit):
@@ -78,19 +76,10 @@ def _estimate_one(
         noise = np.diag(step.variance) + (np.nan_to_num(drives) * step.driving) @ drives.T
         problem = replace(problem, whitening=whitening_of(noise))
         at = best(problem, at.force[None])
-    if at.misfit > _BAD_FIT * len(step.entries):
-        other = best(problem, _starts(model))
-        at = min(at, other, key=lambda one: one.misfit)
     if state is not None and np.isfinite(at.misfit):
         way = model.between_readings(state, number, np.stack([force, at.force]))
         step = replace(step, variance=step.variance + way[step.entries] ** 2)
     return step, at
-
-
-def _starts(model: SensingModel) -> Float[np.ndarray, "k d"]:
-    """Forces from all over the range, along each component."""
-    steps = np.linspace(-model.largest, model.largest, _STARTS)
-    return np.concatenate([np.multiply.outer(steps, row) for row in np.eye(model.size)])
 
 
 def whitening_of(covariance: Float[np.ndarray, "m m"]) -> Float[np.ndarray, "m m"]:
@@ -117,7 +106,6 @@ def with_noise(history: History) -> History:
     tendons = by_drive.shape[2]
     first = np.cumsum([0, *sizes])
     noises = int(first[-1]) + len(steps) * tendons
-    weak = (1e-3 / model.largest) ** 2 * np.eye(model.size)
     before = np.zeros((model.size, noises))
     for k, step in enumerate(steps):
         rows = step.entries
@@ -133,12 +121,24 @@ def with_noise(history: History) -> History:
         covariance = read @ read.T
         white = whitening_of(covariance)
         slopes = white @ by_force[k, k][:, rows].T
-        gain = np.linalg.solve(slopes.T @ slopes + weak, slopes.T)
+        gain = _known(slopes, _LINEAR * model.largest)
         before = before + gain @ (white @ read - slopes @ before)
         history.covariance.append(covariance)
         history.information.append(slopes)
         history.gain.append(before)
     return history
+
+
+def _known(slopes: Float[np.ndarray, "m d"], most: float) -> Float[np.ndarray, "d m"]:
+    """Return the least-squares solution, without directions whose deviation exceeds `most`.
+
+    There the tendons stick, or nothing is read: to first order the noise would move the force by
+    any amount, while what the contacts remember of it stays within the interval.
+    """
+    left, values, right = np.linalg.svd(slopes, full_matrices=False)
+    kept = values * most > 1.0
+    inverse = np.where(kept, 1.0 / np.where(kept, values, 1.0), 0.0)
+    return (right.T * inverse) @ left.T
 
 
 def _slopes_along(

@@ -77,13 +77,14 @@ class SensingModel:
     def step(self, number: int) -> Step:
         """Return what was measured in a reading, counted from 0."""
         read, deviation = self.readings.read, self.readings.deviation
+        count = self.readings.count[number]
         values = np.concatenate([read[name][number] for name in self.outputs])
         variance = [
-            np.full(read[name].shape[1], deviation[name] ** 2 + _RESOLUTION[name] ** 2)
+            np.full(read[name].shape[1], deviation[name] ** 2 / count + _RESOLUTION[name] ** 2)
             for name in self.outputs
         ]
         entries = np.flatnonzero(np.isfinite(values))
-        driving = self.readings.driving_deviation[number] ** 2
+        driving = self.readings.driving_deviation[number] ** 2 / count
         return Step(number, values[entries], entries, np.concatenate(variance)[entries], driving)
 
     def load(self, steps: Iterable[int], forces: Float[np.ndarray, "k d"]) -> LoadPath:

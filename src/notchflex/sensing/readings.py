@@ -63,6 +63,7 @@ class Readings:
         tip: Positions of the tip in the world, mm, (s, 3).
         angles: Angles of the notches, rad, (s, n).
         noise: Standard deviations of the sensors.
+        count: How many readings each row is the mean of, (s,).
     """
 
     tension: Float[np.ndarray, "s t"]
@@ -70,6 +71,7 @@ class Readings:
     tip: Float[np.ndarray, "s 3"]
     angles: Float[np.ndarray, "s n"]
     noise: SensorNoise
+    count: Float[np.ndarray, " s"]
 
     def __len__(self) -> int:
         """Number of readings."""
@@ -154,7 +156,9 @@ def readings_of(
         name: tables.get(name, np.full((rows, width), np.nan))
         for name, (_, width, _) in columns.items()
     }
-    made = Readings(whole["tensions"], whole["strokes"], whole["tip"], whole["angles"], noise)
+    made = Readings(
+        whole["tensions"], whole["strokes"], whole["tip"], whole["angles"], noise, np.ones(rows)
+    )
     _check_driven(made)
     return made
 

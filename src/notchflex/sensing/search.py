@@ -17,6 +17,9 @@ _FULL = np.array([1.0, 0.5, 0.2, 0.05, 0.01])
 _REACH = np.array([2.0, 1.4, 1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001])
 _BETWEEN = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 _MOST_STEPS, _MOST_REACHES, _MOST_HALVINGS = 20, 16, 6
+# A fit that misses the readings by more than this, in squares of the noise for each number that
+# was read, is tried again from all over the range.
+_BAD_FIT, _STARTS = 12.0, 9
 # The search ends where the misfit falls, or an extreme moves, by less than these parts.
 _SMALL_GAIN, _SMALL_MOVE = 1e-9, 1e-3
 # Ends of an interval are found to this part of the range.
@@ -144,6 +147,22 @@ def best(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate
     return at
 
 
+def bad_fit(at: Candidate) -> bool:
+    """Return whether a force misses the readings by far more than their noise."""
+    return not at.misfit <= _BAD_FIT * max(len(at.deviations), 1)
+
+
+def best_of_all(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate:
+    """Find the force that fits best near some, and, if none fits, from all over the range."""
+    at = best(problem, forces)
+    if not bad_fit(at):
+        return at
+    model = problem.model
+    steps = np.linspace(-model.largest, model.largest, _STARTS)
+    every = np.concatenate([np.multiply.outer(steps, row) for row in np.eye(model.size)])
+    return min(at, best(problem, every), key=lambda one: one.misfit)
+
+
 @dataclass(frozen=True, eq=False)
 class Extreme:
     """The end of what fits along a direction.
@@ -228,4 +247,4 @@ def _step_along(
     return move * min(1.0, 2.0 * problem.model.largest / max(size, 1e-300))
 
 
-__all__ = ["Candidate", "Extreme", "ReadingProblem", "best", "extreme"]
+__all__ = ["Candidate", "Extreme", "ReadingProblem", "bad_fit", "best", "best_of_all", "extreme"]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Int
 from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
@@ -14,6 +15,7 @@ from notchflex.loads.validation import check_is_robot, check_number
 from notchflex.robot import Robot
 from notchflex.sensing.bounds import Bounds, bounds
 from notchflex.sensing.history import History, estimate, with_noise
+from notchflex.sensing.merging import merged
 from notchflex.sensing.model import SensingModel
 from notchflex.sensing.observability import LeftOpen
 from notchflex.sensing.readings import Readings, SensorNoise, readings_of
@@ -49,7 +51,8 @@ def sense(
 
     The history begins at rest, with slack tendons and without the force. From reading to reading
     tendons and force change in proportion. The force may come, change and go at any reading: that
-    of every reading is found for itself, from the state that the readings before left.
+    of every reading is found for itself, from the state that the readings before left. Consecutive
+    readings that noise explains are averaged first.
 
     Args:
         robot: The robot.
@@ -85,7 +88,7 @@ def sense(
     """
     check_is_robot(robot)
     sensors = SensorNoise() if noise is None else noise
-    readings = readings_of(robot, tensions, strokes, tip, angles, sensors)
+    readings, group = merged(readings_of(robot, tensions, strokes, tip, angles, sensors))
     unknown = unknown_force(robot, components, place, known)
     model = SensingModel(robot, readings, unknown, _largest(robot, readings, largest), DEFAULT)
     places: dict[int | None, float] = {}
@@ -93,7 +96,7 @@ def sense(
         model, places = _best_place(model, progress)
     history = with_noise(estimate(model, _stage(progress, "finding the force")))
     ends = bounds(history, LEVEL, _stage(progress, "finding the interval"))
-    return _result(model, history, ends, places)
+    return _result(model, history, ends, places, group)
 
 
 def _largest(robot: Robot, readings: Readings, largest: float | None) -> float:
@@ -141,32 +144,42 @@ def _best_place(
 
 
 def _result(
-    model: SensingModel, history: History, ends: Bounds, places: dict[int | None, float]
+    model: SensingModel,
+    history: History,
+    ends: Bounds,
+    places: dict[int | None, float],
+    group: Int[np.ndarray, " s"],
 ) -> SensedForce:
     count, size = len(model.readings), model.size
     found = history.best
     left_open = [LeftOpen.of(model, history, ends, number, LEVEL) for number in range(len(found))]
     rest = count - len(found)
+    stuck = np.array([one.stuck for one in left_open] + [np.zeros(size, bool)] * rest)
+    hidden = [*(one.hidden for one in left_open), *[np.zeros((0, size))] * rest]
+    limited = np.concatenate([ends.limited, np.zeros((rest, size), bool)])
+    entries = np.array([len(model.step(number).entries) for number in range(count)])
+    covariance = [one.covariance for one in left_open]
     return SensedForce(
         robot=model.robot,
         components=model.unknown.names,
         directions=model.unknown.directions,
-        force=_filled([one.force for one in found], (count, size)),
-        covariance=_filled([one.covariance for one in left_open], (count, size, size)),
-        low=_filled(ends.low, (count, size)),
-        high=_filled(ends.high, (count, size)),
-        limited=np.concatenate([ends.limited, np.zeros((rest, size), bool)]),
-        stuck=np.array([one.stuck for one in left_open] + [np.zeros(size, bool)] * rest),
-        misfit=_filled([one.misfit for one in found], (count,)),
-        read=np.array([len(model.step(number).entries) for number in range(count)]),
-        no_force=_filled(ends.no_force, (count,)),
-        hidden=(*(one.hidden for one in left_open), *[np.zeros((0, size))] * rest),
+        force=_filled([one.force for one in found], (count, size))[group],
+        covariance=_filled(covariance, (count, size, size))[group],
+        low=_filled(ends.low, (count, size))[group],
+        high=_filled(ends.high, (count, size))[group],
+        limited=limited[group],
+        stuck=stuck[group],
+        misfit=_filled([one.misfit for one in found], (count,))[group],
+        read=entries[group],
+        no_force=_filled(ends.no_force, (count,))[group],
+        hidden=tuple(hidden[number] for number in group),
+        group=group,
         place=model.unknown.body,
         places=places,
         level=LEVEL,
         largest=model.largest,
         path=model.follow(np.array([one.force for one in found])) if found else None,
-        reason=_reason(model, found),
+        reason=_reason(model, found, group),
     )
 
 
@@ -178,11 +191,12 @@ def _filled(rows: object, shape: tuple[int, ...]) -> np.ndarray:
     return values
 
 
-def _reason(model: SensingModel, found: list[Candidate]) -> str:
+def _reason(model: SensingModel, found: list[Candidate], group: Int[np.ndarray, " s"]) -> str:
     """Return why the history ended before its last reading."""
     if len(found) == len(model.readings):
         return ""
     number = len(found)
     state, force = (found[-1].state, found[-1].force) if found else (None, np.zeros(model.size))
     path = model.solve(state, number, force[None])
-    return f"reading {number + 1} of {len(model.readings)}: {path.reason[0]}"
+    reading = int(np.argmax(group == number)) + 1
+    return f"reading {reading} of {len(group)}: {path.reason[0]}"

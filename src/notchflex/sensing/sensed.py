@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.stats import chi2
 
 from notchflex._summary import Displayed, Summary
@@ -35,9 +35,11 @@ class SensedForce(Displayed):
         stuck: Whether friction widens the interval, (s, d): within it the tendons stick, and forces
             give the same readings.
         misfit: Sum of squares of the deviations of each reading in units of its noise, (s,).
-        read: How many numbers each reading has that depend on the force, (s,).
+        read: How many numbers were compared in each reading, (s,).
         no_force: How much larger the misfit is, at least, where no force acts, (s,).
         hidden: Directions that are not observable at each reading, unit rows, s arrays (k, d).
+        group: Which state of `path` every reading went into, counted from 0: readings that noise
+            explains are averaged, (s,).
         place: Body on which the force acts; None for the tip.
         places: Misfit of the whole history with the force on each body that was tried.
         level: Part of all cases that an interval shall contain.
@@ -60,6 +62,7 @@ class SensedForce(Displayed):
     read: Float[np.ndarray, " s"]
     no_force: Float[np.ndarray, " s"]
     hidden: tuple[Float[np.ndarray, "k d"], ...]
+    group: Int[np.ndarray, " s"]
     place: int | None
     places: dict[int | None, float]
     level: float

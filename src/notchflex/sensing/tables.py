@@ -80,6 +80,7 @@ def sensed_columns(sensed: SensedForce) -> dict[str, Any]:
             f"force_{name}_sd_N": sensed.deviation[:, which],
             f"force_{name}_stuck": sensed.stuck[:, which],
         }
+    columns["averaged_as"] = sensed.group + 1
     columns["contact"] = sensed.contact
     columns["contact_p"] = sensed.contact_probability
     columns["misfit"] = sensed.misfit
@@ -103,6 +104,7 @@ def sensed_document(sensed: SensedForce) -> dict[str, Any]:
             "contact_p": float(sensed.contact_probability[number]),
             "misfit": float(sensed.misfit[number]),
             "numbers_read": int(sensed.read[number]),
+            "averaged_as": int(sensed.group[number]) + 1,
             "not_observable": sensed.hidden[number],
         }
         for number in range(len(sensed))

@@ -68,6 +68,8 @@ _EXTERNAL_COMPLETE = 0.5
 # shape. Substeps that fail below this part of the load step are followed with a viscosity, between
 # these parts of the stiffness at rest, until the notches stand still.
 _SNAPS_BELOW, _VISCOSITY, _LEAST_VISCOSITY, _MOST_VISCOSITY = 0.05, 0.1, 0.02, 30.0
+# A contact at its bound is put this much beyond it, so that it slides on.
+_SLIDES_ON = 1.0 + 1e-12
 # How many times more iterations a load with snaps may take.
 _MORE_ITERATIONS = 4
 
@@ -81,13 +83,31 @@ class _Search(NamedTuple):
         tries: Number of substeps tried.
         viscosity: Of the next substep; 0 outside a snap.
         moving: Where it starts: the last solved state, or a shape on the way of a snap.
+        predicts: Whether contacts are predicted in it, where strokes are commanded.
     """
 
     result: LoadStepResult
     part: Float[Array, ""]
     tries: Int[Array, ""]
     viscosity: Float[Array, ""]
-    moving: SolverState
+    moving: Iterate
+    predicts: Bool[Array, ""]
+
+
+class _Retry(NamedTuple):
+    """How a substep is tried on a robot that can snap.
+
+    Attributes:
+        viscosity: As a part of the stiffness at rest; 0 for none.
+        moving: The point that it drags on and where the search begins. History is that of the last
+            solved state all the same: on the way of a snap nothing is remembered.
+        predicts: Whether contacts are predicted where strokes are commanded; otherwise those that
+            slid before slide on.
+    """
+
+    viscosity: Float[Array, ""]
+    moving: Iterate
+    predicts: Bool[Array, ""]
 
 
 def at_rest(chain: Chain) -> SolverState:
@@ -150,8 +170,8 @@ def solve_load_step(
         stop = jnp.where(first, _EXTERNAL_COMPLETE, 1.0)
         aim = jnp.minimum(result.reached + part, stop)
         towards = interpolate_command(chain, command, last, aim)
-        start = state.moving if can_snap else result.solved
-        new = _solve_substep(chain, towards, start, settings, aim, viscosity if can_snap else None)
+        retry = _Retry(viscosity, state.moving, state.predicts) if can_snap else None
+        new = _solve_substep(chain, towards, result.solved, settings, aim, retry)
         memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound, new.material)
         at_aim = SolverState(new.point, memory, new.stroke, towards.applied)
         still = viscosity == 0.0
@@ -162,7 +182,7 @@ def solve_load_step(
             iterations=result.iterations + new.iterations,
             converged=solved & (aim >= 1.0),
             reached=jnp.where(solved, aim, result.reached),
-            parts=result.parts + new.converged,
+            parts=result.parts + solved,
             between=choose(solved, result.solved, result.between),
             part_before=jnp.where(solved, state.result.reached, result.part_before),
         )
@@ -170,11 +190,14 @@ def solve_load_step(
         part = jnp.where(solved, 2.0 * part, shorter)
         tries = state.tries + 1
         if not can_snap:
-            return _Search(result, part, tries, viscosity, result.solved)
+            return _Search(result, part, tries, viscosity, state.moving, state.predicts)
         viscosity = _next_viscosity(viscosity, new.converged, part)
         given_up = ~still & ~new.converged & (viscosity == 0.0)
-        moving = choose(given_up, result.solved, choose(new.converged, at_aim, state.moving))
-        return _Search(result, part, tries, viscosity, moving)
+        last_point = result.solved.point
+        moving = choose(given_up, last_point, choose(new.converged, new.point, state.moving))
+        # Where one way of finding the contacts fails, the other is tried next.
+        predicts = (state.predicts == new.converged) & (viscosity == 0.0)
+        return _Search(result, part, tries, viscosity, moving, predicts)
 
     start = LoadStepResult(
         solved=last,
@@ -186,7 +209,8 @@ def solve_load_step(
         between=last,
         part_before=jnp.zeros(()),
     )
-    begin = _Search(start, jnp.ones(()), jnp.zeros((), int), jnp.zeros(()), last)
+    none, tries = jnp.zeros(()), jnp.zeros((), int)
+    begin = _Search(start, jnp.ones(()), tries, none, last.point, jnp.array(True))
     return jax.lax.while_loop(proceed, substep, begin).result
 
 
@@ -211,22 +235,29 @@ def _solve_substep(
     solved: SolverState,
     settings: Settings,
     aim: Array,
-    viscosity: Float[Array, ""] | None,
+    retry: _Retry | None,
 ) -> NewtonResult:
     """Solve for a command near a solved state, from the predicted log ratios.
 
-    Modes are dragged by a viscosity, if one is given.
+    See `_Retry` for robots that can snap.
     """
-    last_tension = solved.point.base_tension
+    memory, last_tension = solved.memory, solved.point.base_tension
     base_tension = command.either(last_tension, command.target)
-    log_ratio = predict_log_ratios(chain, last_tension, base_tension, solved.memory)
+    log_ratio = predict_log_ratios(chain, last_tension, base_tension, memory)
     start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
     enough = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
     enough = jnp.where(aim < 1.0, enough, 0.0)
-    memory = solved.memory
-    if viscosity is not None:
-        memory = memory._replace(drag=(viscosity, solved.point.unknowns.modes))
-    problem = NewtonProblem(chain, command, memory, last_tension)
+    predicts: Bool[Array, ""] | bool = True
+    if retry is not None:
+        if command.by_stroke is not None:
+            predicts = retry.predicts
+            sliding = jax.tree.map(lambda old: _SLIDES_ON * old, memory.log_ratio)
+            log_ratio = choose(predicts, log_ratio, sliding)
+            start = start._replace(unknowns=start.unknowns._replace(log_ratio=log_ratio))
+        moves = jnp.any(retry.moving.unknowns.modes != solved.point.unknowns.modes)
+        start = choose(moves, retry.moving, start)
+        memory = memory._replace(drag=(retry.viscosity, retry.moving.unknowns.modes))
+    problem = NewtonProblem(chain, command, memory, last_tension, predicts)
     return newton(problem, start, settings, enough)
 
 

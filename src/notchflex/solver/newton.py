@@ -105,12 +105,15 @@ class NewtonProblem(NamedTuple):
         command: Tensions and strokes commanded, external loads.
         memory: History of contacts and material, as of the last solved state.
         last_tension: Base tensions of that state, N.
+        predicts: Whether contacts are predicted where a stroke is commanded. The predictor takes
+            it that a tendon is pulled as its tension rises, which is not so where a notch softens.
     """
 
     chain: Chain
     command: Command
     memory: Memory
     last_tension: Float[Array, " t"]
+    predicts: Bool[Array, ""] | bool = True
 
 
 # A step may turn a flexure by so much (rad); as `LARGEST_LOG_RATIO`.
@@ -146,7 +149,7 @@ def newton(
     Returns:
         The result; `converged` is false after a failure.
     """
-    chain, command, memory, _ = problem
+    chain, command, memory, *_ = problem
     tolerance = _tolerance(chain, start, settings)
     small_enough = jnp.maximum(tolerance, enough)
 
@@ -262,7 +265,7 @@ def _next_step(
     problem: NewtonProblem, new: NewtonResult, at: Evaluation, iterations: Int[Array, ""]
 ) -> tuple[Iterate, Float[Array, ""]]:
     """Step from an accepted point, and the fraction of it to try first."""
-    chain, command, memory, last_tension = problem
+    chain, command, memory, last_tension, predicts = problem
     point = new.point
     step = linear_step(chain, command, point.unknowns, memory, point.base_tension, at)
     step = limit_slack(chain, point, step)
@@ -278,7 +281,7 @@ def _next_step(
     if by_tension:
         return limited(whole), whole
     assert command.by_stroke is not None
-    early = iterations < _PREDICTED
+    early = (iterations < _PREDICTED) & predicts
     early = jnp.any(command.by_stroke) & early & (new.residual > _PREDICTED_ABOVE)
 
     def predicted() -> Iterate:
@@ -286,4 +289,8 @@ def _next_step(
         return predict_contacts(chain, command, limits, last_tension, point, step, whole, by_turn)
 
     chosen = jax.lax.cond(early, predicted, lambda: step)
-    return chosen, jnp.where(early, by_turn, whole)
+    part = jnp.where(early, by_turn, whole)
+    if predicts is not True:
+        held = limit_closing(chain, point.unknowns, at, chosen, part)
+        chosen = choose(predicts, chosen, held)
+    return chosen, part

@@ -75,7 +75,7 @@ def tolerance_analysis(
     if check_integer(draws, "draws") < LEAST_DRAWS:
         raise InputError.OUT_OF_RANGE(f"draws must be {LEAST_DRAWS} or more; got {draws}")
     asked = _spec(spec, robot)
-    chosen, assumed = _tolerances(robot, asked)
+    chosen, assumed = tolerances_for(robot, asked)
     paths = {}
     for name, load in asked.loads.items():
         paths[name] = simulate(robot, load, settings=settings, refinement=refinement)
@@ -118,10 +118,15 @@ def _spec(spec: ToleranceSpec | str | os.PathLike[str], robot: Robot) -> Toleran
     return read_tolerance_spec(spec, robot)
 
 
-def _tolerances(
+def tolerances_for(
     robot: Robot, asked: ToleranceSpec
 ) -> tuple[tuple[Tolerance, ...], tuple[str, ...]]:
-    """Return the tolerances, and the names of those that are assumed."""
+    """Return the tolerances, and the names of those that are assumed.
+
+    Args:
+        robot: The robot of the drawing.
+        asked: What is asked of it.
+    """
     if asked.tolerances is None:
         return tolerances_of(robot)
     return robot.replace(tolerance=asked.tolerances).tolerance, ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -12,10 +12,10 @@ from scipy.stats import qmc
 
 from notchflex.tolerancing.study import Study
 
-_POINTS = 4096
-_WIDEST = 8.0
+_POINTS = 2048
+_WIDEST = 2.0
 """A tolerance is widened so many times at most."""
-_EXACT = 0.01
+_EXACT = 0.02
 """How exactly the factor on a tolerance is found."""
 
 
@@ -26,7 +26,7 @@ class Control(NamedTuple):
         exact: Yield if the source had no deviation at all, (d,).
         factor: Factor on the deviations of the source that gives the wanted yield, (d,): below 1
             they must be smaller, above 1 they may be larger. 0 where even no deviation is not
-            enough; infinite where 8 times the deviations are not too many. None where no yield is
+            enough; infinite where twice the deviations are not too many. None where no yield is
             wanted.
         robots: How many robots each yield is of.
     """
@@ -52,9 +52,9 @@ def control(
         seed: Of the points.
         progress: Called with the sources done and all of them.
     """
-    points = min(2 ** int(np.log2(max(draws, 64))), _POINTS)
+    points = min(2 ** int(np.log2(draws)), _POINTS)
     sampler = qmc.Sobol(len(study.sources), scramble=True, rng=np.random.default_rng(seed))
-    levels = np.clip(sampler.random(points), 1e-12, 1.0 - 1e-12)
+    levels = sampler.random(points)
     exact, factors = [], []
     for index in range(len(study.sources)):
         yields: dict[float, float] = {}
@@ -88,5 +88,5 @@ def _factor(yield_at: Callable[[float], float], wanted: float) -> float:
             return np.inf
         low, high = high, 2.0 * high
     # The yield is a staircase: a root of the difference lies on a step.
-    root = brentq(lambda factor: yield_at(factor) - wanted, low, high, xtol=_EXACT * high)
+    root: Any = brentq(lambda factor: yield_at(factor) - wanted, low, high, xtol=_EXACT * high)
     return float(root)

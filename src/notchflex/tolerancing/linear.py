@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.analysis.derivatives.forward_model import ForwardModel
-from notchflex.analysis.derivatives.tangent import Change
+from notchflex.analysis.derivatives.tangent import Change, PathTangents
 from notchflex.analysis.uncertainty.draws import Source, deviation, moments
 from notchflex.robot.tolerance import Tolerance
 from notchflex.solver.newton import DEFAULT
@@ -76,7 +76,9 @@ def linear_effects(study: Study) -> LinearEffects:
         changes: list[Change] = [model.change(study.exact, path, name) for name in names]
         own = [index for index, one in enumerate(study.criteria) if one.load == load]
         outputs = tuple(dict.fromkeys(study.criteria[index].quantity.name for index in own))
-        found = model.derivatives(solved, changes, outputs)
+        tangents = PathTangents(solved, outputs)
+        columns = [tangents.along(change) for change in changes]
+        found = {name: np.stack([one[name] for one in columns]) for name in outputs}
         for index in own:
             criterion = study.criteria[index]
             slopes[index] = criterion.of(found[criterion.quantity.name])

@@ -180,5 +180,5 @@ def _loaded(path: LoadPath, table: Mapping[str, Any]) -> LoadPath:
     turns = {"following": following} if following and {"tip_force", "tip_moment"} & {*table} else {}
     mass = {"tip_mass": table["tip_mass"]} if "tip_mass" in table else {}
     bodies = {"body_forces": forces} if forces else {}
-    external = {**vectors, **mass, **bodies, **turns}
+    external: dict[str, Any] = {**vectors, **mass, **bodies, **turns}
     return path.loaded(**external) if external else path

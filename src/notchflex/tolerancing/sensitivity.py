@@ -12,7 +12,7 @@ from scipy.stats import qmc, sobol_indices
 
 from notchflex.tolerancing.study import Study
 
-_MOST, _LEAST = 2048, 64
+_MOST, _LEAST = 2048, 16
 """Points of each of the two sets; all indices need d + 2 times as many robots."""
 
 
@@ -47,7 +47,7 @@ def sobol(
     points = 2 ** int(math.log2(max(draws / (sources + 2), _LEAST)))
     points = min(points, _MOST)
     sampler = qmc.Sobol(2 * sources, scramble=True, rng=np.random.default_rng(seed))
-    both = np.clip(sampler.random(points), 1e-12, 1.0 - 1e-12)
+    both = sampler.random(points)
     first, second = both[:, :sources], both[:, sources:]
     mixed = np.repeat(first[None], sources, axis=0)
     for index in range(sources):

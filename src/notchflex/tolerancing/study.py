@@ -24,6 +24,10 @@ from notchflex.tolerancing.criteria import Criterion
 CODES = ("accepted", "rejected", "NOT_CONVERGED", "INVALID_ROBOT")
 """What becomes of a drawn robot; the last two meet no limit and count as rejected."""
 
+TAIL = 1e-6
+"""What a normal distribution has beyond its end is drawn at the end: 1e-6 on either side, 4.8
+standard deviations."""
+
 ACCEPTED, REJECTED, FAILED, INVALID = range(len(CODES))
 
 
@@ -84,9 +88,15 @@ class Study:
             last[one.load] = max(last.get(one.load, 0), one.step + 1)
         return {name: self.paths[name].load.part(0, steps) for name, steps in last.items()}
 
+    @cached_property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Between what the numbers of drawn robots lie, by name."""
+        low, high = (self.drawn(np.full((1, len(self.sources)), level)) for level in (0.0, 1.0))
+        return {name: (float(low[name][0]), float(high[name][0])) for name in low}
+
     def drawn(self, levels: Float[np.ndarray, "robots d"]) -> dict[str, Float[np.ndarray, " r"]]:
-        """Return the numbers of robots by name, at levels of the sources."""
-        return values_at(self.sources, levels)
+        """Return the numbers of robots by name, at levels of the sources; see `TAIL`."""
+        return values_at(self.sources, np.clip(levels, TAIL, 1.0 - TAIL))
 
     def at_levels(
         self,
@@ -110,7 +120,7 @@ class Study:
             progress: Called with the robots done and all of them.
         """
         values = np.full((count, len(self.criteria)), np.nan)
-        every = VariedRobots(self.exact, drawn)
+        every = VariedRobots(self.exact, drawn, self.ranges)
         valid = every.valid()
         robots, rows = every.take(valid), np.flatnonzero(valid)
         codes = np.where(valid, ACCEPTED, INVALID)

@@ -84,7 +84,9 @@ def rays(
     groups = _groups(robot, largest)
     sequence = qmc.Sobol(2 * len(groups) + 2, rng=seed)  # pyright: ignore[reportCallIssue]
     drawn = sequence.random(2 ** int(np.ceil(np.log2(count))))
+    # Rays side by side take as many iterations as the hardest of them: alike ones together.
     drawn = drawn[:count]
+    drawn = drawn[np.argsort(drawn[:, 0], kind="stable")]
     directions = np.zeros((count, robot.number_of_tendons))
     for number, group in enumerate(groups):
         around, share = drawn[:, 2 * number], drawn[:, 2 * number + 1]

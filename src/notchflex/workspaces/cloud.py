@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from notchflex._extras import need
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
 from notchflex.loads.external import ExternalLoad
 from notchflex.loads.validation import check_number
+from notchflex.results.quantities.registry import AXES
 from notchflex.robot import Robot
 from notchflex.workspaces.limits import Limit
 from notchflex.workspaces.shape import Hull, alpha_size, hull_of
@@ -150,9 +152,32 @@ class Workspace(Displayed):
         Raises:
             InputError: xarray is not installed.
         """
-        from notchflex.workspaces.files import dataset_of
+        need("xarray", "data", "to_xarray")
+        import xarray
 
-        return dataset_of(self)
+        vector, each = ("state", "axis"), ("state",)
+        states = {
+            "tension": (("state", "tendon"), self.tension, "N", "tendon tension at the base"),
+            "tip_position": (vector, self.tip, "mm", "position of the tip in the world"),
+            "tip_direction": (vector, self.direction, "1", "along the tube at the tip"),
+            "loading": (each, self.loading, "1", "whether the state lies on the way up"),
+            "peak_strain": (each, self.strain, "1", "largest strain of any fibre"),
+            "total_angle": (each, self.angle, "rad", "total bending angle"),
+            "hysteresis": (each, self.hysteresis, "mm", "distance to the tip on the other way"),
+            "stiffness": (each, self.stiffness, "N/mm", "of the tip where it is softest"),
+        }
+        return xarray.Dataset(
+            {
+                name: (axes, values, {"units": unit, "long_name": text})
+                for name, (axes, values, unit, text) in states.items()
+            },
+            coords={"axis": list(AXES), "tendon": np.arange(self.tension.shape[1]) + 1},
+            attrs={
+                "robot": self.robot.name,
+                "limits": "; ".join(one.text for one in self.limits),
+                "largest_tension_N": self.largest,
+            },
+        )
 
     def _summary(self) -> Summary:
         title = f"Workspace of {self.robot.name}: {len(self)} states"
@@ -160,7 +185,7 @@ class Workspace(Displayed):
         rows.append(("left out", f"{self.failed} not converged, {self.beyond} beyond limits"))
         if len(self):
             low, high = self.extent
-            for axis, a, b in zip("xyz", low, high, strict=True):
+            for axis, a, b in zip(AXES, low, high, strict=True):
                 rows.append((axis, f"{short(float(a))} to {short(float(b))} mm"))
             rows.append(("convex hull", f"{short(self.hull.size)} {self.hull.unit}"))
             if np.isfinite(self.hysteresis).any():

@@ -14,6 +14,7 @@ from notchflex.errors import InputError
 from notchflex.loads import ExternalLoad, LoadPath
 from notchflex.loads.validation import check_integer, check_is_robot, check_number, short_repr
 from notchflex.robot import Robot
+from notchflex.solver.newton import Settings
 from notchflex.workspaces.actuation import largest_tensions, rays
 from notchflex.workspaces.cloud import Workspace
 from notchflex.workspaces.limits import Limit, all_hold, limits_of
@@ -25,6 +26,9 @@ LEVELS = 16
 """Levels of tension on each way of a ray."""
 
 MOST_STATES = 20_000_000
+
+# Far below what a picture or a volume shows, and a third quicker than the usual tolerance.
+_SETTINGS = Settings(tolerance=1e-9)
 
 _MOST_STIFFNESS = 5000
 
@@ -171,7 +175,9 @@ class _Explorer:
         external = (self.load,) * tension.shape[1]
         paths = [LoadPath.of_valid(one, strokes, turn, external) for one in tension]
         outputs = tuple(dict.fromkeys([*names, "converged"]))
-        return simulate_batch(self.robot, paths, outputs=outputs, cores=self.cores)
+        return simulate_batch(
+            self.robot, paths, outputs=outputs, settings=_SETTINGS, cores=self.cores
+        )
 
 
 def _joined(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from notchflex.results.files.writing import replacing
 from notchflex.results.quantities.registry import AXES
 from notchflex.workspaces.cloud import Workspace
 from notchflex.workspaces.comparing import Overlap
-
-if TYPE_CHECKING:
-    from xarray import Dataset
 
 _PARTS = (0.05, 0.5, 0.95)
 
@@ -72,35 +69,6 @@ def overlap_documents(found: Sequence[Overlap]) -> list[dict[str, Any]]:
     return [vars(one) for one in found]
 
 
-def dataset_of(found: Workspace) -> Dataset:
-    """Return all states as a labelled data set."""
-    need("xarray", "data", "to_xarray")
-    import xarray
-
-    states = {
-        "tension": (("state", "tendon"), found.tension, "N", "tendon tension at the base"),
-        "tip_position": (("state", "axis"), found.tip, "mm", "position of the tip in the world"),
-        "tip_direction": (("state", "axis"), found.direction, "1", "along the tube at the tip"),
-        "loading": ("state", found.loading, "1", "whether the state lies on the way up"),
-        "peak_strain": ("state", found.strain, "1", "largest strain of any fibre"),
-        "total_angle": ("state", found.angle, "rad", "total bending angle"),
-        "hysteresis": ("state", found.hysteresis, "mm", "distance to the tip on the other way"),
-        "stiffness": ("state", found.stiffness, "N/mm", "of the tip where it is softest"),
-    }
-    return xarray.Dataset(
-        {
-            name: (dims, values, {"units": unit, "long_name": text})
-            for name, (dims, values, unit, text) in states.items()
-        },
-        coords={"axis": list(AXES), "tendon": np.arange(found.tension.shape[1]) + 1},
-        attrs={
-            "robot": found.robot.name,
-            "limits": "; ".join(one.text for one in found.limits),
-            "largest_tension_N": found.largest,
-        },
-    )
-
-
 def save_netcdf(found: Mapping[str, Workspace], target: str) -> None:
     """Write the states as NetCDF, each robot a group where there are several; whole or not at all.
 
@@ -113,4 +81,4 @@ def save_netcdf(found: Mapping[str, Workspace], target: str) -> None:
         for number, (label, one) in enumerate(found.items()):
             group = label.replace("/", "-") if len(found) > 1 else None
             mode = "a" if number else "w"
-            dataset_of(one).to_netcdf(temporary, engine="h5netcdf", group=group, mode=mode)
+            one.to_xarray().to_netcdf(temporary, engine="h5netcdf", group=group, mode=mode)

@@ -42,9 +42,10 @@ def test_dimensions_outside_the_range_are_named():
     assert sentence in path_warnings(shallow)
 
 
-def test_an_elastic_stop(margin):
-    robot = wrist(closing="elastic")
-    path = nf.simulate(robot, nf.pull(0.0, 8.0, steps=17))
+@pytest.mark.parametrize(("ends", "most"), [("shell", 8.0), ("rigid", 16.0)])
+def test_an_elastic_stop(margin, ends, most):
+    robot = wrist(closing="elastic", ends=ends)
+    path = nf.simulate(robot, nf.pull(0.0, most, steps=17))
     assert path.converged.all()
     ring = Side("between", 1.2)
     law = notch_stiffness(0.81, 0.7, "off-axis", 1.4, 0.8, 0.33, ring, ring)
@@ -58,7 +59,7 @@ def test_an_elastic_stop(margin):
     arm = 0.8 / closing
     beyond = stop * (angle[closed] - closing)
     margin.within("moment of the stop, relative", force[closed] * arm / beyond - 1.0, 1e-9)
-    rigid = nf.simulate(wrist(), nf.Load(tension=8.0))
+    rigid = nf.simulate(wrist(ends=ends), nf.Load(tension=most))
     assert rigid.notch_angle[0, 2] == pytest.approx(closing / law.closing_factor)
 
 

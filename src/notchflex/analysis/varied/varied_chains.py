@@ -36,8 +36,6 @@ _AIM = 1e-6
 _FLOOR = 1e-2
 _CHECKS = 8
 _MOST_NODES = 2000
-_WIDER = 1.05
-"""Ranges are made wider than the numbers by this factor, so that further robots fit in."""
 
 
 class _Form(NamedTuple):
@@ -161,32 +159,31 @@ def _fitted(
     if not any(one.gravity is not None for one in load.different):  # masses are of no effect
         places: Any = jax.tree.unflatten(form.chain.structure, form.chain.indices)
         weightless[np.append(places.body_mass, places.body_centre)] = True
-    middle = 0.5 * (table.min(axis=0) + table.max(axis=0))
-    half = np.maximum(0.5 * np.ptp(table, axis=0), 1e-9 * np.maximum(np.abs(middle), 1e-3))
+    low, high = robots.box
+    middle = 0.5 * (low + high)
+    half = np.maximum(0.5 * (high - low), 1e-9 * np.maximum(np.abs(middle), 1e-3))
     rows = np.linspace(0, len(table) - 1, _CHECKS).astype(int)
-    for wider in (_WIDER, 1.0):  # beyond the numbers there may be no robot
-        try:
-            found = fit_polynomial(
-                vector_of,
-                middle - wider * half,
-                middle + wider * half,
-                list(robots.cliques()),
-                lambda sizes: _scale(sizes, form),
-                form.parts,
-                tolerance=TOLERANCE,
-                aim=_AIM,
-                most=min(_MOST_NODES, len(table) // 3),
-                checks=table[rows],
-            )
-        except _AnotherFormError:
-            continue
-        if found is None:
-            return None
-        base, nodes = (
-            np.where(infinite | weightless, reference, one) for one in (found.base, found.nodes)
+    try:
+        found = fit_polynomial(
+            vector_of,
+            middle - half,
+            middle + half,
+            list(robots.cliques()),
+            lambda sizes: _scale(sizes, form),
+            form.parts,
+            tolerance=TOLERANCE,
+            aim=_AIM,
+            most=min(_MOST_NODES, len(table) // 3),
+            checks=table[rows],
         )
-        return found._replace(base=base, nodes=nodes)
-    return None
+    except _AnotherFormError:
+        return None
+    if found is None:
+        return None
+    base, nodes = (
+        np.where(infinite | weightless, reference, one) for one in (found.base, found.nodes)
+    )
+    return found._replace(base=base, nodes=nodes)
 
 
 def _scale(sizes: Float[np.ndarray, " m"], form: _Form) -> Float[np.ndarray, " m"]:

@@ -13,6 +13,7 @@ from notchflex.export.options import DxfVersion, PatternOptions, Seam
 
 PATTERN = Group("Flat pattern (--dxf, --svg, --pdf)", sort_key=1)
 SOLIDS = Group("Solids (--stl, --step)", sort_key=2)
+FINITE_ELEMENTS = Group("Finite elements (--inp)", sort_key=3)
 _LENGTH = partial(number, form="a length in mm, 0 or more", least=0.0)
 
 

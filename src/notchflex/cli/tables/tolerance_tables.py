@@ -57,8 +57,10 @@ def _limit_rows(found: ToleranceAnalysis) -> list[list[str]]:
         ends = [linear.nominal[index], *(worst / scale), linear.sd[index], low[index], high[index]]
         cells = [_number(one.lower * scale), _number(one.upper * scale)]
         cells += [_number(end * scale) for end in ends]
-        name = f"{one.name} [{unit}]" if unit else one.name
-        rows.append([name, *cells, f"{100.0 * outside[index]:.3g}"])
+        entry, _, place = one.name.partition(" ")
+        more = " ".join([place, f"[{unit}]" if unit else ""]).strip()
+        name = f"{entry}\n  {more}" if more else entry
+        rows.append([name, *cells, f"{100.0 * outside[index]:.1f}"])
     return rows
 
 
@@ -73,10 +75,10 @@ def _source_rows(found: ToleranceAnalysis) -> list[list[str]]:
     rows: list[list[str]] = []
     for index in found.order:
         row = [
-            found.sources[index], f"{100.0 * share[index]:.3g}", f"{first[index]:.2f}",
-            f"{total[index]:.2f}", f"{100.0 * found.control.exact[index]:.4g}",
+            found.sources[index], f"{100.0 * share[index]:.1f}", f"{first[index]:.2f}",
+            f"{total[index]:.2f}", f"{100.0 * found.control.exact[index]:.1f}",
         ]  # fmt: skip
-        rows.append(row if factor is None else [*row, _factor(factor[index])])
+        rows.append(row if factor is None else [*row, _factor(float(factor[index]))])
     return rows
 
 
@@ -89,7 +91,7 @@ def _factor(factor: float) -> str:
 def _yield_lines(found: ToleranceAnalysis) -> list[str]:
     low, high = (100.0 * end for end in found.interval)
     text = (
-        f"Yield: {100.0 * found.accepted_fraction:.4g} % meet all limits ({low:.4g} to {high:.4g} "
+        f"Yield: {100.0 * found.accepted_fraction:.1f} % meet all limits ({low:.1f} to {high:.1f} "
         f"%, 95 % interval)"
     )
     if found.wanted_yield is not None:
@@ -105,8 +107,8 @@ def advice(found: ToleranceAnalysis) -> list[str]:
     sentences: list[str] = []
     if 100.0 * exact - part >= 0.1:
         sentences.append(
-            f"Control {name} first: if it were exact, the yield would be {100.0 * exact:.4g} % "
-            f"instead of {part:.4g} %."
+            f"Control {name} first: if it were exact, the yield would be {100.0 * exact:.1f} % "
+            f"instead of {part:.1f} %."
         )
     else:
         sentences.append(
@@ -133,4 +135,4 @@ def advice(found: ToleranceAnalysis) -> list[str]:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "-"
+    return f"{value:.3g}" if math.isfinite(value) else "-"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import flag
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.results.files.writing import check_folder
@@ -28,6 +29,10 @@ def design(
             help="Write robot.toml, wishes.csv, design.json and design.svg into this folder.",
         ),
     ] = None,
+    front: Annotated[
+        bool,
+        flag("Find the front between two or three objectives: point_01.toml and so on, front.csv."),
+    ] = False,
     json: JsonFile = None,
     plot: PlotFile = None,
     quiet: Quiet = False,
@@ -40,19 +45,20 @@ def design(
     """
     from notchflex.designing.files import file_names, write_design
 
-    checked = {} if output is None else check_folder(output, file_names(), "-o", inputs=[spec])
+    checked = () if output is None else check_folder(output, file_names(), "-o", inputs=[spec])
     files = {f"-o ({file.name})": str(file) for file in checked}
     outputs = Outputs([spec], quiet=quiet, files=files, json=json, plot=plot)
     with terminal.working("loading the solver"):
         terminal.use_compile_cache()
-        from notchflex.designing import design as search
-        from notchflex.designing import design_document
+        import notchflex.designing as designing
+    if front:
+        return _front(spec, output, outputs)
     with terminal.bars("ranking robots") as progress:
-        made = search(spec, progress=progress)
+        made = designing.design(spec, progress=progress)
     if output is not None:
         written = write_design(made, output, inputs=[spec])
         terminal.note(f"written: {', '.join(map(str, written))}.")
-    outputs.write_json(lambda: design_document(made))
+    outputs.write_json(lambda: designing.design_document(made))
 
     def picture() -> object:
         from notchflex._plot import plot as drawn
@@ -65,6 +71,36 @@ def design(
     if not made.converged:
         terminal.error(f"{made.reason}.")
     return DONE if made.converged else NOT_CONVERGED
+
+
+def _front(spec: str, output: str | None, outputs: Outputs) -> int:
+    """Find a front, write and print it."""
+    import notchflex.designing as designing
+    from notchflex._plot import plot as drawn
+
+    with terminal.bars("spreading over the front") as progress:
+        found = designing.design_front(spec, progress=progress)
+    if output is not None:
+        written = designing.write_front(found, output, inputs=[spec])
+        terminal.note(f"written: {', '.join(map(str, written))}.")
+    outputs.write_json(
+        lambda: {
+            "objectives": list(found.titles),
+            "reason": found.reason,
+            "points": [designing.design_document(point) for point in found.points],
+        }
+    )
+    outputs.save_picture(lambda: drawn(found))  # pyright: ignore[reportArgumentType]
+    if outputs.prints_tables:
+        heads = ["point", *(f">{title}" for title in found.titles)]
+        rows = [
+            (str(number), *(f"{value:.5g}" for value in values))
+            for number, values in enumerate(found.objectives.tolist(), start=1)
+        ]
+        terminal.output().print(terminal.table(heads, rows, gap=2))
+    if found.reason:
+        terminal.error(f"{found.reason}.")
+    return NOT_CONVERGED if found.reason else DONE
 
 
 def _print(made: Design) -> None:

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, number
-from notchflex.cli.arguments.export import SOLIDS, PatternArguments
+from notchflex.cli.arguments.export import FINITE_ELEMENTS, SOLIDS, PatternArguments
 from notchflex.cli.arguments.loads import TendonCommand, load_columns, tendon_command
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
@@ -56,7 +56,7 @@ def export(
     pattern: PatternArguments = PatternArguments(),  # noqa: B008 - frozen
     mesh: Annotated[
         Mesh,
-        Parameter(help="How fine the mesh of `--inp` is."),
+        Parameter(group=FINITE_ELEMENTS, help="How fine the mesh is."),
     ] = "medium",
     tension: Annotated[
         tuple[TendonCommand, ...],

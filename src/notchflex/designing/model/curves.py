@@ -20,6 +20,8 @@ from notchflex.robot import Robot
 _STATIONS, _ROUNDS = 241, 4
 # Points of a curve that is given by its curvature, and steps of its integration between two.
 _POINTS, _FINE = 20, 50
+# How far to both sides of a point the direction of the axis is taken, mm.
+_ASIDE = 1e-3
 # A step of the poses along a direction, relative; points are cubic in them, or nearly so.
 _STEP = 1e-4
 
@@ -56,32 +58,49 @@ class Bodies(NamedTuple):
     rotations: np.ndarray | None = None
 
 
-def distances(
+def offsets(
     robot: Robot,
     bodies: Bodies,
     points: Float[np.ndarray, "m 3"],
     lengths: Sequence[Float[np.ndarray, " bodies"]] | None,
 ) -> Reading:
-    """Return the distance of each point from the axis, of the last one from the tip, mm.
+    """Return the vector from each point to the nearest of the axis, from the last one to the tip.
 
     Args:
         robot: The robot.
         bodies: Where it is.
         points: The points.
         lengths: Changes of the lengths of the bodies with every variable; None for values only.
+
+    Returns:
+        The vectors one after the other, mm; their slopes across the axis, as the nearest point
+        slides along.
     """
     stations = _nearest(robot, bodies, points)
     places = axis_places(robot, stations)
-    axis = _axis(places, bodies.position, bodies.rotation)
-    off = axis - points
-    size = np.linalg.norm(off, axis=1)
+    off = _axis(places, bodies.position, bodies.rotation) - points
     if lengths is None or bodies.positions is None or bodies.rotations is None:
-        return Reading(size, None)
-    # Where on the axis the nearest point lies changes no distance, to first order.
-    toward = off / np.where(size > 0.0, size, 1.0)[:, None]
+        return Reading(off.ravel(), None)
+    near = np.clip(stations + np.array([[-_ASIDE], [_ASIDE]]), 0.0, stations[-1])
+    ends = [_axis(axis_places(robot, at), bodies.position, bodies.rotation) for at in near]
+    along = ends[1] - ends[0]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    along[-1] = 0.0  # the tip does not slide
     columns = zip(bodies.positions, bodies.rotations, lengths, strict=True)
     moved = [_moved(places, bodies, *one) for one in columns]
-    return Reading(size, np.stack([np.sum(toward * one, axis=1) for one in moved], axis=1))
+    across = [one - np.sum(one * along, axis=1)[:, None] * along for one in moved]
+    return Reading(off.ravel(), np.stack([one.ravel() for one in across], axis=1))
+
+
+def distances(off: Reading) -> Reading:
+    """Return the lengths of the vectors of `offsets`, mm."""
+    vectors = off.values.reshape(-1, 3)
+    size = np.linalg.norm(vectors, axis=1)
+    if off.slopes is None:
+        return Reading(size, None)
+    toward = vectors / np.where(size > 0.0, size, 1.0)[:, None]
+    slopes = off.slopes.reshape(len(size), 3, -1)
+    return Reading(size, np.einsum("ma,mav->mv", toward, slopes))
 
 
 def _nearest(

@@ -16,7 +16,7 @@ from notchflex.analysis.derivatives.forward_model import ForwardModel
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.derivatives.tangent import Change
 from notchflex.designing.model.closings import closing_slopes
-from notchflex.designing.model.curves import Bodies, distances, target_points
+from notchflex.designing.model.curves import Bodies, distances, offsets, target_points
 from notchflex.designing.model.load_states import PROBE, Direction, Probe, StatePaths
 from notchflex.designing.model.quantities import OF_ROBOTS, edge_unit
 from notchflex.designing.model.reading import Reading
@@ -91,7 +91,11 @@ class Point:
 
     def value(self, path: str) -> Reading:
         """Values of the robot file."""
-        return self._of_robot(lambda robot: np.array(list(numbers_at(robot, path).values())))
+        found = numbers_at(self.robot, path)
+        values = np.array(list(found.values()))
+        if self.slopes_of is None:
+            return Reading(values, None)
+        return Reading(values, np.stack([self.variables.parts_of(one) for one in found]))
 
     def _of_robot(self, formula: Callable[[Robot], np.ndarray]) -> Reading:
         values = formula(self.robot)
@@ -116,22 +120,24 @@ class Point:
 
     def curve(self, curve: TargetCurve) -> Reading:
         """Distances of the points of a curve, mm."""
-        step = self.paths.step[curve.state]
+        return distances(self.offsets(curve))
+
+    def offsets(self, curve: TargetCurve) -> Reading:
+        """Vectors from the points of a curve to the axis, mm."""
+        step, points = self.paths.step[curve.state], target_points(curve)
         poses = [self.arrays[name][step] for name in ("body_position", "body_rotation")]
         if self.slopes_of is None:
-            return distances(self.robot, Bodies(*poses), target_points(curve), None)
+            return offsets(self.robot, Bodies(*poses), points, None)
         lengths = self._of_robot(lambda one: body_lengths(one.tube, one.notches)).slopes
         assert lengths is not None
         changes = [self.slopes_of(name)[:, step] for name in ("body_position", "body_rotation")]
-        return distances(
-            self.robot, Bodies(*poses, *changes), target_points(curve), list(lengths.T)
-        )
+        return offsets(self.robot, Bodies(*poses, *changes), points, list(lengths.T))
 
     def moved(self, number: int, part: float) -> Robot:
         """Return the robot with a variable moved by a part of its span."""
         x = self.x.copy()
         x[number] += part * self.variables.columns[number].span
-        return self.variables.robot_at(x)
+        return self._once(("robot", number, part), lambda: self.variables.robot_at(x))
 
     def _changes(self, model: ForwardModel, load: LoadPath) -> list[Change]:
         """Directions of all variables for a model whose loads do not depend on them."""

@@ -101,6 +101,22 @@ class Variables:
                 values[number] = getattr(state, one.load.kind)[one.load.tendon]
         return np.clip(values, self.lower, self.lower + self.span)
 
+    def parts_of(self, path: str) -> Float[np.ndarray, " v"]:
+        """Return how much of a single number of the robot file each variable makes."""
+        if path not in self._parts:
+            self._parts[path] = np.array([self._part(one, path) for one in self.columns])
+        return self._parts[path]
+
+    def _part(self, column: Column, path: str) -> float:
+        for name, weight in column.weights.items():
+            if path in numbers_at(self.robot, name):
+                return weight
+        return 0.0
+
+    @cached_property
+    def _parts(self) -> dict[str, np.ndarray]:
+        return {}
+
     def values(self, x: Float[np.ndarray, " v"]) -> dict[str, float]:
         """Return the values of the robot file, by path."""
         found: dict[str, float] = {}

@@ -63,6 +63,10 @@ class Source(Protocol):
         """Distances of the points of a curve, mm."""
         ...
 
+    def offsets(self, curve: TargetCurve) -> Reading:
+        """Vectors from the points of a curve to the axis, mm."""
+        ...
+
 
 @dataclass(frozen=True)
 class Wish:
@@ -75,6 +79,7 @@ class Wish:
         parts: What its numbers are called, such as "notch 3"; before they are made one.
         rows: Which of the quantity's numbers are meant.
         read: Takes the quantity from a source, at a state.
+        curve: The target curve that it is about.
     """
 
     asked: Measured
@@ -83,6 +88,7 @@ class Wish:
     parts: tuple[str, ...]
     rows: np.ndarray
     read: Callable[[Source, str | None], Reading]
+    curve: TargetCurve | None = None
 
     @property
     def take(self) -> str:
@@ -201,7 +207,9 @@ def _resolved(
     rows = _rows(asked, parts)
     at = f" at {asked.state}" if asked.state else ""
     at += f" less {asked.minus}" if asked.minus else ""
-    wish = Wish(asked, f"{name}{at}", unit, tuple(parts[i] for i in rows), rows, read)
+    curve = curves.get(name.removeprefix(CURVE)) if name.startswith(CURVE) else None
+    chosen_parts = tuple(parts[i] for i in rows)
+    wish = Wish(asked, f"{name}{at}", unit, chosen_parts, rows, read, curve)
     chosen = " ".join(wish.parts) if len(rows) == 1 and len(parts) > 1 else ""
     take = asked.take if asked.take not in (None, "each", "steps") else ""
     title = " ".join(one for one in (take, name, chosen) if one) + at

@@ -13,6 +13,7 @@ from notchflex.designing.search.optimality import multipliers
 from notchflex.designing.search.problem import Evaluation, Problem, Vector
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.scaled import Scaled
+from notchflex.designing.search.squares import is_sum_of_squares, nearest_squares
 from notchflex.designing.search.trust_region import approach
 
 # SLSQP keeps an estimate of the curvature, which a kink (a notch that closes) spoils: it begins
@@ -62,6 +63,9 @@ def search_from(problem: Problem, z: Vector, iterations: int) -> Found:
     if first is None:
         return Found(z, None, False, 0)
     stationary = False
+    if is_sum_of_squares(problem):
+        z, first, settled = nearest_squares(problem, z, first)
+        return Found(z, first, settled or is_stationary(problem, z, first), 0)
     z, one, done = approach(problem, z, first, iterations)
     best = z, one
     if problem.worst(one) > _FAR:  # limits that contradict each other here

@@ -55,6 +55,7 @@ class Evaluation:
         rows: The numbers of all constraints.
         bounded: The numbers that each bound is above or below.
         total: The whole sum, the largest of several numbers taken as it is.
+        has_slopes: Whether the numbers come with their derivatives.
     """
 
     point: Point
@@ -62,6 +63,7 @@ class Evaluation:
     rows: Reading
     bounded: tuple[Reading, ...]
     total: float
+    has_slopes: bool
 
 
 @dataclass(eq=False)
@@ -135,7 +137,7 @@ class Problem:
 
     def with_slopes(self, one: Evaluation, z: Vector) -> Evaluation | None:
         """Return the design at a scaled vector with its derivatives; None if they are not known."""
-        if one.rows.slopes is not None:
+        if one.has_slopes:
             return one
         try:
             return self.read(one.point, z)
@@ -159,7 +161,8 @@ class Problem:
         rows = [row_reading(one, point) for one in self.constraints]
         rows += [objective_reading(one, point) for one, _ in self.extra]
         bounded = tuple(one.wish.every(point) for one in self.bounds)
-        made = Evaluation(point, self._sum(terms), self._joined(rows), bounded, total)
+        has_slopes = point.slopes_of is not None
+        made = Evaluation(point, self._sum(terms), self._joined(rows), bounded, total, has_slopes)
         if made.objective.slopes is not None:
             size = float(np.linalg.norm(made.objective.slopes * span))
             self.steepest = max(self.steepest, size if np.isfinite(size) else 0.0)

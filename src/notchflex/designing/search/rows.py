@@ -92,22 +92,29 @@ def row_reading(wish: Wish, source: Source) -> Reading:
     return every.map(pairs(len(every.values))) if take == "pairs" else taken(every, take)
 
 
+def squared(wish: Wish, source: Source) -> Reading:
+    """Return the numbers whose squares an objective adds up: distances from a target or curve."""
+    asked = wish.asked
+    assert isinstance(asked, DesignObjective)
+    if asked.target is None:  # the mean square, which is smooth where it is 0
+        every = wish.every(source) if wish.curve is None else source.offsets(wish.curve)
+        return every.scaled(float(np.sqrt(asked.weight / len(wish.rows))))
+    made = taken(wish.every(source), wish.take)
+    return Reading(made.values - asked.target, made.slopes).scaled(float(np.sqrt(asked.weight)))
+
+
 def objective_reading(wish: Wish, source: Source) -> Reading:
     """Return what an objective adds to the sum that is minimised, in the units of the user."""
     asked = wish.asked
     assert isinstance(asked, DesignObjective)
-    every = wish.every(source)
-    if asked.target is not None:
-        made = taken(every, wish.take)
-        off = made.values - asked.target
-        slopes = None if made.slopes is None else 2.0 * asked.weight * off @ made.slopes
-        return Reading(
-            np.array([asked.weight * float(off @ off)]), None if slopes is None else slopes[None]
-        )
+    if asked.target is not None or (wish.take == "rms" and asked.goal == "minimise"):
+        off = squared(wish, source)
+        by = None if off.slopes is None else 2.0 * off.values[None] @ off.slopes
+        return Reading(np.array([float(off.values @ off.values)]), by)
     sign = asked.weight * (1.0 if asked.goal == "minimise" else -1.0)
-    if wish.take == "each":  # several numbers that each count
-        return taken(every, "sum").scaled(sign)
-    return taken(every, wish.take).scaled(sign)
+    # Several numbers that each count are added up.
+    take = "sum" if wish.take == "each" else wish.take
+    return taken(wish.every(source), take).scaled(sign)
 
 
 def violations(

@@ -11,6 +11,7 @@ from notchflex.designing.search.local import Found, search_from, search_on
 from notchflex.designing.search.nearest import nearest
 from notchflex.designing.search.problem import Problem, Progress, Vector
 from notchflex.designing.search.rows import TOLERANCE
+from notchflex.designing.search.squares import is_followed
 from notchflex.designing.search.starts import (
     Candidate,
     draw,
@@ -91,6 +92,8 @@ def search(
             found = search_from(problems[number], z, options.iterations)
             if found.evaluation is not None:
                 searches.outcomes.append(Outcome(problems[number], number, z, found))
+                if is_followed(problems[number], found.evaluation.total):
+                    break
         if searches.outcomes and searches.best.merit[0] > 0.0:
             told("searching what comes nearest", 0, 1)
             _approach(searches, options)

@@ -1,4 +1,4 @@
-"""From far away to where SLSQP converges: linear programs within a trust region.
+"""From far away to where limits hold: linear programs within a trust region.
 
 Every step minimises the linearised sum plus what limits are missed by, at a price, within a box.
 There is always a step, also where limits contradict each other at first, and no step leaves the
@@ -21,8 +21,9 @@ _FIRST, _MOST, _LAST = 0.15, 0.5, 1e-4
 _PRICE, _DEARER, _DEAREST = 10.0, 10.0, 1e5
 # A step is taken if it gains this part of what was promised; the box grows beyond the other part.
 _TAKEN, _GOOD = 0.05, 0.7
-# Little is left to be gained: SLSQP takes over.
-_SETTLED = 1e-5
+# Little is left to be gained, or nothing is missed by more than this: SLSQP takes over.
+_SETTLED, _NEAR = 1e-5, 1e-3
+_STEPS = 30
 
 
 @dataclass
@@ -80,7 +81,7 @@ class _Model:
 def approach(
     problem: Problem, z: Vector, first: Evaluation, iterations: int
 ) -> tuple[Vector, Evaluation, int]:
-    """Step by step to where all limits hold and little is left to be gained.
+    """Step to where limits hold, or are missed by least.
 
     Args:
         problem: The problem.
@@ -93,7 +94,9 @@ def approach(
     """
     one, box, price = first, _FIRST, _PRICE
     done = 0
-    while done < iterations and problem.count:
+    while done < min(iterations, _STEPS) and problem.count:
+        if problem.worst(one) <= _NEAR:
+            break
         model = _Model(problem, one, price, problem.total_size)
         step, promised = model.step(z, box)
         here = model.merit(one)
@@ -110,7 +113,7 @@ def approach(
         if other is not None and part > _TAKEN:
             full = problem.with_slopes(other, z + step)
         if full is None:
-            box = 0.4 * float(np.abs(step).max(initial=box))
+            box = 0.4 * min(box, float(np.abs(step).max()))
             continue
         z, one = np.clip(z + step, 0.0, 1.0), full
         box = min(_MOST, 2.0 * box) if part > _GOOD else box

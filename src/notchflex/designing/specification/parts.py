@@ -1,7 +1,6 @@
 """The tables of a design file: variables, states, objectives, constraints and target curves."""
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
 from typing import Annotated, Any, Literal
@@ -323,6 +322,3 @@ class DesignSpec:
             text = "is missing, and so are [[constraint]] and [[curve]]; give at least one of them."
             raise ProblemError([("objective", text)])
         return self
-
-
-NOT_COMMANDED = math.nan

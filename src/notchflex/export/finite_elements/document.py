@@ -12,6 +12,8 @@ from notchflex.export.finite_elements.half_tube import half_tube
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.tendon_spans import TendonSpan, tendon_spans
 from notchflex.export.simulators.document import TextDocument
+from notchflex.loads.external import NOTHING
+from notchflex.results import EquilibriumPath
 from notchflex.results.same_robot import robot_digest
 from notchflex.robot import ArcNotch, Linear
 
@@ -27,6 +29,7 @@ def deck_document(subject: Subject, options: DeckOptions) -> TextDocument:
     spans: list[TendonSpan] = []
     loads: list[str] = []
     if subject.path is not None:
+        _check_state(subject.path, subject.step)
         tension = np.asarray(subject.path.span_tension[subject.step])
         for tendon, own in enumerate(tension):
             if own[0] > 0.0:
@@ -53,6 +56,16 @@ def deck_document(subject: Subject, options: DeckOptions) -> TextDocument:
     ]
     facts = {"nodes": len(mesh.place), "elements": len(mesh.elements)}
     return TextDocument(deck(robot, mesh, spans, options, "\n".join(head)), warnings, facts)
+
+
+def _check_state(path: EquilibriumPath, step: int) -> None:
+    if not path.converged[step]:
+        raise InputError.NOT_CONVERGED(f"the deck has no load to carry: {path.reason[step]}")
+    if path.load.external and path.load.external[step] != NOTHING:
+        raise InputError.UNSUPPORTED(
+            "a deck carries the tensions of tendons and an end moment: leave forces, masses and "
+            "gravity out of the load"
+        )
 
 
 def _warnings(subject: Subject) -> tuple[str, ...]:

@@ -21,10 +21,10 @@ _MM = 4  # $INSUNITS
 
 @dataclass(frozen=True)
 class DxfPattern:
-    """A pattern as the text of a DXF file."""
+    """A pattern as the bytes of a DXF file."""
 
     drawing: PatternDrawing
-    text: str
+    content: bytes
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -38,7 +38,7 @@ class DxfPattern:
 
     def save(self, file: Path) -> None:
         """Write it."""
-        file.write_text(self.text, encoding="utf-8", newline="\n")
+        file.write_bytes(self.content)
 
 
 def dxf_pattern(subject: Subject, options: PatternOptions) -> DxfPattern:
@@ -50,12 +50,12 @@ def dxf_pattern(subject: Subject, options: PatternOptions) -> DxfPattern:
         InputError: See `flat_pattern`.
     """
     drawing = pattern_drawing(flat_pattern(subject, options))
-    return DxfPattern(drawing, _text_of(drawing))
+    return DxfPattern(drawing, _content_of(drawing))
 
 
-def _text_of(drawing: PatternDrawing) -> str:
-    import ezdxf
+def _content_of(drawing: PatternDrawing) -> bytes:
     from ezdxf._options import options as ezdxf_options
+    from ezdxf.document import Drawing
     from ezdxf.enums import TextEntityAlignment
 
     options = drawing.pattern.options
@@ -63,8 +63,9 @@ def _text_of(drawing: PatternDrawing) -> str:
     before = ezdxf_options.write_fixed_meta_data_for_testing
     ezdxf_options.write_fixed_meta_data_for_testing = True
     try:
-        units = 0 if options.dxf_version == "R12" else _MM  # R12 has no units
-        made = ezdxf.new(options.dxf_version, units=units)  # pyright: ignore[reportPrivateImportUsage]
+        made = Drawing.new(options.dxf_version)  # `ezdxf.new` logs that R12 has no units
+        if options.dxf_version != "R12":
+            made.units = _MM
         _layers(made)
         space = made.modelspace()
         for line in drawing.lines:
@@ -83,7 +84,8 @@ def _text_of(drawing: PatternDrawing) -> str:
         made.write(stream)
     finally:
         ezdxf_options.write_fixed_meta_data_for_testing = before
-    return stream.getvalue()
+    # Old versions are in the code page of Windows; other letters are written as \\U+XXXX.
+    return stream.getvalue().encode(made.output_encoding, errors="dxfreplace")
 
 
 def _layers(made: Drawing) -> None:

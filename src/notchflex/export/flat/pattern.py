@@ -25,8 +25,8 @@ from notchflex.robot.notches.cut import Point
 WEB_IN_KERFS = 3.0
 """A thinner web warns: the beam heats it from both sides."""
 
-WEB_CHORD = 0.001
-"""Largest distance of a curve from its chords where webs are measured [mm]."""
+WEB_CHORD = 5e-4
+"""Largest distance of a curve from its chords where webs are measured, in outer radii."""
 
 _EPSILON = 1e-9  # mm; less than this beyond the seam is on it
 
@@ -120,9 +120,9 @@ def flat_pattern(subject: Subject, options: PatternOptions) -> FlatPattern:
         _check_two_axis(found.cuts)
     end = tube_end(robot, found)
     order = sorted(found.cuts, key=lambda one: (-one.end, -one.start, one.cut.side_deg))
-    edge = Path(0.0, options.corner_radius, max(options.chord, WEB_CHORD))
-    beam = Path(options.inside, options.corner_radius, options.chord)
     radius = robot.tube.outer_radius
+    edge = Path(0.0, options.corner_radius, max(options.chord, WEB_CHORD * radius))
+    beam = Path(options.inside, options.corner_radius, options.chord)
     high = radius * math.radians(options.seam_deg)
     low = high - math.tau * radius
     cuts: list[PatternCut] = []

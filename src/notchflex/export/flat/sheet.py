@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from notchflex.export.document import Subject
 from notchflex.export.flat.drawing import DrawnLine, PatternDrawing, pattern_drawing
 from notchflex.export.flat.pattern import FlatPattern, PatternCut, flat_pattern
-from notchflex.export.flat.title import title_lines
+from notchflex.export.flat.title import plain_name, title_lines
 from notchflex.export.options import PatternOptions
 from notchflex.robot.tolerance import Tolerance
 
@@ -85,7 +85,7 @@ def pattern_sheet(subject: Subject, options: PatternOptions) -> PatternSheet:
         pages = [_pattern_page(pattern_drawing(pattern))]
         for start in range(0, len(rows), _ROWS):
             pages.append(_table_page(pattern, rows[start : start + _ROWS]))
-        pages.append(dimensioned_figure(subject.robot))
+        pages.append(dimensioned_figure(subject.robot.replace(name=plain_name(subject.robot))))
     return PatternSheet(pattern, pages)
 
 
@@ -94,14 +94,14 @@ def _new_page(title: str) -> tuple[Figure, Axes]:
 
     figure = Figure(figsize=_PAPER)
     axes = figure.add_axes((0.06, 0.06, 0.88, 0.86))
-    figure.text(0.06, 0.945, title, fontsize=12.0, va="center")
+    figure.text(0.06, 0.945, title, fontsize=12.0, va="center", parse_math=False)
     return figure, axes
 
 
 def _pattern_page(drawing: PatternDrawing) -> Figure:
     """Draw the pattern to scale, with the numbers of its cuts and the title block below."""
     pattern = drawing.pattern
-    figure, axes = _new_page(f"{pattern.robot.name}: flat pattern")
+    figure, axes = _new_page(f"{plain_name(pattern.robot)}: flat pattern")
     figure.delaxes(axes)
     axes = figure.add_axes((0.08, 0.44, 0.86, 0.46))
     for line in drawing.lines:
@@ -117,7 +117,8 @@ def _pattern_page(drawing: PatternDrawing) -> Figure:
     lines += [f"WARNING: {text}" for text in pattern.warnings]
     tolerances = [f"{one.value} {_written(one)}" for one in pattern.robot.tolerance]
     lines += [f"tolerances of the robot file: {', '.join(tolerances)}"] if tolerances else []
-    figure.text(0.06, 0.37, "\n".join(lines), fontsize=8.0, va="top", wrap=True)
+    words = "\n".join(lines)
+    figure.text(0.06, 0.37, words, fontsize=8.0, va="top", wrap=True, parse_math=False)
     return figure
 
 
@@ -154,7 +155,7 @@ def _row(pattern: FlatPattern, one: PatternCut) -> list[str]:
 
 
 def _table_page(pattern: FlatPattern, rows: Sequence[Sequence[str]]) -> Figure:
-    figure, axes = _new_page(f"{pattern.robot.name}: cuts, nominal on the outer surface")
+    figure, axes = _new_page(f"{plain_name(pattern.robot)}: cuts, nominal on the outer surface")
     axes.set_axis_off()
     made = axes.table(
         cellText=[list(row) for row in rows], colLabels=list(_HEADS), loc="upper center"

@@ -10,6 +10,7 @@ from xml.sax.saxutils import escape, quoteattr
 from notchflex.export.document import Subject
 from notchflex.export.flat.drawing import LAYERS, DrawnLine, PatternDrawing, pattern_drawing
 from notchflex.export.flat.pattern import flat_pattern
+from notchflex.export.flat.title import plain_name
 from notchflex.export.options import PatternOptions
 
 _COLOURS = {"CUT": "#ff0000", "CUT_OFF": "#0000ff", "REFERENCE": "#808080", "TEXT": "#000000"}
@@ -55,7 +56,7 @@ def _text_of(drawing: PatternDrawing) -> str:
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide:.6g}mm" height="{high:.6g}mm" '
         f'viewBox="{left - _MARGIN!r} {-top - _MARGIN!r} {wide!r} {high!r}">\n'
-        f"<title>{escape(drawing.pattern.robot.name)}: flat pattern</title>\n"
+        f"<title>{escape(plain_name(drawing.pattern.robot))}: flat pattern</title>\n"
     )
     groups = [_group(drawing, layer) for layer in LAYERS]
     return head + "".join(groups) + "</svg>\n"

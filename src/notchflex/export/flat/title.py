@@ -5,6 +5,13 @@ from __future__ import annotations
 from notchflex import __version__
 from notchflex.export.flat.pattern import FlatPattern
 from notchflex.results.same_robot import robot_digest
+from notchflex.robot import Robot
+
+
+def plain_name(robot: Robot) -> str:
+    """Return the name of a robot in one line, without characters that no file takes."""
+    words = "".join(letter if letter.isprintable() else " " for letter in robot.name)
+    return " ".join(words.split()) or "robot"
 
 
 def title_lines(pattern: FlatPattern) -> list[str]:
@@ -12,7 +19,7 @@ def title_lines(pattern: FlatPattern) -> list[str]:
     robot, options = pattern.robot, pattern.options
     tube, material = robot.tube, robot.material
     lines = [
-        robot.name,
+        plain_name(robot),
         f"tube: outer diameter {tube.outer_diameter:.6g} mm, inner diameter "
         f"{tube.inner_diameter:.6g} mm; material of the model: {material.kind}",
         _kerf_line(pattern),

@@ -15,8 +15,8 @@ from notchflex.errors import InputError
 from notchflex.robot.notches.cut import NotchCut, Point
 from notchflex.robot.notches.profile import Arc, Line, pieces
 
-_DEEPEST = 20
-"""Halvings of a piece at most: a millionth of it."""
+_DEEPEST = 14
+"""Halvings of a piece at most: 16384 chords."""
 _STRAIGHT = 1e-12
 """A point nearer than this to the line of its neighbours is left out [mm]."""
 
@@ -111,9 +111,14 @@ def _flattened(curve: Callable[[float], Point], chord: float) -> list[Point]:
         away = max(
             _distance(curve(low + part * (high - low)), start, end) for part in (0.25, 0.5, 0.75)
         )
-        if away <= chord or depth == _DEEPEST:
+        if away <= chord:
             points.append(start)
             return
+        if depth == _DEEPEST:
+            raise InputError.OUT_OF_RANGE(
+                f"chord: with {chord:g} mm a curve of this pattern needs more than "
+                f"{2**_DEEPEST} points; give a larger chord."
+            )
         middle = 0.5 * (low + high)
         add(low, middle, depth + 1)
         add(middle, high, depth + 1)

@@ -44,17 +44,21 @@ def smallest_web(
         ends = ((edge[:, 0].min() - start, "cut-off"), (end - edge[:, 0].max(), "tip"))
         for width, other in ends:
             best = min(best, Web(float(width), (name, other)), key=lambda web: web.width)
+    # From the tip on: a cut that starts farther away than the best web so far ends the search.
+    order = sorted(range(len(edges)), key=lambda number: -edges[number][:, 0].max())
     shift = np.array([0.0, around])
-    for first, (name, edge) in enumerate(zip(names, edges, strict=True)):
-        for second in range(first, len(edges)):
-            turns = (1.0,) if first == second else (-1.0, 0.0, 1.0)
-            for turn in turns:
-                other = edges[second] + turn * shift
-                if _apart(edge, other) >= best.width:
+    for place, first in enumerate(order):
+        for second in order[place:]:
+            edge, other = edges[first], edges[second]
+            if edge[:, 0].min() - other[:, 0].max() >= best.width:
+                break
+            for turn in (1.0,) if first == second else (-1.0, 0.0, 1.0):
+                moved = other + turn * shift
+                if _apart(edge, moved) >= best.width:
                     continue
-                width = 0.0 if _overlap(edge, other) else _distance(edge, other)
+                width = 0.0 if _overlap(edge, moved) else _distance(edge, moved)
                 if width < best.width:
-                    best = Web(width, (name, names[second]))
+                    best = Web(width, (names[first], names[second]))
     return best
 
 

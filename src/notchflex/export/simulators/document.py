@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +14,7 @@ from notchflex._extras import install_command
 from notchflex.export.document import Subject
 from notchflex.export.simulators.joint_model import JointModel, joint_model
 from notchflex.export.simulators.mjcf import mjcf
-from notchflex.export.simulators.mujoco_run import SimulatorError, measure_errors
+from notchflex.export.simulators.mujoco_run import SimulatorError, has_mujoco, measure_errors
 from notchflex.export.simulators.options import SimulatorOptions
 from notchflex.export.simulators.transmission import transmission_table
 from notchflex.export.simulators.urdf import urdf
@@ -76,10 +75,10 @@ def mjcf_document(subject: Subject, options: SimulatorOptions) -> TextDocument:
     )
     text = mjcf(model, _head(model, *about))
     facts: dict[str, Any] = {"largest_tension_N": model.top}
-    if importlib.util.find_spec("mujoco") is None:
+    if not has_mujoco():
         sentence = (
-            "The error of the MJCF file against the chain was not measured, because MuJoCo is not "
-            f"installed: {install_command('robotics')}."
+            "The error of the MJCF file against the chain was not measured, because MuJoCo 4.0 or "
+            f"newer is not installed: {install_command('robotics')}."
         )
         return TextDocument(mjcf(model, _head(model, *about, sentence)), (sentence,), facts)
     errors = measure_errors(model, text)

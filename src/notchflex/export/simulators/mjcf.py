@@ -16,7 +16,15 @@ import numpy as np
 
 from notchflex.export.simulators.joint_model import JointModel
 from notchflex.export.simulators.springs import HingeSpring, potential_range
-from notchflex.export.simulators.text import METRE, add, comment, finished, inertia, quaternion
+from notchflex.export.simulators.text import (
+    METRE,
+    add,
+    comment,
+    finished,
+    inertia,
+    printable,
+    quaternion,
+)
 
 TIME_STEP = 5e-4  # s
 # Turn of a drum before it yields, of about 1 rad over the whole range: smaller is closer to dry
@@ -57,7 +65,7 @@ def mjcf(model: JointModel, head: str = "", numbers: Mapping[str, float] | None 
         head: What stands at the head of the file.
         numbers: Named numbers that the file carries as `<custom><numeric>`.
     """
-    root = ElementTree.Element("mujoco", model=model.robot.name)
+    root = ElementTree.Element("mujoco", model=printable(model.robot.name))
     root.append(comment(head))
     add(root, "compiler", angle="radian", autolimits="true")
     add(
@@ -116,7 +124,7 @@ def _bodies(root: ElementTree.Element, model: JointModel, drums: list[_Drum | No
         stiffness = METRE * spring.largest_stiffness
         resolved = (TIME_STEP / _RESOLVED) ** 2
         armature = stiffness * resolved
-        inertia = armature + yields * resolved * steepest**2
+        with_drum = armature + yields * resolved * steepest**2
         limit = {"range": [-np.pi, model.limit[j]]} if np.isfinite(model.limit[j]) else {}
         own = hinges.free_rotation[j].T
         add(
@@ -128,7 +136,7 @@ def _bodies(root: ElementTree.Element, model: JointModel, drums: list[_Drum | No
             axis=own @ hinges.axis[j],
             stiffness=METRE * spring.stiffness,
             armature=armature,
-            damping=2.0 * np.sqrt(stiffness * inertia),
+            damping=2.0 * np.sqrt(stiffness * with_drum),
             **limit,
             **(
                 {"solreflimit": [4 * TIME_STEP, 1], "solimplimit": [0.9995, 0.9995, 1e-4]}

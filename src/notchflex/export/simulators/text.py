@@ -56,7 +56,12 @@ def _text(value: object) -> str:
 
 def comment(text: str) -> Any:
     """Return a comment; XML allows no two hyphens in one."""
-    return ElementTree.Comment(f"\n{text.replace('--', '- -')}\n")
+    return ElementTree.Comment(f"\n{printable(text).replace('--', '- -')}\n")
+
+
+def printable(text: str) -> str:
+    """Return a text without the control characters that XML does not allow."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
 def finished(root: ElementTree.Element) -> str:

@@ -12,7 +12,15 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.export.simulators.joint_model import JointModel
-from notchflex.export.simulators.text import METRE, add, comment, finished, inertia, roll_pitch_yaw
+from notchflex.export.simulators.text import (
+    METRE,
+    add,
+    comment,
+    finished,
+    inertia,
+    printable,
+    roll_pitch_yaw,
+)
 
 _FASTEST = 100.0  # rad/s; a limit is required, and quasi-static joints know none
 
@@ -24,7 +32,7 @@ def urdf(model: JointModel, head: str = "") -> str:
         model: The robot as bodies and hinges.
         head: What stands at the head of the file.
     """
-    root = ElementTree.Element("robot", name=model.robot.name.replace(" ", "_"))
+    root = ElementTree.Element("robot", name=printable(model.robot.name).replace(" ", "_"))
     root.append(comment(head))
     hinges = model.hinges
     # A link's frame is that of the joint before it: in the hinge, turned as the body.

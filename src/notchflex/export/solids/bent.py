@@ -129,10 +129,34 @@ class Motion:
         return new
 
 
-def bent_solid(straight: Manifold, motion: Motion) -> Manifold:
-    """Bend the straight solid of a robot."""
+def bent_solid(straight: Manifold, motion: Motion, cuts: RobotCuts) -> Manifold:
+    """Bend the straight solid of a robot.
+
+    Its edges are refined to the length of a piece of a flexure. Lengths of tube without cuts, which
+    stay straight, are shortened meanwhile, so that they get few triangles.
+    """
     length = min(float(np.ptp(zone.places)) for zone in motion.zones) / STEPS
-    return straight.refine_to_length(length).warp_batch(motion)
+    box = straight.bounding_box()
+    low, high = float(box[2]), float(box[5])
+    knots = [low - 1.0]  # below the tube: a cut may start at its very end
+    for one in sorted(cuts.cuts, key=lambda one: one.start):
+        if one.start > knots[-1]:
+            knots += [one.start, one.end]
+        else:  # it overlaps along the tube with the one before
+            knots[-1] = max(knots[-1], one.end)
+    knots.append(high)
+    steps = np.diff(knots)
+    steps[::2] = np.minimum(steps[::2], 2.0 * length)
+    short = np.concatenate([[knots[0]], knots[0] + np.cumsum(steps)])
+
+    def along(points: Points, old: Points, new: Points) -> Points:
+        return np.column_stack([points[:, :2], np.interp(points[:, 2], old, new)])
+
+    whole = np.array(knots)
+    shorter = straight.warp_batch(lambda points: along(points, whole, short))
+    return shorter.refine_to_length(length).warp_batch(
+        lambda points: motion(along(points, short, whole))
+    )
 
 
 def _turned(turns: Points, points: Points) -> Points:

@@ -19,6 +19,7 @@ from notchflex import __version__
 from notchflex.errors import InputError
 from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.document import Subject
+from notchflex.export.flat.title import plain_name
 from notchflex.export.options import SolidOptions
 from notchflex.export.solids.bent import Motion, is_bent
 from notchflex.export.solids.checks import check_channels, check_one_piece, check_window
@@ -60,7 +61,7 @@ class StepSolid:
         """Write it."""
         cad = import_module("build123d")
         digest = robot_digest(self.robot)
-        self.solid.label = f"{self.robot.name}; notchflex {__version__}, robot {digest}"
+        self.solid.label = f"{plain_name(self.robot)}; notchflex {__version__}, robot {digest}"
         if not cad.export_step(self.solid, file, timestamp=_STAMP):
             raise OSError(f"build123d could not write {file}")
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from notchflex.errors import InputError
 from notchflex.export.cuts import RobotCuts
 from notchflex.export.options import SolidOptions
 from notchflex.export.solids.checks import check_channels, check_window
@@ -23,14 +24,23 @@ from notchflex.robot.notches.profile import outline
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-FEWEST_SIDES = 48
+FEWEST_SIDES, MOST_SIDES = 48, 2000
 _BEYOND = 2.0
 """How far a cutting solid reaches, in outer radii."""
 
 
 def sides_of(robot: Robot, chord: float) -> int:
-    """Return the number of flat sides of the tube at which they are near enough to round."""
+    """Return the number of flat sides of the tube at which they are near enough to round.
+
+    Raises:
+        InputError: There would be very many.
+    """
     step = math.acos(max(1.0 - 2.0 * chord / robot.tube.outer_radius, 0.0))
+    if math.pi > MOST_SIDES * step:
+        raise InputError.OUT_OF_RANGE(
+            f"chord: with {chord:g} mm the tube would have more than {MOST_SIDES} flat sides; give "
+            "a larger chord."
+        )
     return max(FEWEST_SIDES, 4 * math.ceil(math.pi / step / 4.0))
 
 

@@ -54,6 +54,8 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
         )  # fmt: skip
         if notch.closing == "elastic":
             closure, stop = closure / law.closing_factor, 1.0 / law.closed_ratio
+            if notch.ends == "rigid":  # the ratio is over a notch with its ends
+                stop *= law.weak / notch.height
         if notch.ends == "shell":
             centroid -= law.coupling / law.weak
             centre = constant(law.shear_centre - centroid)

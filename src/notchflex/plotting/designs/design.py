@@ -8,11 +8,22 @@ import numpy as np
 
 from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, shape_panel
-from notchflex.plotting.sheet import BELOW, Cell, Curve, Mark, Note, Panel, Span, dots, stack
+from notchflex.plotting.sheet import (
+    BELOW,
+    BESIDE,
+    Cell,
+    Curve,
+    Mark,
+    Note,
+    Panel,
+    Span,
+    dots,
+    stack,
+)
 from notchflex.plotting.style import BLACK, BLUE, GREY, VERMILLION
 
 if TYPE_CHECKING:
-    from notchflex.designing import Design
+    from notchflex.designing import Design, WishResult
     from notchflex.results import EquilibriumPath
 
 BEFORE, AFTER = GREY, BLUE
@@ -38,7 +49,9 @@ def design_picture(made: Design, *, title: str = "") -> Picture:
         panel = shape_panel(one, steps, plane_of(one), title=label, colours=shades, legend=BELOW)
         cells.append(Cell(_with_curves(panel, made, one, label), 0, column, 2))
         column += 1
-    cells += stack([_variables(made), _wishes(made)], column)
+    several = [one for one in made.wishes if len(one.achieved) > 1]
+    beside = [_variables(made), *(_numbers(one) for one in several[:1])]
+    cells += stack(beside, column, 1 if several else 2)
     name = title or f"{made.spec.name}: {made.before.name}"
     return Picture(name, 1.2 + 3.6 * (column + 1), 6.8, cells, [])
 
@@ -75,16 +88,11 @@ def _variables(made: Design) -> Panel:
         dots(np.stack([at, after], axis=1), AFTER, 5.0, name="designed"),
     ]
     labels = "variable [number]", "from least (0) to greatest (1)"
-    return Panel(items, *labels, title="variables", legend=BELOW, whole="x", y_range=(-0.08, 1.08))
+    return Panel(items, *labels, title="variables", legend=BESIDE, whole="x", y_range=(-0.08, 1.08))
 
 
-def _wishes(made: Design) -> Panel:
-    """The notch by notch numbers of the first wish that has several, or a note."""
-    several = [one for one in made.wishes if len(one.achieved) > 1]
-    if not several:
-        lines = [f"{w.title}: {w.achieved[0]:.4g} {w.unit}" for w in made.wishes[:6]]
-        return Panel([Note("\n".join(lines), corner=True)], "", "", title="achieved")
-    one = several[0]
+def _numbers(one: WishResult) -> Panel:
+    """The numbers of a wish that has several, before and after."""
     at = np.arange(1, len(one.achieved) + 1, dtype=float)
     items: list[Mark] = []
     for values, colour, name in ((one.before, BEFORE, "before"), (one.achieved, AFTER, "designed")):
@@ -92,7 +100,7 @@ def _wishes(made: Design) -> Panel:
             points = np.stack([at, np.array(values)], axis=1)
             items.append(Curve(points, colour, marker="o", name=name))
     unit = f" [{one.unit}]" if one.unit else ""
-    return Panel(items, "number", f"{one.title}{unit}", title=one.asked, legend=BELOW, whole="x")
+    return Panel(items, "number", f"{one.title}{unit}", title=one.asked, whole="x")
 
 
 __all__ = ["design_picture"]

@@ -77,7 +77,8 @@ def _band(
 def _readings(sensed: SensedForce, x: NDArray[np.float64]) -> list[Panel]:
     """Return the tensions of the best history."""
     assert sensed.path is not None
-    tension = sensed.path.tension
+    shown = sensed.group[sensed.converged]
+    tension = sensed.path.tension[shown]
     colours = [GREY, GREEN, ORANGE, BLUE]
     items = [
         Curve(

@@ -24,7 +24,7 @@ from notchflex.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VER
 if TYPE_CHECKING:
     from notchflex.tolerancing import ToleranceAnalysis
 
-MOST_LIMITS, MOST_BARS = 5, 12
+MOST_LIMITS, MOST_BARS = 4, 12
 _BINS = 60
 
 
@@ -48,8 +48,8 @@ def tolerance_picture(found: ToleranceAnalysis) -> Picture:
     rows = -(-len(panels) // columns)
     low, high = (100.0 * end for end in found.interval)
     title = (
-        f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.4g} % "
-        f"({low:.4g} to {high:.4g} %) of {found.draws} robots"
+        f"{found.robot.name}: yield {100.0 * found.accepted_fraction:.1f} % "
+        f"({low:.1f} to {high:.1f} %) of {found.draws} robots"
     )
     cells, size = grid(panels, columns), (0.8 + 4.2 * columns, 1.0 + 3.0 * rows)
     return Picture(title, *size, cells, _legend(found))
@@ -89,8 +89,7 @@ def _histogram(found: ToleranceAnalysis, index: int) -> Panel:
             items.append(Area(_steps(edges, tops, part), colour, colour, width=0.0, name=name))
     for end in (lower, upper):
         if np.isfinite(end):
-            look = {"width": 1.4, "layer": 4, "group": "limit"}
-            items.append(Span("x", end, end, VERMILLION, name="limit", **look))
+            items.append(Span("x", end, end, VERMILLION, width=1.4, layer=4, name="limit"))
     nominal = found.linear.nominal[index] * scale
     items.append(Span("x", nominal, nominal, GREEN, width=1.4, layer=4, name="drawing"))
     for end in found.linear.worst_case[index] * scale:

@@ -154,7 +154,7 @@ def _loads_from(text: str) -> tuple[Any, ...]:
 def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     import jax.tree_util as tree_util
 
-    from notchflex.results.recorded import BEFORE, REPORTED
+    from notchflex.results.recorded import BEFORE, MATERIAL, REPORTED
     from notchflex.results.state import leaf_name
 
     run = path.run
@@ -170,6 +170,8 @@ def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     yield _HELD[1], path.determinant_sign
     for name in BEFORE:
         yield _START + name, run.before(name)
+    if not isinstance(run.solved.memory.material, tuple):
+        yield _START + MATERIAL, run.before(MATERIAL)
     for key, leaf in tree_util.tree_flatten_with_path(run.solved)[0]:
         yield _STATE + leaf_name(key), np.asarray(leaf)
 
@@ -179,7 +181,7 @@ def _path_of(record: Record) -> EquilibriumPath:
 
     from notchflex.loads import LoadPath
     from notchflex.results.path import EquilibriumPath
-    from notchflex.results.recorded import BEFORE, REPORTED, Recorded
+    from notchflex.results.recorded import BEFORE, MATERIAL, REPORTED, Recorded
     from notchflex.results.state import leaf_name
     from notchflex.robot import robot_from_text
     from notchflex.solver.newton import Settings
@@ -214,10 +216,15 @@ def _path_of(record: Record) -> EquilibriumPath:
         name: _of_shape(arrays["solver_converged" if name == "converged" else name], (steps,), name)
         for name in _RUN
     }
+    first = {name: arrays[_START + name] for name in BEFORE}
+    at_rest = ready.rest.memory.material
+    if not isinstance(at_rest, tuple):  # older files do not have it
+        material = arrays.get(_START + MATERIAL, np.asarray(at_rest))
+        first[MATERIAL] = _of_shape(material, np.shape(at_rest), _START + MATERIAL)
     recorded = Recorded(
         solved=tree_util.tree_unflatten(structure, state),
         reported=reported,
-        first={name: arrays[_START + name] for name in BEFORE},
+        first=first,
         held=(arrays[_HELD[0]], arrays[_HELD[1]]),
         **run,
     )

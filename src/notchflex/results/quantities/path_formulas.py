@@ -9,7 +9,6 @@ from jaxtyping import Float, Int
 
 from notchflex._quantity import Quantity
 from notchflex.solver.derived.quantities import believable
-from notchflex.solver.programs.run import SolverRun
 
 if TYPE_CHECKING:  # for the type only: a path evaluates these
     from notchflex.results.path import EquilibriumPath
@@ -58,9 +57,7 @@ def material_dissipation(path: EquilibriumPath) -> np.ndarray:
     chain, after = path.chain, path.run.solved.memory.material
     if isinstance(after, tuple):  # no memory
         return np.zeros((len(path), chain.flexures))
-    first = chain.law.rest(chain.rods.section)
-    if isinstance(path.run, SolverRun):  # a file keeps no memory of the state before its path
-        first = path.prepared.state.unpack(path.run.first).memory.material
+    first = path.run.before("material")
     before = np.broadcast_to(first, after.shape)
     if not path.each_from_rest:
         before = np.concatenate([before[:1], after[:-1]])

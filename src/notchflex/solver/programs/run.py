@@ -126,10 +126,15 @@ class SolverRun:
         return unpad_quantity(self._prepared.chain, name, values)
 
     def before(self, name: str) -> np.ndarray:
-        """Return a quantity of the state before the first load; of its shape tension and stroke."""
-        if name not in ("tension", "stroke"):
+        """Return a quantity of the state before the first load.
+
+        Of its shape tension and stroke are known; "material" is the memory of the material.
+        """
+        if name not in ("tension", "stroke", "material"):
             return self._derived[name][0]
         start: SolverState = self._prepared.state.unpack(self.first)
+        if name == "material":
+            return np.asarray(start.memory.material)
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:

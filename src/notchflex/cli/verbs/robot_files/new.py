@@ -23,7 +23,7 @@ NOTCHES = Group("Notches (one value for all, or one for each, base to tip)", sor
 TENDONS = Group("Tendons (one value for each)", sort_key=3)
 MATERIAL = Group("Material and friction", sort_key=4)
 
-TEMPLATE = Path(__file__).parents[2] / "designing" / "specification" / "template.toml"
+TEMPLATE = Path(__file__).parents[3] / "designing" / "specification" / "template.toml"
 """The design file that `--design` writes."""
 
 _SECTIONS = ("notch", "tendon", "material", "friction")

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import json
+from typing import Annotated
 
+from notchflex.cli.arguments.conversion import flag
 from notchflex.results.files.streams import write_document
 from notchflex.robot import json_schema
 
 
-def schema() -> None:
-    """Print the JSON Schema of robot files."""
-    write_document(json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n")
+def schema(*, design: Annotated[bool, flag("The schema of design files instead.")] = False) -> None:
+    """Print the JSON Schema of robot files, or of design files."""
+    if design:
+        from notchflex.designing.specification.schema import design_schema
+
+        document = design_schema()
+    else:
+        document = json_schema()
+    write_document(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")

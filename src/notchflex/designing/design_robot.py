@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.designing.explanation import explain
+from notchflex.designing.explanation import curves_missed, explain
 from notchflex.designing.forms import problems_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.result import (
@@ -59,13 +59,18 @@ def design(
         >>> f"{made.robot.notches[0].height:.4f} mm"
         '0.6268 mm'
     """
-    asked, first = _given(spec, robot)
+    asked, first = given(spec, robot)
     problems = problems_of(asked, first)
     searches = search(problems, asked.search, progress)
     return made_of(asked, first, problems, searches)
 
 
-def _given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
+def given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
+    """Return a specification given in any form, and the robot to begin with.
+
+    Raises:
+        InputError: It is not allowed, or its robot cannot be read.
+    """
     if isinstance(spec, str | os.PathLike):
         asked, named = read_design(spec)
         return asked, robot or named
@@ -97,6 +102,8 @@ def made_of(spec: DesignSpec, first: Robot, problems: list[Problem], searches: S
         reason = "interrupted; this is the best robot so far"
     elif not met:
         reason = "not all constraints can be met; this is the robot that comes nearest"
+    elif far := curves_missed(best):
+        reason = far[0].rstrip(".")
     elif not found.stationary:
         reason = "the search ended before it settled; try more starts or iterations"
     solves, gradients = total_counts(problems)

@@ -1,0 +1,214 @@
+"""A controller for loops: one target in, drives out, within a fixed number of solves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.control.drive_model import Response
+from notchflex.control.inverse import make_problem, present_drives
+from notchflex.control.limits import Drive, Limits
+from notchflex.control.observer import Observer
+from notchflex.control.problem import TargetSearch
+from notchflex.control.search import find
+from notchflex.control.targets import DIRECTION, Targets, target_shapes
+from notchflex.errors import Failure, InputError
+from notchflex.loads import Load
+from notchflex.loads.validation import check_is_robot, check_number, short_repr
+from notchflex.results.state import SavedState, State
+from notchflex.robot import Robot
+
+
+class ControlStatus(NamedTuple):
+    """How the last step of a controller went.
+
+    Attributes:
+        reached: Whether the model meets the target.
+        code: Name of the `Failure` where it does not; "INVALID_INPUT" for a target or a
+            measurement that cannot be used; empty otherwise.
+        error: Weighted distance of the model from the target (mm, N, rad); NaN where none is known.
+        solves: How many loads were solved.
+        held: Whether the command is the last good one, because none was found.
+    """
+
+    reached: bool
+    code: str
+    error: float
+    solves: int
+    held: bool
+
+
+_START = ControlStatus(False, "", float("nan"), 0, False)
+
+
+class Controller:
+    """Drives for one target after the other, for use in a loop.
+
+    A step never raises and never takes more than its number of solves. Feedforward is the exact
+    inverse with friction history. Two kinds of measurements correct it: what is aimed at itself,
+    such as the position of the tip, and tension with stroke, which correct the friction history
+    and the coefficient of friction.
+
+    Args:
+        robot: The robot.
+        aim: Name of the quantity that targets give, or several names.
+        state: The present state; rest where not given.
+        load: External loads, and tendons that are held; as for `notchflex.reach`.
+        drive: Whether "tension" (N) or "stroke" (mm) is commanded.
+        limits: Limits on drives and robot.
+        weights: What an error of a quantity counts per unit (mm, N, rad); 1 each.
+        search: Tolerance, and the largest number of solves in a step.
+        feedback: Part of the measured deviation that a step takes up, 0 to 1.
+        observer: Corrects history and friction by measured tension and stroke; none where None.
+
+    Raises:
+        InputError: Anything that cannot be used. Steps do not raise.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> controller = Controller(load_robot("pacheco2021-a"), "total_angle")
+        >>> [round(float(controller.step(angle)[0]), 3) for angle in (0.3, 0.6, 0.3)]
+        [0.322, 0.66, 0.307]
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        aim: str | Sequence[str] = "tip_position",
+        *,
+        state: State | SavedState | None = None,
+        load: Load | None = None,
+        drive: Drive = "tension",
+        limits: Limits | None = None,
+        weights: Mapping[str, float] | None = None,
+        search: TargetSearch | None = None,
+        feedback: float = 0.3,
+        observer: Observer | None = None,
+    ) -> None:
+        shapes = target_shapes(check_is_robot(robot))
+        names = (aim,) if isinstance(aim, str) else tuple(aim)
+        for name in names:
+            if name not in shapes:
+                raise InputError.UNKNOWN_NAME(
+                    f"there is no target {short_repr(name)}; there are {', '.join(shapes)}"
+                )
+        if not 0.0 <= check_number(feedback, "feedback") <= 1.0:
+            raise InputError.OUT_OF_RANGE(f"feedback is from 0 to 1; got {feedback:g}")
+        self._shapes = {name: shapes[name] for name in names}
+        some = Targets({name: np.zeros((1, *shape)) for name, shape in self._shapes.items()})
+        search = search or TargetSearch(tolerance=1e-5, solves=10)
+        self._problem, aims = make_problem(robot, some, state, load, drive, limits, weights, search)
+        self._rate = np.inf if limits is None or limits.rate is None else limits.rate
+        self._feedback, self.observer = feedback, observer
+        self._deviation = np.zeros(aims.goals.shape[1])
+        self._before = self._problem.model.first
+        self._command = present_drives(self._problem, self._before)
+        self._known: Response | None = None
+        self.status = _START
+        # Programs are compiled or read now, not within the loop.
+        self._problem.model.solve(self._before, self._command)
+
+    def step(
+        self,
+        target: Any,
+        *,
+        measured: Any = None,
+        tension: Any = None,
+        stroke: Any = None,
+    ) -> Float[np.ndarray, " t"]:
+        """Return drives for a target.
+
+        Args:
+            target: Values of the quantity that is aimed at, by name if there are several (mm, N,
+                rad); NaN where an entry is free.
+            measured: The same as measured now; NaN where it was not. Nothing where None.
+            tension: Measured tension of every tendon, N; for the observer.
+            stroke: Measured stroke of every tendon, mm; for the observer.
+
+        Returns:
+            Tensions (N) or strokes (mm) to command. `status` says how the step went; after a
+            failure they are the last good ones, or those that come nearest.
+        """
+        try:
+            goal = self._flat(target)
+            if np.isinf(goal).any() or np.isnan(goal).all():
+                raise ValueError
+            if self.observer is not None and tension is not None and stroke is not None:
+                self._observe(tension, stroke)
+            if measured is not None:
+                self._correct(self._flat(measured))
+            self._seek(goal - self._deviation)
+        except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
+            # A loop must go on whatever it is given: the robot stays where it is.
+            self.status = ControlStatus(False, "INVALID_INPUT", float("nan"), 0, True)
+        return self._command.copy()
+
+    @property
+    def command(self) -> Float[np.ndarray, " t"]:
+        """The last command, N or mm."""
+        return self._command.copy()
+
+    @property
+    def values(self) -> Float[np.ndarray, " m"]:
+        """What the model has at the last command, of what is aimed at, flattened."""
+        if self._known is None:
+            self._known = self._problem.model.solve(self._before, self._command)
+        return self._known.values[self._problem.entries]
+
+    def _flat(self, given: Any) -> np.ndarray:
+        """Values by name, or those of the only quantity, as one vector."""
+        named = given if isinstance(given, Mapping) else {next(iter(self._shapes)): given}
+        if len(named) != len(self._shapes):
+            raise ValueError
+        parts = []
+        for name, shape in self._shapes.items():
+            part = np.asarray(named[name], float)
+            if part.shape != shape:
+                raise ValueError
+            if name == DIRECTION:
+                part = part / np.sqrt(part @ part)
+            parts.append(part.ravel())
+        return np.concatenate(parts)
+
+    def _correct(self, measured: np.ndarray) -> None:
+        """Take up a part of how far the robot is from the model."""
+        deviation = measured - self.values
+        seen = np.isfinite(deviation)
+        change = self._feedback * (deviation - self._deviation)
+        self._deviation = np.where(seen, self._deviation + change, self._deviation)
+
+    def _observe(self, tension: Any, stroke: Any) -> None:
+        """Go on from the state that measured tension and stroke tell."""
+        assert self.observer is not None
+        model, state = self.observer.observe(tension, stroke)
+        if state.shape == self._before.shape:
+            self._problem = self._problem._replace(
+                model=self.observer.seen_by(model, self._problem)
+            )
+            self._before, self._known = state, None
+
+    def _seek(self, goal: np.ndarray) -> None:
+        problem = self._problem
+        if np.isfinite(self._rate):
+            low = np.maximum(problem.low, self._command - self._rate)
+            high = np.minimum(problem.high, self._command + self._rate)
+            problem = problem._replace(low=np.minimum(low, high), high=high)
+        alone = bool(np.count_nonzero(self._command) < 2)
+        found = find(problem, self._before, self._command, goal, self._known, over_bands=alone)
+        failure, good = found.failure, found.response.converged and np.isfinite(found.error)
+        code = failure.name if failure else ""
+        if good:
+            self._command, self._before, self._known = (
+                found.drive,
+                found.response.state,
+                found.response,
+            )
+        elif failure is None:
+            code = Failure.SEARCH_STOPPED.name
+        self.status = ControlStatus(failure is None, code, found.error, found.solves, not good)
+
+
+__all__ = ["ControlStatus", "Controller"]

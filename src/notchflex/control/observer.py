@@ -1,0 +1,138 @@
+"""The state of a robot from measured tension and stroke: history, and coefficient of friction.
+
+How far a tendon has been drawn at a tension depends on the friction on its way there. Several
+models with different friction are pulled as the robot is, each with its own history; those that
+draw as much tendon as the robot count more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.control.drive_model import DriveModel
+from notchflex.control.problem import Problem
+from notchflex.errors import InputError
+from notchflex.loads import Load
+from notchflex.loads.load_path import load_path
+from notchflex.loads.validation import check_is_robot, check_number
+from notchflex.robot import Robot
+from notchflex.robot.value_names import number_at
+
+FRICTION = "friction.coefficient"
+
+
+class Observer:
+    """Models of a robot with different friction, pulled as the robot is.
+
+    Args:
+        robot: The robot, at rest.
+        factors: Coefficients of friction of the models, as multiples of that of the robot.
+        noise: Standard deviation of a measured stroke, mm.
+        memory: How many measurements count; older ones are forgotten.
+        load: External loads.
+
+    Raises:
+        InputError: A factor, the noise or the memory is not positive, or a robot without a
+            coefficient of friction.
+
+    Example:
+        >>> from notchflex import Load, load_robot, pull, simulate
+        >>> wrist = load_robot("pacheco2021-a")
+        >>> rough = simulate(
+        ...     wrist.with_value("friction.coefficient", 0.156), pull(0.1, 1.5, steps=15)
+        ... )
+        >>> observer = Observer(wrist)
+        >>> for tension, stroke in zip(rough.tension, rough.stroke):
+        ...     _ = observer.observe(tension, stroke)
+        >>> round(observer.friction, 3)
+        0.156
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        factors: Sequence[float] = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4),
+        *,
+        noise: float = 0.01,
+        memory: float = 50.0,
+        load: Load | None = None,
+    ) -> None:
+        for value, what in (
+            (noise, "noise"),
+            (memory, "memory"),
+            *((f, "a factor") for f in factors),
+        ):
+            if not 0.0 < check_number(value, what) < np.inf:
+                raise InputError.OUT_OF_RANGE(
+                    f"{what} of an observer must be positive; got {value!r}"
+                )
+        coefficient = number_at(check_is_robot(robot), FRICTION)
+        tendons = robot.number_of_tendons
+        pulled = load_path(load or Load(), tendons)
+        one = type(pulled)(
+            np.zeros((1, tendons)), pulled.stroke, pulled.base_rotation, pulled.external
+        )
+        self._coefficients = coefficient * np.array(factors, float)
+        robots = [robot.with_value(FRICTION, float(one)) for one in self._coefficients]
+        self._models = [DriveModel(each, one, OUTPUTS) for each in robots]
+        self._states = [model.first for model in self._models]
+        self._noise, self._forgets = noise, 1.0 - 1.0 / max(memory, 1.0)
+        self._cost = np.zeros(len(robots))
+        self._seen: dict[int, DriveModel] = {}
+
+    def observe(self, tension: Any, stroke: Any) -> tuple[int, Float[np.ndarray, " state"]]:
+        """Pull all models by a measured tension, and compare their strokes with the measured one.
+
+        Args:
+            tension: Tension of every tendon, N; a negative one, by noise, counts as 0.
+            stroke: Stroke of every tendon, mm; NaN where it was not measured.
+
+        Returns:
+            Number of the model that fits best, and its state, packed.
+        """
+        pulled, drawn = np.maximum(np.asarray(tension, float), 0.0), np.asarray(stroke, float)
+        if not np.isfinite(pulled).all() or pulled.shape != drawn.shape:
+            raise ValueError("tension and stroke are one finite number per tendon")
+        for number, model in enumerate(self._models):
+            found = model.solve(self._states[number], pulled)
+            if not found.converged:
+                continue
+            self._states[number] = found.state
+            miss = (found.values[model.slices["stroke"]] - drawn) / self._noise
+            miss = miss[np.isfinite(miss) & (pulled > 0.0)]
+            self._cost[number] = self._forgets * self._cost[number] + float(miss @ miss)
+        best = int(np.argmin(self._cost))
+        return best, self._states[best]
+
+    @property
+    def weights(self) -> Float[np.ndarray, " models"]:
+        """How likely each model is, in all 1."""
+        likely = np.exp(-0.5 * (self._cost - self._cost.min()))
+        return likely / likely.sum()
+
+    @property
+    def friction(self) -> float:
+        """Coefficient of friction, the mean of the models by their weights."""
+        return float(self.weights @ self._coefficients)
+
+    def seen_by(self, number: int, problem: Problem) -> DriveModel:
+        """Return a model, asked for what a controller aims at.
+
+        Args:
+            number: Which.
+            problem: What the controller searches.
+        """
+        if number not in self._seen:
+            own, other = self._models[number], problem.model
+            self._seen[number] = DriveModel(
+                own.robot, other.load, other.outputs, other.start, other.settings
+            )
+        return self._seen[number]
+
+
+OUTPUTS = ("tension", "stroke", "peak_strain", "gap")
+"""What the models are asked: as limits are, so that they share a program."""

@@ -1,0 +1,105 @@
+"""The controller for loops: it follows, takes up what is measured, and never raises."""
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+
+WRIST = nf.load_robot("pacheco2021-a")
+ROUGH = WRIST.with_value("friction.coefficient", 0.156)
+
+
+def path(robot, tensions):
+    return nf.simulate(robot, [nf.Load(tension=float(one)) for one in tensions])
+
+
+SWEEP = 0.9 + 0.7 * np.sin(np.linspace(0.0, 9.0, 120))
+
+
+def test_a_loop_is_followed_within_the_budget():
+    forward = path(WRIST, SWEEP)
+    controller = nf.Controller(WRIST)
+    commands = []
+    for tip in forward.tip_position:
+        commands.append(float(controller.step(tip)[0]))
+        assert controller.status.reached
+        assert controller.status.solves <= 10 + 4
+    np.testing.assert_allclose(path(WRIST, commands).tip_position, forward.tip_position, atol=1e-4)
+
+
+def test_measured_angles_correct_another_robot():
+    wanted = 0.8 + 0.5 * np.sin(np.linspace(0.0, 9.0, 120))
+    errors = {}
+    for feedback in (0.0, 0.5):
+        controller = nf.Controller(WRIST, "total_angle", feedback=feedback)
+        state, seen, error = None, None, []
+        for angle in wanted:
+            tension = controller.step(angle, measured=seen)
+            real = nf.solve(ROUGH, nf.Load(tension=tension), from_state=state)
+            state, seen = real.state, real.total_angle
+            error.append(real.total_angle - angle)
+        errors[feedback] = float(np.sqrt(np.mean(np.square(error))))
+    assert errors[0.5] < 0.5 * errors[0.0]
+
+
+def test_tension_and_stroke_tell_the_friction():
+    real = path(ROUGH, SWEEP)
+    observer = nf.Observer(WRIST, (0.8, 1.0, 1.2))
+    random = np.random.default_rng(0)
+    for tension, stroke in zip(real.tension, real.stroke, strict=True):
+        observer.observe(tension, stroke + random.normal(0.0, 0.01, 1))
+    assert observer.friction == pytest.approx(0.156, rel=0.02)
+
+
+def test_the_observer_corrects_the_controller():
+    wanted = 0.8 + 0.5 * np.sin(np.linspace(0.0, 9.0, 120))
+    errors = []
+    for observer in (None, nf.Observer(WRIST, (0.8, 1.0, 1.2))):
+        controller = nf.Controller(WRIST, "total_angle", observer=observer)
+        state, seen, error = None, {}, []
+        for angle in wanted:
+            tension = controller.step(angle, **seen)
+            real = nf.solve(ROUGH, nf.Load(tension=tension), from_state=state)
+            state, seen = real.state, {"tension": real.tension, "stroke": real.stroke}
+            error.append(real.total_angle - angle)
+        errors.append(float(np.sqrt(np.mean(np.square(error[30:])))))
+    assert errors[1] < 0.05 * errors[0]
+
+
+BAD = [
+    np.nan * np.ones(3),
+    (np.inf, 0.0, 1.0),
+    (1.0, 2.0),
+    "far",
+    None,
+    {"total_angle": 1.0},
+    [[1.0, 2.0, 3.0]],
+    object(),
+]
+
+
+@pytest.mark.parametrize("target", BAD, ids=range(len(BAD)))
+def test_a_bad_target_holds_the_last_command(target):
+    controller = nf.Controller(WRIST)
+    good = controller.step((2.4, 0.0, 9.307))
+    np.testing.assert_array_equal(controller.step(target), good)
+    assert controller.status.held
+    assert controller.status.code == "INVALID_INPUT"
+    np.testing.assert_allclose(controller.step((2.4, 0.0, 9.307)), good)
+    assert not controller.status.held
+
+
+def test_bad_measurements_hold_the_last_command():
+    controller = nf.Controller(WRIST, observer=nf.Observer(WRIST, (1.0,)))
+    good = controller.step((2.4, 0.0, 9.307))
+    for bad in ({"measured": "x"}, {"tension": [1.0, 2.0], "stroke": [1.0]}, {"measured": (1, 2)}):
+        np.testing.assert_array_equal(controller.step((3.0, 0.0, 8.9), **bad), good)
+        assert controller.status.code == "INVALID_INPUT"
+
+
+def test_out_of_reach_is_flagged_and_the_nearest_commanded():
+    controller = nf.Controller(WRIST)
+    tension = controller.step((30.0, 0.0, 0.0))
+    assert np.isfinite(tension).all()
+    assert not controller.status.reached
+    assert controller.status.code

@@ -1,0 +1,129 @@
+"""Bad design files: refused with one sentence and exit code 2, and nothing is written."""
+
+from __future__ import annotations
+
+import json
+import random
+from pathlib import Path
+
+import pytest
+
+import notchflex as nf
+from notchflex.cli import run
+from notchflex.designing import read_design
+
+TEMPLATE = Path(nf.__file__).parent / "designing" / "specification" / "template.toml"
+TEXT = TEMPLATE.read_text(encoding="utf-8")
+
+BAD = {
+    "no TOML": (TEXT + "\n[[state", "FILE_UNREADABLE"),
+    "unknown key": (TEXT.replace("lower = 1.2", "lowest = 1.2"), "INVALID_SPECIFICATION"),
+    "reversed": (TEXT.replace("lower = 1.2", "lower = 1.9"), "INVALID_SPECIFICATION"),
+    "unknown robot": (TEXT.replace("pacheco2021-a", "pacheco2021-x"), "UNKNOWN_NAME"),
+    "unknown value": (TEXT.replace("notch.depth", "notch.dept"), "UNKNOWN_NAME"),
+    "unknown quantity": (TEXT.replace('"peak_strain"', '"peak_strian"'), "UNKNOWN_NAME"),
+    "unknown state": (TEXT.replace('state = "pulled"', 'state = "puled"', 1), "UNKNOWN_NAME"),
+    "strain in percent": (TEXT.replace("upper = 0.06", "upper = 6.0"), "OUT_OF_RANGE"),
+    "depth in metres": (TEXT.replace("lower = 1.2 ", "lower = -0.0012 "), "OUT_OF_RANGE"),
+    "negative tension": (TEXT.replace("tension = 2.0", "tension = -2.0"), "OUT_OF_RANGE"),
+    "two tendons": (TEXT.replace("tension = 2.0", "tension = [2.0, 1.0]"), "WRONG_SHAPE"),
+    "nan": (TEXT.replace("equal = 90.0", "equal = nan"), "INVALID_SPECIFICATION"),
+    "same twice": (TEXT.replace('"notch.height"', '"notch[2].depth"', 1), "CONFLICT"),
+    "contradiction": (
+        TEXT + '[[constraint]]\nquantity = "total_angle"\nstate = "pulled"\nupper = 80.0\n',
+        "CONFLICT",
+    ),
+    "nothing asked": (TEXT.split("# --- What is to be small")[0], "INVALID_SPECIFICATION"),
+    "in a circle": (
+        TEXT.replace("tension = 2.0", 'tension = 2.0\nafter = "pulled"'),
+        "CONFLICT",
+    ),
+    "not to be made": (
+        TEXT.replace("lower = 1.2 ", "lower = 1.7 ").replace("upper = 1.5 ", "upper = 1.9 "),
+        "UNSUPPORTED",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_wishes(name, tmp_path, wording):
+    text, code = BAD[name]
+    file = tmp_path / "wish.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(nf.InputError) as caught:
+        nf.design(file)
+    assert caught.value.code.name == code, caught.value
+    wording(f"design: {name}", str(caught.value).replace(str(tmp_path), ""))
+
+
+def mutated(seed: int) -> str:
+    """The template with lines changed, dropped, doubled or exchanged."""
+    rng = random.Random(seed)
+    lines = TEXT.splitlines()
+    junk = ["nan", "inf", "-1", "0", "1e99", '"x"', "[]", "true", "[1.0, 2.0]", "{}", "1e-9", "[["]
+    for _ in range(rng.randint(1, 4)):
+        own = [k for k, line in enumerate(lines) if line and not line.startswith("#")]
+        if not own:
+            break
+        k = rng.choice(own)
+        way = rng.randrange(5)
+        if way == 0:
+            del lines[k]
+        elif way == 1:
+            lines.insert(k, lines[k])
+        elif way == 2 and "=" in lines[k]:
+            lines[k] = f"{lines[k].partition('=')[0]}= {rng.choice(junk)}"
+        elif way == 3:
+            place = rng.randrange(len(lines[k]))
+            lines[k] = lines[k][:place] + chr(rng.randrange(32, 127)) + lines[k][place + 1 :]
+        else:
+            other = rng.choice(own)
+            lines[k], lines[other] = lines[other], lines[k]
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(40), pytest.param(range(40, 300), marks=pytest.mark.nightly)]
+)
+def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
+    """Each is refused, or asks for a design; none ends in a traceback, and none writes a file."""
+    monkeypatch.chdir(tmp_path)
+
+    class ReachedError(Exception):
+        """The specification was accepted: what a search does is tested elsewhere."""
+
+    def stop(*_):
+        raise ReachedError
+
+    monkeypatch.setattr("notchflex.designing.design_robot.search", stop)
+    refused = 0
+    for seed in seeds:
+        Path("wish.toml").write_text(mutated(seed), encoding="utf-8")
+        try:
+            code = run(["design", "wish.toml", "-o", "made"])
+        except ReachedError:
+            continue
+        out, err = capsys.readouterr()
+        refused += 1
+        assert code == 2, (seed, err)
+        assert err.startswith("Error: "), (seed, err)
+        assert out == ""
+        assert not Path("made").exists()
+    assert refused > len(seeds) // 2
+
+
+def test_schema_names_every_table(capsys):
+    assert run(["schema", "--design"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    tables = {"variable", "stock", "state", "objective", "constraint", "curve", "search"}
+    assert tables < set(schema["properties"])
+
+
+def test_new_writes_a_design_file_that_can_be_read(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["new", "wish", "--design"]) == 0
+    assert "notchflex design wish.toml" in capsys.readouterr().out
+    spec, robot = read_design("wish.toml")
+    assert robot == nf.load_robot("pacheco2021-a")
+    assert len(spec.constraint) == 3
+    assert run(["new", "wish", "--design"]) == 2  # it is there already
