@@ -20,11 +20,12 @@ _PRIOR_ROLL, _PRIOR_TILT = math.radians(10.0), math.radians(8.0)
 _PRIOR_KERF, _PRIOR_CUT = 0.01, 0.006  # of the outer diameter: how well notches are made
 _PRIOR_NEAR, _NEAR = 0.006, 0.006  # inverse distance of the camera, per outer diameter
 _EDGE = 0.25  # px: noise of an edge, against which the priors are weighed
+_MOST_SHIFT = 1.5  # px
 _LEAST_NOISE = 0.05  # px
 _FAR = 3.0  # px: an edge farther away belongs to something else
 _CAP, _ALIKE = 4.0, 4.0  # residuals over their noise; edges that err as one
 LINE_SHIFT, ALL_SHIFT = 0.25, 0.5
-"""How far the edges of one line, and all edges, are shifted together, px (standard deviations)."""
+"""How far the edges of one line (at least), and all edges, are shifted together, px (standard deviations)."""
 
 _STEPS = np.array([0.05, 0.05, 1e-4, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-4])
 
@@ -117,7 +118,7 @@ def _solved(
     normal = outline.normal[found]
     target = outline.point[0][found] + edges.offset[found, None] * normal
     target_along = (target * normal).sum(axis=1)
-    columns, shift_spread = shifts(model)
+    columns, shift_spread = shifts(model, edges.offset)
     centre, spread = priors(model, numbers)
     count, columns = len(numbers), columns[found]
     centre = np.append(centre, np.zeros(len(shift_spread)))
@@ -145,17 +146,25 @@ def _solved(
     return solved.x[:count]
 
 
-def shifts(model: OutlineModel) -> tuple[Numbers, Numbers]:
+def shifts(model: OutlineModel, offset: Numbers) -> tuple[Numbers, Numbers]:
     """Return columns by which lines of edges shift together, and how far they do, px.
 
-    Highlights and blur shift all edges of one line alike, and all lines outward.
+    Highlights and blur shift all edges of one line alike, and all lines outward. How far is found
+    from the edges themselves: rings that are not made as the robot file says shift lines too.
+
+    Args:
+        model: The outline of the robot.
+        offset: Distances of the edges from it, px, (N,).
     """
     line = model.kind * 10000 + model.ring * 2 + (model.which > 0)
     names, which = np.unique(line, return_inverse=True)
     columns = np.zeros((len(line), len(names) + 1))
     columns[np.arange(len(line)), which] = 1.0
     columns[:, -1] = 1.0
-    return columns, np.append(np.full(len(names), LINE_SHIFT), ALL_SHIFT)
+    lines = [offset[(which == one) & np.isfinite(offset)] for one in range(len(names))]
+    typical = np.median([abs(float(np.median(one))) for one in lines if len(one) > 2] or [0.0])
+    spread = float(np.clip(1.5 * typical, LINE_SHIFT, _MOST_SHIFT))
+    return columns, np.append(np.full(len(names), spread), ALL_SHIFT)
 
 
 def priors(model: OutlineModel, numbers: Numbers) -> tuple[Numbers, Numbers]:
@@ -205,7 +214,7 @@ def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], floa
     covariance is scaled by the correlation of residuals that follow one another on one line.
     """
     found = np.isfinite(fit.residual)
-    columns, shift_spread = shifts(model)
+    columns, shift_spread = shifts(model, fit.residual)
     rows = np.hstack([fit.jacobian, columns])[found]
     _, spread = priors(model, fit.numbers)
     inverse_spread = np.append(1.0 / (spread * _EDGE), 1.0 / shift_spread)
@@ -238,7 +247,7 @@ def misfit(fit: Fit, model: OutlineModel, noise: float) -> float:
 
 def _without_shifts(fit: Fit, model: OutlineModel) -> Numbers:
     """Return residuals less the median of their line, as far as lines shift."""
-    columns, spread = shifts(model)
+    columns, spread = shifts(model, fit.residual)
     left = fit.residual.copy()
     for column, one in zip(columns.T[:-1] > 0.0, spread, strict=False):
         if np.isfinite(left[column]).sum() > 2:
