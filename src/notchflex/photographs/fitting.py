@@ -25,7 +25,8 @@ _LEAST_NOISE = 0.05  # px
 _FAR = 3.0  # px: an edge farther away belongs to something else
 _CAP, _ALIKE = 4.0, 4.0  # residuals over their noise; edges that err as one
 LINE_SHIFT, ALL_SHIFT = 0.25, 0.5
-"""How far the edges of one line (at least), and all edges, are shifted together, px (standard deviations)."""
+"""How far the edges of one line at least, and all edges, are shifted together, px (standard
+deviations)."""
 
 _STEPS = np.array([0.05, 0.05, 1e-4, 1e-4, 1e-3, 1e-3, 1e-5, 1e-4, 1e-4])
 
