@@ -28,6 +28,7 @@ ORDER = (
     "control",
     "sensing",
     "workspaces",
+    "photographs",
     "plotting",
     "export",
     "viewer",

@@ -153,6 +153,14 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "MeasuredPhotograph",
+            "MeasuredPhotographs",
+            "measure",
+        ),
+        "notchflex.photographs",
+    ),
+    **dict.fromkeys(
+        (
             "Workspace",
             "workspace",
         ),

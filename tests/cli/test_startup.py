@@ -28,6 +28,7 @@ ROOT_VERBS = (
     "view",
     "compare",
     "calibrate",
+    "measure",
     "friction-rig",
     "sense",
     "workspace",

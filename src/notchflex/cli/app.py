@@ -95,6 +95,11 @@ VERBS = {
         "    notchflex calibrate pacheco2021-a=a.csv pacheco2021-b=b.csv --leave-out robot \\\n"
         "        --fit material.elastic_modulus,friction.coefficient --plot fit.png",
     ),
+    "measure": (
+        "Measure the angle of every notch in photographs of a bent robot.",
+        "notchflex measure pull_0.5N.jpg pull_1N.jpg --robot wrist.toml \\\n"
+        '        --pattern "pull_{tension}N" -o measured.csv',
+    ),
     "tolerance": (
         "Find out what tolerances do: worst case, yield, which dimension to control.",
         "notchflex tolerance pacheco2021-a limits.toml\n"

@@ -1,0 +1,131 @@
+"""`notchflex measure`: notch angles from photographs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from notchflex.cli import terminal
+from notchflex.cli.arguments.robots import Settings, chosen_robot, robot_files
+from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet, output_file
+from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.results.files.writing import check_folder
+
+if TYPE_CHECKING:
+    from notchflex.photographs import MeasuredPhotographs
+
+
+def measure(
+    *photographs: Annotated[
+        str, Parameter(help="Photographs of the robot from the side: PNG, JPEG or TIFF.")
+    ],
+    robot: Annotated[
+        str, Parameter(help="Robot file (.toml), or the name of a ready robot, in all of them.")
+    ],
+    output: Annotated[
+        str | None,
+        output_file("-o", "Write the CSV that `calibrate` reads to this file; `-` prints it."),
+    ] = None,
+    loads: Annotated[
+        str | None,
+        Parameter(
+            metavar="FILE",
+            help="CSV with a column `photograph` and columns of loads, such as `tendon_force_N`.",
+        ),
+    ] = None,
+    pattern: Annotated[
+        str | None,
+        Parameter(
+            help="What the names of the files look like: `{tension}` stands for the pull in N, "
+            "`{pull}` for a label of the pull."
+        ),
+    ] = None,
+    overlays: Annotated[
+        str | None,
+        Parameter(
+            group=OUTPUT,
+            metavar="FOLDER",
+            help="Write each photograph with its fitted outline as PNG into this folder; with `-o "
+            "NAME.csv` NAME-overlays by default.",
+        ),
+    ] = None,
+    settings: Settings = (),
+    json: JsonFile = None,
+    quiet: Quiet = False,
+) -> int:
+    """Measure the angle of every notch in photographs of a bent robot.
+
+    The outline of the robot file is fitted to the edges of each photograph. A photograph in which
+    anything is doubtful is refused with its reason (exit code 1); look at the overlays.
+    """
+    inputs = [*photographs, *robot_files(robot), *([] if loads is None else [loads])]
+    folder = overlays
+    if folder is None and output not in (None, "-"):
+        folder = str(Path(str(output)).with_suffix("")) + "-overlays"
+    from notchflex.photographs.overlay import overlay_names
+
+    files: tuple[Path, ...] = ()
+    if folder is not None:
+        files = check_folder(folder, overlay_names(photographs), "--overlays", inputs=inputs)
+    named = {f"--overlays ({file.name})": str(file) for file in files}
+    if output is not None:
+        named = {"-o": output, **named}
+    outputs = Outputs(inputs, quiet=quiet, files=named, json=json)
+    if output is not None:
+        from notchflex.results.files.writing import check_output
+
+        check_output(output, "-o", inputs=inputs)
+    chosen = chosen_robot(robot, settings)
+    with terminal.bars("measuring") as progress:
+        terminal.use_compile_cache()
+        from notchflex.photographs import measure as measured
+
+        found = measured(photographs, chosen, loads=loads, pattern=pattern, progress=progress)
+    _write(found, outputs, output, files)
+    return DONE if not found.refused else NOT_CONVERGED
+
+
+def _write(
+    found: MeasuredPhotographs, outputs: Outputs, output: str | None, files: tuple[Path, ...]
+) -> None:
+    from notchflex.photographs.documents import measured_document
+    from notchflex.photographs.overlay import write_overlay
+    from notchflex.photographs.reading import read_photograph
+
+    if files:
+        files[0].parent.mkdir(exist_ok=True)
+    for file, one in zip(files, found.photographs, strict=False):
+        write_overlay(file, read_photograph(one.source), one)
+    outputs.write_json(lambda: measured_document(found))
+    if output is not None and found.measured:
+        found.write_csv(output)
+    if outputs.prints_tables and output != "-":
+        _print(found)
+    for one in found.refused:
+        terminal.warn(f"{one.source} is refused: {one.reason}.")
+    if output is not None and not found.measured:
+        terminal.error(f"no photograph was measured; {output} is not written.")
+    elif output is not None and not found.loads:
+        terminal.note("calibrate needs loads too: give --loads or --pattern.")
+
+
+def _print(found: MeasuredPhotographs) -> None:
+    import numpy as np
+
+    console = terminal.output()
+    console.print(f"Notch angles of {found.robot.name}, with standard deviations")
+    heads = ["\nphotograph"]
+    for notch in range(found.robot.number_of_notches):
+        heads += [f">notch {notch + 1}\ndeg", ">±\ndeg"]
+    rows: list[list[str]] = []
+    for one in found.measured:
+        row = [Path(one.source).name]
+        for angle, spread in zip(
+            np.degrees(one.notch_angle), np.degrees(one.notch_angle_deviation), strict=True
+        ):
+            row += [f"{angle:.2f}", f"{spread:.2f}"]
+        rows.append(row)
+    if rows:
+        console.print(terminal.table(heads, rows))

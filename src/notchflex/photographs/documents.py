@@ -1,0 +1,38 @@
+"""The JSON document of measured photographs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
+from notchflex.results.files.json import document_head
+
+
+def measured_document(found: MeasuredPhotographs) -> dict[str, Any]:
+    """Return the JSON document: all photographs, the refused with their reasons."""
+    photographs = []
+    for number, one in enumerate(found.photographs):
+        loads = {name: texts[number] for name, texts in found.loads.items()}
+        photographs.append({**_entry(one), "loads": loads})
+    return {**document_head(found.robot), "photographs": photographs}
+
+
+def _entry(one: MeasuredPhotograph) -> dict[str, Any]:
+    entry: dict[str, Any] = {"photograph": one.source, "measured": one.measured}
+    if not one.measured:
+        return {**entry, "reason": one.reason}
+    return {
+        **entry,
+        "notch_angle_deg": np.degrees(one.notch_angle),
+        "notch_angle_sd_deg": np.degrees(one.notch_angle_deviation),
+        "tip_position_mm": one.tip_position,
+        "tip_position_sd_mm": one.tip_deviation,
+        "scale_px_mm": one.scale,
+        "roll_deg": math.degrees(one.roll),
+        "tilt_deg": math.degrees(one.tilt),
+        "edge_noise_px": one.noise,
+        "outline_found": one.found,
+    }

@@ -1,0 +1,81 @@
+"""Edges of a photograph near a predicted outline, to a part of a pixel."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.photographs.contrast import Contrast
+from notchflex.photographs.outline import Numbers, Outline
+
+STEP = 0.5
+"""Distance of samples along a normal, px."""
+
+_BESIDE = 3.0  # how far out the background is looked at, px
+_BLURRED = 0.35  # contrast outside over that inside: what blur leaves of a sharp edge
+_LEAST_ROOM = 5.0  # gaps that are narrower show no background, px
+
+
+class Edges(NamedTuple):
+    """Edges along the normals of an outline, N points.
+
+    Attributes:
+        offset: Distance of each edge from the predicted point, outward, px, (N,); NaN if none.
+        looked: Whether an edge should be seen there, (N,).
+    """
+
+    offset: Numbers
+    looked: NDArray[np.bool_]
+
+
+def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbers) -> Edges:
+    """Find the edge of the robot nearest to every point of an outline.
+
+    Outside an edge lies background; the edge is where the contrast rises most steeply.
+
+    Args:
+        contrast: Contrast of the photograph against its background.
+        outline: Where the outline is expected; its first view counts.
+        reach: How far from there an edge is looked for, px.
+        middle: Middle of the photograph, px, (2,).
+    """
+    import cv2
+
+    height, width = contrast.value.shape
+    room = np.minimum(outline.room, 1e6)
+    looked = (room > _LEAST_ROOM) & (outline.breadth > 3.0)
+    steps = np.arange(-reach - _BESIDE, reach + 2.0 * _BESIDE + STEP, STEP)
+    at = outline.point[0] + middle
+    inside = (at > 2.0).all(1) & (at[:, 0] < width - 3.0) & (at[:, 1] < height - 3.0)
+    looked &= inside
+    where = at[:, None] + steps[None, :, None] * outline.normal[:, None]
+    profile: Any = cv2.remap(
+        contrast.value,
+        where[..., 0].astype(np.float32),
+        where[..., 1].astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    smooth: Any = cv2.GaussianBlur(profile, (0, 0), 1.2 / STEP, sigmaY=1e-3)
+    rise = smooth[:, :-2] - smooth[:, 2:]  # toward the inside
+    level = rise[:, 1:-1]
+    peak = (level > rise[:, :-2]) & (level >= rise[:, 2:])
+    place = steps[2:-2]
+    far = round(_BESIDE / STEP)
+    outside = np.minimum(np.arange(2, len(steps) - 2) + far, len(steps) - 1)
+    within = smooth[:, np.maximum(np.arange(2, len(steps) - 2) - far, 0)]
+    clear = smooth[:, outside] < np.maximum(contrast.threshold, _BLURRED * within)
+    strong = within - smooth[:, outside] > 0.5 * contrast.threshold
+    limit = np.minimum(reach, 0.6 * room)[:, None]
+    allowed = peak & clear & strong & (np.abs(place)[None] <= limit)
+    cost = np.where(allowed, np.abs(place)[None], np.inf)
+    best = cost.argmin(axis=1)
+    row = np.arange(len(best))
+    found = np.isfinite(cost[row, best]) & looked
+    before, here, after = (rise[row, best + shift] for shift in (0, 1, 2))
+    bend = before - 2.0 * here + after
+    shift = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, -1.0), 0.0)
+    offset = place[best] + np.clip(shift, -1.0, 1.0) * STEP
+    return Edges(np.where(found, offset, np.nan), looked)

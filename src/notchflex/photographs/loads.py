@@ -1,0 +1,83 @@
+"""The loads under which photographs were taken: from a table, or from the names of the files."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from notchflex.errors import InputError
+from notchflex.photographs.measured import PHOTOGRAPH
+from notchflex.results.files.csv_reading import read_table
+from notchflex.robot import Robot
+
+_FIELDS = {"tension": r"(?P<tension>\d+(?:[.,]\d+)?)", "pull": r"(?P<pull>[^_]+?)"}
+
+
+def loads_of(
+    names: Sequence[str],
+    robot: Robot,
+    table: str | os.PathLike[str] | None,
+    pattern: str | None,
+) -> dict[str, tuple[str, ...]]:
+    """Return columns of loads, one text for each photograph; none if nothing is given.
+
+    Raises:
+        InputError: Both are given, a photograph has no loads, or a file name does not fit.
+    """
+    if table is not None and pattern is not None:
+        raise InputError.CONFLICT("give the loads as a table or by a pattern of names, not both")
+    if table is not None:
+        return _from_table(names, table)
+    return {} if pattern is None else _from_names(names, robot, pattern)
+
+
+def _from_table(names: Sequence[str], source: str | os.PathLike[str]) -> dict[str, tuple[str, ...]]:
+    table = read_table(source)
+    if PHOTOGRAPH not in table.header:
+        raise InputError.TABLE_COLUMNS(
+            f"{table.name}: there is no column {PHOTOGRAPH} with the names of the files; "
+            f"{table.columns}."
+        )
+    listed = [Path(text).name for text in table.texts(PHOTOGRAPH)]
+    rows: list[int] = []
+    for name in names:
+        here = [row for row, text in enumerate(listed) if text == Path(name).name]
+        if len(here) != 1:
+            words = "is not listed" if not here else f"is listed {len(here)} times"
+            raise InputError.TABLE_ROWS(
+                f"{table.name}: the photograph {Path(name).name} {words}; give it one row."
+            )
+        rows += here
+    columns = [name for name in table.header if name != PHOTOGRAPH]
+    return {name: tuple(table.texts(name)[row] for row in rows) for name in columns}
+
+
+def _from_names(names: Sequence[str], robot: Robot, pattern: str) -> dict[str, tuple[str, ...]]:
+    if robot.number_of_tendons != 1:
+        raise InputError.UNSUPPORTED(
+            f"{robot.name} has {robot.number_of_tendons} tendons; a pattern gives the tension of "
+            "one, give the loads as a table"
+        )
+    if pattern.count("{tension}") != 1 or pattern.count("{pull}") > 1:
+        raise InputError.BAD_SYNTAX(
+            f"the pattern {pattern!r} needs {{tension}} once, and {{pull}} at most once, such as "
+            "wrist_{pull}_{tension}N.jpg"
+        )
+    form = re.escape(pattern)
+    for name, group in _FIELDS.items():
+        form = form.replace(re.escape(f"{{{name}}}"), group)
+    found: list[dict[str, str]] = []
+    for name in names:
+        path = Path(name)
+        match = re.fullmatch(form, path.name) or re.fullmatch(form, path.stem)
+        if match is None:
+            raise InputError.BAD_SYNTAX(
+                f"the name of the photograph {path.name} does not fit the pattern {pattern!r}"
+            )
+        found.append(match.groupdict())
+    columns = {"tendon_force_N": tuple(one["tension"].replace(",", ".") for one in found)}
+    if "pull" in found[0]:
+        return {"pull": tuple(one["pull"] for one in found), **columns}
+    return columns

@@ -1,0 +1,112 @@
+"""Finding a robot in a photograph: many starts, small first, then the few best in full."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.contrast import Contrast
+from notchflex.photographs.fitting import Fit, cost, covariance, misfit, refine
+from notchflex.photographs.outline import NUMBERS, OutlineModel
+from notchflex.photographs.start import COARSE, starts, with_tilts
+
+NEAR = 2.0
+"""Distance from the outline within which an edge counts as its own, px."""
+
+_COARSE_WIDTH = 40.0  # of the tube in the first fits, px
+_FINE_WIDTH = 100.0  # of the tube in the last fits, px: edges of sharp photographs are then sharp
+_COARSE_REACHES = [14.0, 14, 12, 12, 10, 10, 8, 8, 6, 6, 5, 4, 4]
+_FINE_REACHES = [8.0, 8, 6, 6, 5, 5, 4, 4]
+_LAST_REACHES = [5.0, 4.0, 4.0]
+_KEPT = 4
+_TILT = 0.06
+_EDGE_NOISE = 0.08  # px: no edge is known better
+_SAME = math.radians(1.5)
+
+
+class Located(NamedTuple):
+    """The best fit of a robot, its model, and the next best that differs from it.
+
+    Attributes:
+        fit: The best.
+        model: The outline that was fitted.
+        cost: How badly it lies.
+        rival: By how much more other fits whose angles differ miss the edges (`misfit`), with the
+            largest difference, rad.
+        factor: By how much the photograph was made smaller for it.
+    """
+
+    fit: Fit
+    model: OutlineModel
+    cost: float
+    rival: tuple[tuple[float, float], ...]
+    factor: float
+
+
+def locate(table: ChainTable, contrast: Contrast) -> Located | None:
+    """Find a robot in a photograph; None if nothing there looks like a tube of its proportions."""
+    height, width = contrast.value.shape
+    middle = np.array([width - 1.0, height - 1.0]) / 2.0
+    factor = min(1.0, COARSE / max(width, height))
+    coarse = _coarse(table, contrast, factor, middle)
+    if not coarse:
+        return None
+    wide = 2.0 * table.outer * math.exp(coarse[0][3])
+    fine = min(1.0, _FINE_WIDTH / wide)
+    contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
+    model = OutlineModel(table, base=1.2 * table.outer)
+    fits: list[tuple[float, Fit]] = []
+    for numbers in coarse:
+        for start in with_tilts(_scaled(numbers, fine), _TILT)[::2]:
+            quick = refine(model, contrast, start, _FINE_REACHES, middle, NEAR, quick=True)
+            fit = refine(model, contrast, quick.numbers, _LAST_REACHES, middle, NEAR)
+            fits.append((cost(fit, model), fit))
+    best_cost, best = min(fits, key=lambda one: one[0])
+    noise = max(_EDGE_NOISE, covariance(best, model)[1])
+    least = misfit(best, model, noise)
+    rivals = [
+        (misfit(other, model, noise) - least, _differ(best.numbers, other.numbers))
+        for _, other in fits
+    ]
+    return Located(best, model, best_cost, tuple(one for one in rivals if one[1] > _SAME), fine)
+
+
+def _coarse(table: ChainTable, contrast: Contrast, factor: float, middle: Numbers) -> list[Numbers]:
+    model = OutlineModel(table, 8, 6, base=1.2 * table.outer)
+    found: list[tuple[float, Numbers]] = []
+    low = contrast.reduced(factor)
+    low_middle = (middle + 0.5) * factor - 0.5
+    images: dict[float, Contrast] = {}
+    for start in starts(table, low, low_middle):
+        wide = 2.0 * table.outer * math.exp(start[3]) / factor
+        rough = min(1.0, _COARSE_WIDTH / wide)
+        rough = min(1.0, 2.0 ** (round(2.0 * math.log2(rough)) / 2.0))
+        image = images.setdefault(rough, contrast.reduced(rough))
+        numbers = _scaled(start, rough / factor)
+        fit = refine(
+            model, image, numbers, _COARSE_REACHES, (middle + 0.5) * rough - 0.5, NEAR, quick=True
+        )
+        found.append((cost(fit, model), _scaled(fit.numbers, 1.0 / rough)))
+    found.sort(key=lambda one: one[0])
+    kept: list[Numbers] = []
+    for _, numbers in found:
+        if all(_differ(numbers, other) > _SAME for other in kept):
+            kept.append(numbers)
+    return kept[:_KEPT]
+
+
+def _scaled(numbers: Numbers, factor: float) -> Numbers:
+    made = numbers.copy()
+    made[:2] *= factor
+    made[3] += math.log(factor)
+    return made
+
+
+def _differ(one: Numbers, other: Numbers) -> float:
+    """Return by how much angles differ, rad: toward the same side of the photograph."""
+    seen = [np.sign(math.cos(numbers[4])) * numbers[NUMBERS:] for numbers in (one, other)]
+    apart = float(np.abs(seen[0] - seen[1]).max())
+    return apart if math.cos(one[4]) * math.cos(other[4]) > 0.0 else max(apart, 2.0 * _SAME)

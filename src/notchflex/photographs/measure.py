@@ -1,0 +1,138 @@
+"""Measuring the notch angles of robots in photographs."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.analysis import tip_from_angles
+from notchflex.errors import InputError
+from notchflex.photographs.chain_table import ChainTable, Numbers, chain_table
+from notchflex.photographs.contrast import contrast
+from notchflex.photographs.fitting import covariance
+from notchflex.photographs.judging import doubt
+from notchflex.photographs.loads import loads_of
+from notchflex.photographs.locating import NEAR, Located, locate
+from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
+from notchflex.photographs.outline import NUMBERS
+from notchflex.photographs.reading import read_photograph
+from notchflex.robot import Robot
+
+WORKED_ON = 8.0e6
+"""Pixels of a photograph beyond which it is made smaller before it is measured."""
+
+
+def measure(
+    photographs: Sequence[str | os.PathLike[str]] | str | os.PathLike[str],
+    robot: Robot,
+    *,
+    loads: str | os.PathLike[str] | None = None,
+    pattern: str | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> MeasuredPhotographs:
+    """Measure the angle of every notch in photographs of a robot from the side.
+
+    The outline of the robot, as its file describes it, is fitted to the edges in each photograph:
+    angles, place, scale, roll and tilt. The scale follows from the outer diameter. A photograph
+    in which anything is doubtful is refused with its reason.
+
+    Args:
+        photographs: One file or several: PNG, JPEG or TIFF.
+        robot: The robot in all of them; its notches are arcs and bend in one plane.
+        loads: CSV with a column `photograph` (names of the files) and columns of loads, such as
+            `tendon_force_N`.
+        pattern: What the names of the files look like, with `{tension}` for the pull in N and
+            `{pull}` for a label of the pull: `"wrist_{pull}_{tension}N.jpg"`.
+        progress: Called with the stage, how many photographs are done, and how many there are.
+
+    Returns:
+        Angles and tip with standard deviations, or the reason, for each photograph.
+
+    Raises:
+        InputError: A file is no photograph, the robot is of another kind, a photograph has no
+            loads, or `opencv-python-headless` is not installed.
+
+    Example:
+        >>> import notchflex as nf
+        >>> found = nf.measure("pull_1N.jpg", nf.load_robot("wrist.toml"))  # doctest: +SKIP
+        >>> found.write_csv("measured.csv")  # doctest: +SKIP
+    """
+    one = isinstance(photographs, (str, os.PathLike))
+    names = [os.fspath(name) for name in ([photographs] if one else photographs)]
+    if not names:
+        raise InputError.NO_DATA("there is no photograph to measure; name one or more")
+    table = chain_table(robot)
+    given = loads_of(names, robot, loads, pattern)
+    measured: list[MeasuredPhotograph] = []
+    for number, name in enumerate(names):
+        measured.append(measure_picture(read_photograph(name), table, name))
+        if progress is not None:
+            progress("measuring", number + 1, len(names))
+    return MeasuredPhotographs(robot, tuple(measured), given)
+
+
+def measure_picture(picture: NDArray[np.uint8], table: ChainTable, name: str) -> MeasuredPhotograph:
+    """Measure a photograph that was read, (height, width, 3).
+
+    Args:
+        picture: Blue, green and red.
+        table: The robot.
+        name: What the photograph is called.
+    """
+    import cv2
+
+    factor = min(1.0, math.sqrt(WORKED_ON / (picture.shape[0] * picture.shape[1])))
+    if factor < 1.0:
+        smaller: Any = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        picture = smaller
+    located = locate(table, contrast(picture))
+    if located is None:
+        return _refused(name, table, "no tube of the proportions of the robot is seen")
+    factor *= located.factor
+    both, noise = covariance(located.fit, located.model)
+    deviation = np.sqrt(np.maximum(np.diag(both)[NUMBERS:], 0.0))
+    reason = doubt(located, deviation, noise)
+    middle = (np.array([picture.shape[1], picture.shape[0]]) * located.factor - 1.0) / 2.0
+    return _measured(name, located, both[NUMBERS:, NUMBERS:], (reason, noise, factor), middle)
+
+
+def _measured(
+    name: str,
+    located: Located,
+    spread: Numbers,
+    judged: tuple[str, float, float],
+    middle: Numbers,
+) -> MeasuredPhotograph:
+    reason, noise, factor = judged
+    fit, table = located.fit, located.model.table
+    angles = fit.numbers[NUMBERS:]
+    outline = (fit.outline.point[0] + middle + 0.5) / factor - 0.5
+    view: dict[str, Any] = {
+        "scale": math.exp(fit.numbers[3]) / factor,
+        "roll": math.remainder(fit.numbers[4], math.pi),
+        "tilt": float(fit.numbers[5]),
+        "noise": noise / factor,
+        "found": fit.score,
+        "outline": outline,
+        "seen": np.abs(fit.residual) < NEAR,
+    }
+    if reason:
+        return _refused(name, table, reason, **view)
+    steps = 1e-4 * np.vstack([np.zeros(len(angles)), np.eye(len(angles))])
+    tips, _ = tip_from_angles(table.robot, angles + steps)
+    slopes = (tips[1:] - tips[0]).T / 1e-4
+    variance = np.einsum("an,nm,am->a", slopes, spread, slopes)
+    deviation = np.where(variance > 1e-18, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+    return MeasuredPhotograph(
+        name, "", angles.copy(), np.sqrt(np.diag(spread)), tips[0], deviation, **view
+    )
+
+
+def _refused(name: str, table: ChainTable, reason: str, **view: Any) -> MeasuredPhotograph:
+    nothing, nowhere = np.full(table.notches, np.nan), np.full(3, np.nan)
+    return MeasuredPhotograph(name, reason, nothing, nothing, nowhere, nowhere, **view)

@@ -1,0 +1,121 @@
+"""What was measured in photographs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.fit.measurements.columns import measured_columns
+from notchflex.results.files.csv import write_csv
+from notchflex.robot import Robot
+
+PHOTOGRAPH = "photograph"
+"""Column with the name of the file; `calibrate` passes over it."""
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPhotograph:
+    """One photograph of a robot of n notches. Units mm, rad, px.
+
+    Attributes:
+        source: The file.
+        reason: Why nothing is reported; "" if the photograph was measured.
+        notch_angle: Angle of every notch, base to tip, (n,); NaN if refused.
+        notch_angle_deviation: Their standard deviations, (n,).
+        tip_position: Tip on the tube axis, in the frame of the base, (3,). Its y is 0: the robot
+            bends in a plane.
+        tip_deviation: Standard deviations of x and z, (3,); NaN for y, which is not measured.
+        scale: Pixels of the photograph per mm.
+        roll: Roll of the robot about the axis of its base, from the side view.
+        tilt: Tilt of its base out of the photograph.
+        noise: Spread of the edges about the outline, px.
+        found: Share of the outline that was found, 0 to 1.
+        outline: Points of the fitted outline in the photograph, px, (N, 2).
+        seen: Whether an edge was found at each of them, (N,).
+    """
+
+    source: str
+    reason: str
+    notch_angle: Numbers
+    notch_angle_deviation: Numbers
+    tip_position: Numbers
+    tip_deviation: Numbers
+    scale: float = float("nan")
+    roll: float = float("nan")
+    tilt: float = float("nan")
+    noise: float = float("nan")
+    found: float = 0.0
+    outline: Numbers = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
+    seen: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool), repr=False)
+
+    @property
+    def measured(self) -> bool:
+        """Whether angles are reported."""
+        return not self.reason
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPhotographs:
+    """Photographs of one robot, with the loads they were taken under.
+
+    Attributes:
+        robot: The robot.
+        photographs: What was measured in each, in the order given.
+        loads: Columns of a file of measurements (`tendon_force_N`, ...) with one text for each
+            photograph.
+
+    Example:
+        >>> import notchflex as nf  # doctest: +SKIP
+        >>> found = nf.measure(["pull_1N.jpg"], nf.load_robot("wrist.toml"))  # doctest: +SKIP
+        >>> found.photographs[0].notch_angle  # doctest: +SKIP
+    """
+
+    robot: Robot
+    photographs: tuple[MeasuredPhotograph, ...]
+    loads: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Number of photographs."""
+        return len(self.photographs)
+
+    @property
+    def measured(self) -> tuple[MeasuredPhotograph, ...]:
+        """Those that were measured."""
+        return tuple(one for one in self.photographs if one.measured)
+
+    @property
+    def refused(self) -> tuple[MeasuredPhotograph, ...]:
+        """Those that were refused; each has its `reason`."""
+        return tuple(one for one in self.photographs if not one.measured)
+
+    def columns(self) -> dict[str, list[Any]]:
+        """Return the columns of the CSV that `calibrate` reads, the measured photographs only."""
+        rows = [number for number, one in enumerate(self.photographs) if one.measured]
+        table: dict[str, list[Any]] = {PHOTOGRAPH: [one.source for one in self.measured]}
+        for name, texts in self.loads.items():
+            table[name] = [texts[row] for row in rows]
+        notches, tendons = self.robot.number_of_notches, self.robot.number_of_tendons
+        for column in measured_columns(notches, tendons, ()):
+            if column.quantity != "notch_angle":
+                continue
+            (notch,) = column.index
+            table[column.name] = [math.degrees(one.notch_angle[notch]) for one in self.measured]
+            table[column.deviation] = [
+                math.degrees(one.notch_angle_deviation[notch]) for one in self.measured
+            ]
+        return table
+
+    def write_csv(self, target: str) -> None:
+        """Write the measured photographs as the CSV that `calibrate` reads, `-` for output.
+
+        Raises:
+            InputError: The file cannot be written.
+        """
+        table = self.columns()
+        write_csv(target, list(table), zip(*table.values(), strict=True))

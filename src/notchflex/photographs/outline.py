@@ -1,0 +1,329 @@
+"""The outline of a bent robot in a photograph: the projected chain.
+
+A pinhole camera sees the chain; its principal point is the middle of the photograph. Rings are
+cylinders, whose sides are seen as lines and whose ends as half ellipses; the spine of a notch is an
+arc of the wall, bent to a circle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.photographs.chain_table import ChainTable, Numbers
+
+SIDE, FACE, SPINE = 0, 1, 2
+"""Kinds of outline: the sides of a ring, its ends, the two edges of a spine."""
+
+VIEW = ("x", "y", "direction", "log_scale", "roll", "tilt", "perspective", "kerf", "cut")
+"""Numbers of a view, before the angles: place of the start of the first notch from the middle of
+the photograph (px), direction of the base (rad), logarithm of the scale (px/mm), roll about the
+tube axis and tilt out of the photograph (rad), inverse distance of the camera (1/mm), and what the
+notches are higher and deeper than in the robot file (mm)."""
+NUMBERS = len(VIEW)
+
+_SPINE_END = 0.2
+"""Part of a spine at either end that is not used: fillets and the corners of rings."""
+
+
+_Index = dict[tuple[int, int, float, int], int]
+
+
+class Outline(NamedTuple):
+    """Points of outlines. N points, b views.
+
+    Attributes:
+        point: Where they are seen, px from the middle of the photograph, (b, N, 2).
+        normal: Unit normals that point out of the robot, of the first view, (N, 2).
+        room: How far the background reaches beyond each point along its normal, px, of the first
+            view, (N,); infinite where nothing follows.
+        breadth: How far the robot reaches inside each point, px, (N,).
+    """
+
+    point: Numbers
+    normal: Numbers
+    room: Numbers
+    breadth: Numbers
+
+
+@dataclass(frozen=True)
+class OutlineModel:
+    """The outline of a robot as a function of its view and its notch angles.
+
+    Args:
+        table: The robot.
+        per_side: Points on each side of a ring.
+        per_face: Points on each end of a ring.
+        base: Length of the straight tube before the first notch that is looked at, mm.
+    """
+
+    table: ChainTable
+    per_side: int = 24
+    per_face: int = 16
+    base: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Number all points: kind, ring or notch, side or end, place along it."""
+        n = self.table.notches
+        rings, sides = np.arange(n + 1), np.array([-1.0, 1.0])
+        along = np.linspace(0.06, 0.94, self.per_side)
+        across = np.linspace(0.0, 1.0, self.per_face)
+        spine = np.linspace(_SPINE_END, 1.0 - _SPINE_END, max(3, self.per_side // 3))
+        blocks = [
+            _block(SIDE, rings, sides, along),
+            _block(FACE, rings[1:], [-1.0], across),
+            _block(FACE, rings, [1.0], across),
+            _block(SPINE, rings[1:], sides, spine),
+        ]
+        kind, ring, which, place = (np.concatenate(one) for one in zip(*blocks, strict=True))
+        object.__setattr__(self, "kind", kind.astype(int))
+        object.__setattr__(self, "ring", ring.astype(int))
+        object.__setattr__(self, "which", which)
+        object.__setattr__(self, "place", place)
+        index = self._index()
+        object.__setattr__(self, "across", self._other(index))
+        object.__setattr__(self, "facing", self._facing(index))
+
+    kind: NDArray[np.int_] = None  # type: ignore[assignment]
+    ring: NDArray[np.int_] = None  # type: ignore[assignment]
+    which: Numbers = None  # type: ignore[assignment]
+    place: Numbers = None  # type: ignore[assignment]
+    across: NDArray[np.int_] = None  # type: ignore[assignment]
+    facing: NDArray[np.int_] = None  # type: ignore[assignment]
+
+    def outline(self, numbers: Numbers) -> Outline:
+        """Return the outline of views and angles.
+
+        Args:
+            numbers: Numbers of `VIEW` and angles (rad), (b, NUMBERS + n).
+        """
+        view = _View(np.atleast_2d(numbers))
+        start, turned = self.table.poses(view.angles)
+        point = np.zeros((len(view.angles), len(self.kind), 3))
+        tangent = np.zeros_like(point)
+        for part, place in (
+            (self.kind == SIDE, self._sides),
+            (self.kind == FACE, self._faces),
+            (self.kind == SPINE, self._spines),
+        ):
+            point[:, part], tangent[:, part] = place(view, start, turned, part)
+        seen = view.seen(point)
+        along = (view.seen(point[:1] + 1e-4 * tangent[:1]) - seen[:1])[0]
+        length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+        normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / length
+        return Outline(seen, *self._oriented(seen[0], normal, view))
+
+    def _oriented(self, seen: Numbers, normal: Numbers, view: _View) -> tuple[Numbers, ...]:
+        """Turn normals outward; find the room outside and the breadth inside of each point."""
+        inward = seen[self.across] - seen
+        breadth = np.abs((inward * normal).sum(axis=1))
+        outward = -np.sign((inward * normal).sum(axis=1))
+        normal = normal * np.where(outward == 0.0, 1.0, outward)[:, None]
+        room = np.full(len(seen), np.inf)
+        has = self.facing >= 0
+        gap = ((seen[self.facing[has]] - seen[has]) * normal[has]).sum(axis=1)
+        room[has] = gap
+        return normal, room, breadth
+
+    def _other(self, index: _Index) -> NDArray[np.int_]:
+        """Return the point across the robot of each point."""
+        found = np.arange(len(self.kind))
+        for key, number in index.items():
+            kind, ring, which, place = key
+            found[number] = index.get((kind, ring, -which, place), number)
+            if kind == FACE and ring == 0:  # its other end is the collet: sides give the inside
+                found[number] = index[(SIDE, 0, -1.0, 0)]
+        return found
+
+    def _facing(self, index: _Index) -> NDArray[np.int_]:
+        """Return the point across the notch of each point of an end; -1 where there is none."""
+        found = np.full(len(self.kind), -1)
+        for (kind, ring, which, place), number in index.items():
+            if kind == FACE:
+                found[number] = index.get((FACE, ring + int(which), -which, place), -1)
+        return found
+
+    def _index(self) -> _Index:
+        counts: dict[tuple[int, int, float], int] = {}
+        index: _Index = {}
+        for number, key in enumerate(
+            zip(self.kind.tolist(), self.ring.tolist(), self.which.tolist(), strict=True)
+        ):
+            counts[key] = counts.get(key, -1) + 1
+            index[(*key, counts[key])] = number
+        return index
+
+    def _sides(
+        self, view: _View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
+    ) -> tuple[Numbers, Numbers]:
+        ring = self.ring[part]
+        half = 0.5 * view.kerf
+        first = np.where(ring > 0, half, -self.base)
+        length = np.append(self.base, self.table.uncut)[ring]
+        last = np.where(ring == 0, 0.0, length) - np.where(ring < self.table.notches, half, 0.0)
+        frame = _Frame(view, start, turned, ring)
+        centre = frame.at(first + (last - first) * self.place[part])
+        lateral, _ = frame.lateral(centre)
+        across = self.table.outer * self.which[part]
+        return centre + across[:, None] * lateral, frame.axis
+
+    def _faces(
+        self, view: _View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
+    ) -> tuple[Numbers, Numbers]:
+        ring, which = self.ring[part], self.which[part]
+        n, half = self.table.notches, 0.5 * view.kerf
+        far = np.where(ring < n, np.append(0.0, self.table.uncut)[ring] - half, 0.0)
+        far = np.where(ring == n, self.table.uncut[-1], far)
+        frame = _Frame(view, start, turned, ring)
+        centre = frame.at(np.where(which > 0, far, half))
+        lateral, toward = frame.lateral(centre)
+        notch = np.clip(np.where(which > 0, ring, ring - 1), 0, n - 1)
+        tip = (which > 0) & (ring == n)
+        side = self.table.side[notch]
+        # The part of an end beside the notch; the whole end at the tip.
+        edge = self._spine_edge(view, lateral, frame, notch)
+        r = self.table.outer
+        low = np.where(tip, -0.9 * r, np.minimum(edge * side + 0.12 * r, 0.8 * r))
+        q = side * (low + (0.92 * r - low) * self.place[part]) / r
+        depth = np.sqrt(1.0 - q**2)
+        # The half of the circle that bulges out of the ring.
+        tilt = (frame.axis * view.ray(centre)).sum(axis=-1)
+        sign = np.where(tilt * which > 0.0, 1.0, -1.0)
+        point = centre + r * (q[..., None] * lateral + (sign * depth)[..., None] * toward)
+        tangent = depth[..., None] * lateral - (sign * q)[..., None] * toward
+        return point, tangent
+
+    def _spines(
+        self, view: _View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
+    ) -> tuple[Numbers, Numbers]:
+        notch, which, place = self.ring[part] - 1, self.which[part], self.place[part]
+        before, after = start[:, notch].copy(), start[:, notch + 1]
+        uncut = np.append(0.0, self.table.uncut)[notch]
+        angle0 = turned[:, notch]
+        before = before + np.stack([np.sin(angle0), np.cos(angle0)], -1) * uncut[:, None]
+        bend = turned[:, notch + 1] - angle0
+        chord = np.linalg.norm(after - before, axis=-1)
+        middle = 0.5 * bend
+        length = chord / np.sinc(middle / np.pi)
+        at = place * bend
+        reach = (length * place * np.sinc(0.5 * at / np.pi))[..., None]
+        heading = angle0 + 0.5 * at
+        here = before + reach * np.stack([np.sin(heading), np.cos(heading)], axis=-1)
+        frame = _Frame.of(view, here, angle0 + at)
+        centre = frame.origin
+        lateral, _ = frame.lateral(centre)
+        side = self.table.side[notch]
+        inner = self._spine_edge(view, lateral, frame, notch)
+        across = np.where(which * side < 0.0, -side * self.table.outer, inner)
+        return centre + across[..., None] * lateral, frame.axis
+
+    def _spine_edge(
+        self, view: _View, lateral: Numbers, frame: _Frame, notch: NDArray[np.int_]
+    ) -> Numbers:
+        """Return where the inner edge of a spine is seen, along `lateral` from the axis, mm."""
+        t = self.table
+        depth = np.clip(t.depth[notch] + view.cut, 0.02 * t.outer, 1.98 * t.outer)
+        cosine = (depth - t.outer) / t.outer
+        side = t.side[notch]
+        x = (lateral * frame.x).sum(axis=-1) * side
+        y = np.abs((lateral * view.y[:, None]).sum(axis=-1))
+        high = -np.inf
+        for radius in (t.outer, t.inner):
+            cos = np.where(t.radial[notch], cosine, np.clip(cosine * t.outer / radius, -1.0, 1.0))
+            sin = np.sqrt(1.0 - cos**2)
+            high = np.maximum(high, radius * (-cos * x + sin * y))
+        return side * high
+
+
+class _View:
+    """The numbers of b views."""
+
+    def __init__(self, numbers: Numbers) -> None:
+        one = dict(zip(VIEW, numbers.T, strict=False))
+        self.angles = numbers[:, NUMBERS:]
+        self.scale = np.exp(one["log_scale"])
+        self.place = numbers[:, :2]
+        self.perspective = one["perspective"]
+        self.kerf, self.cut = one["kerf"][:, None], one["cut"][:, None]
+        rotation = _rotation(one["direction"], one["roll"], one["tilt"])
+        self.x, self.y, self.z = rotation[..., 0], rotation[..., 1], rotation[..., 2]
+
+    def seen(self, point: Numbers) -> Numbers:
+        """Project points of camera axes, mm from the start of the first notch, (b, N, 3)."""
+        scale, near = self.scale[:, None, None], self.perspective[:, None, None]
+        return (self.place[:, None] + scale * point[..., :2]) / (1.0 + near * point[..., 2:])
+
+    def ray(self, point: Numbers) -> Numbers:
+        """Return unit vectors from the camera to points, (b, N, 3)."""
+        near = self.perspective[:, None]
+        ray = np.empty_like(point)
+        ray[..., :2] = near[..., None] * (
+            point[..., :2] + (self.place / self.scale[:, None])[:, None]
+        )
+        ray[..., 2] = 1.0 + near * point[..., 2]
+        return ray / np.linalg.norm(ray, axis=-1, keepdims=True)
+
+
+class _Frame:
+    """Frames of points on bodies, in camera axes."""
+
+    def __init__(
+        self, view: _View, start: Numbers, turned: Numbers, ring: NDArray[np.int_]
+    ) -> None:
+        self._set(view, start[:, ring], turned[:, ring])
+
+    @classmethod
+    def of(cls, view: _View, start: Numbers, turned: Numbers) -> _Frame:
+        """Return frames at points of the plane (x, z), (b, N, 2), turned by angles, (b, N)."""
+        made = cls.__new__(cls)
+        made._set(view, start, turned)
+        return made
+
+    def _set(self, view: _View, start: Numbers, turned: Numbers) -> None:
+        x, z = view.x[:, None], view.z[:, None]
+        cos, sin = np.cos(turned)[..., None], np.sin(turned)[..., None]
+        self.view = view
+        self.origin = start[..., :1] * x + start[..., 1:] * z
+        self.axis = cos * z + sin * x
+        self.x = cos * x - sin * z
+
+    def at(self, along: Numbers) -> Numbers:
+        """Return points on the tube axis, at lengths from the start of the body, mm."""
+        return self.origin + along[..., None] * self.axis
+
+    def lateral(self, centre: Numbers) -> tuple[Numbers, Numbers]:
+        """Return unit vectors across the axis: across the line of sight too, and toward the eye."""
+        ray = self.view.ray(centre)
+        across = np.cross(self.axis, ray)
+        across /= np.linalg.norm(across, axis=-1, keepdims=True)
+        across *= np.where((across * self.x).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+        toward = -(ray - (ray * self.axis).sum(axis=-1, keepdims=True) * self.axis)
+        return across, toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+
+
+def _rotation(direction: Numbers, roll: Numbers, tilt: Numbers) -> Numbers:
+    """Return the axes of the base in camera axes (right, down, forward), as columns, (b, 3, 3)."""
+    zero, one = np.zeros_like(roll), np.ones_like(roll)
+    cos, sin = np.cos(roll), np.sin(roll)
+    rolled = _matrix([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
+    # z of the base to the right, x down, y forward
+    laid = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    cos, sin = np.cos(tilt), np.sin(tilt)
+    tilted = _matrix([[cos, zero, -sin], [zero, one, zero], [sin, zero, cos]])
+    cos, sin = np.cos(direction), np.sin(direction)
+    turned = _matrix([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
+    return turned @ tilted @ laid @ rolled
+
+
+def _matrix(rows: list[list[Numbers]]) -> Numbers:
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _block(
+    kind: int, rings: NDArray[np.int_], which: list[float] | Numbers, place: Numbers
+) -> tuple[Numbers, ...]:
+    grid = np.meshgrid(rings, which, place, indexing="ij")
+    return np.full(grid[0].size, float(kind)), *(one.ravel().astype(float) for one in grid)

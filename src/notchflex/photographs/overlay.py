@@ -1,0 +1,82 @@
+"""The fitted outline drawn over a photograph."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.photographs.measured import MeasuredPhotograph
+from notchflex.results.files.writing import replacing
+
+LONGEST = 1800
+"""Longer side of an overlay, px."""
+
+_FOUND, _MISSED, _REFUSED = (60, 200, 60), (40, 140, 255), (120, 160, 255)
+
+
+def overlay_names(sources: Sequence[str]) -> list[str]:
+    """Return a name for the overlay of each photograph, no two alike.
+
+    Example:
+        >>> overlay_names(["a/x.jpg", "b/x.jpg", "y.png"])
+        ['x-1.png', 'x-2.png', 'y.png']
+    """
+    stems = [Path(source).stem or "photograph" for source in sources]
+    counts: dict[str, int] = {}
+    names: list[str] = []
+    for stem in stems:
+        counts[stem] = counts.get(stem, 0) + 1
+        names.append(f"{stem}-{counts[stem]}.png" if stems.count(stem) > 1 else f"{stem}.png")
+    return names
+
+
+def write_overlay(
+    target: str | Path, picture: NDArray[np.uint8], found: MeasuredPhotograph
+) -> None:
+    """Draw the fitted outline and the angles over a photograph, and write it as PNG.
+
+    Green points lie on an edge, orange ones on none. The photograph is made smaller.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    import cv2
+
+    factor = min(1.0, LONGEST / max(picture.shape[:2]))
+    small = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+    size = max(small.shape[:2]) / 1000.0
+    points = (found.outline + 0.5) * factor - 0.5
+    for point, seen in zip(points, found.seen, strict=True):
+        if np.abs(point).max() < 1e4:
+            at = (round(16 * float(point[0])), round(16 * float(point[1])))
+            colour = _FOUND if seen else _MISSED
+            cv2.circle(small, at, round(16 * 1.3 * size), colour, -1, cv2.LINE_AA, 4)
+    lines = [f"refused: {found.reason}"] if found.reason else _lines(found)
+    colour = _REFUSED if found.reason else (255, 255, 255)
+    height = round(26 * size)
+    for number, text in enumerate(lines, 1):
+        corner = (
+            (0, round((number - 0.85) * height)),
+            (small.shape[1], round((number + 0.25) * height)),
+        )
+        cv2.rectangle(small, *corner, (40, 40, 40), -1)
+        cv2.putText(
+            small, text, (height // 2, number * height), cv2.FONT_HERSHEY_SIMPLEX,
+            0.62 * size, colour, max(1, round(size)), cv2.LINE_AA,
+        )  # fmt: skip
+    done, data = cv2.imencode(".png", small)
+    assert done
+    with replacing(target) as path:
+        path.write_bytes(data.tobytes())
+
+
+def _lines(found: MeasuredPhotograph) -> list[str]:
+    angles = zip(found.notch_angle, found.notch_angle_deviation, strict=True)
+    return [
+        f"notch {number}: {math.degrees(angle):.2f} +- {math.degrees(spread):.2f} deg"
+        for number, (angle, spread) in enumerate(angles, 1)
+    ]

@@ -1,0 +1,98 @@
+"""Reading a photograph: any depth and any number of channels, turned as its EXIF says."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex._extras import need
+from notchflex.errors import InputError
+
+MOST_PIXELS = 120e6
+LARGEST_FILE = 400_000_000
+_LEAST_SIDE = 64
+
+
+def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
+    """Return a photograph as blue, green, red of 8 bits, (height, width, 3).
+
+    Raises:
+        InputError: There is no such file, it is no photograph, or it is too large or too small.
+    """
+    need("cv2", "photographs", "measuring photographs")
+    name = os.fspath(source)
+    data = _bytes(name)
+    _check_size(name, *_size_in_head(data))
+    image = _decoded(data)
+    if image is None or image.ndim != 3:
+        raise InputError.FILE_FORMAT(
+            f"{name} is no photograph that can be read; give a PNG, JPEG or TIFF file"
+        )
+    _check_size(name, image.shape[1], image.shape[0])
+    return image
+
+
+def _decoded(data: bytes) -> Any:
+    """Return the picture, or None; OpenCV's own words on bad files are not shown."""
+    import cv2
+
+    logging: Any = getattr(cv2.utils, "logging", None)
+    level = None if logging is None else logging.setLogLevel(logging.LOG_LEVEL_SILENT)
+    try:
+        return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:
+        return None
+    finally:
+        if logging is not None:
+            logging.setLogLevel(level)
+
+
+def _bytes(name: str) -> bytes:
+    try:
+        path = Path(name)
+        is_folder, size = path.is_dir(), path.stat().st_size
+        data = b"" if is_folder or size > LARGEST_FILE else path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError.FILE_NOT_FOUND(f"there is no photograph {name}") from None
+    except (OSError, ValueError) as problem:
+        words = getattr(problem, "strerror", None) or problem
+        raise InputError.FILE_UNREADABLE(f"{name} cannot be read: {words}") from None
+    if is_folder:
+        raise InputError.FILE_FORMAT(f"{name} is a folder; name the photographs in it")
+    if size > LARGEST_FILE:
+        raise InputError.OUT_OF_RANGE(
+            f"{name} is larger than {LARGEST_FILE / 1e6:.0f} MB; give a smaller photograph"
+        )
+    return data
+
+
+def _size_in_head(data: bytes) -> tuple[int, int]:
+    """Return width and height by the head of a PNG or JPEG, before it is decoded; else (0, 0)."""
+    if data[:8] == b"\x89PNG\r\n\x1a\n":
+        return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    if data[:2] != b"\xff\xd8":
+        return 0, 0
+    at = 2
+    while at + 9 < len(data) and data[at] == 0xFF:
+        marker = data[at + 1]
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            height = int.from_bytes(data[at + 5 : at + 7], "big")
+            return int.from_bytes(data[at + 7 : at + 9], "big"), height
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return 0, 0
+
+
+def _check_size(name: str, width: int, height: int) -> None:
+    if width * height > MOST_PIXELS:
+        raise InputError.OUT_OF_RANGE(
+            f"{name} has {width} x {height} pixels; at most {MOST_PIXELS / 1e6:.0f} million are "
+            "read, make it smaller"
+        )
+    if width and min(width, height) < _LEAST_SIDE:
+        raise InputError.OUT_OF_RANGE(
+            f"{name} has {width} x {height} pixels; each side needs {_LEAST_SIDE} or more"
+        )

@@ -1,0 +1,168 @@
+"""Rendered photographs of known wrists: measured, or refused with the reason; never wrong."""
+
+import json
+from contextlib import suppress
+
+import cv2
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.cli.app import run
+from notchflex.photographs.chain_table import chain_table
+from notchflex.photographs.measure import measure_picture
+from notchflex.photographs.overlay import overlay_names
+from notchflex.photographs.reading import read_photograph
+from photographs.renderer import Scene, render
+from refusals import refused
+
+ROBOT = nf.load_robot("pacheco2021-a")
+ANGLES = np.radians([14.0, 22.0, 18.0, 9.0, 16.0])
+SCENE = Scene(
+    size=(720, 620), scale=46.0, place=(450.0, 150.0), direction=75.0, roll=8.0, tilt=5.0, seed=3
+)
+
+
+@pytest.fixture(scope="module")
+def photograph(tmp_path_factory):
+    file = tmp_path_factory.mktemp("photographs") / "wrist_0.5N.png"
+    cv2.imwrite(str(file), render(ROBOT, ANGLES, SCENE))
+    return file
+
+
+def test_angles_of_a_rendered_photograph(photograph):
+    (one,) = nf.measure(photograph, ROBOT).photographs
+    assert one.reason == ""
+    error = one.notch_angle - ANGLES
+    assert np.degrees(np.sqrt((error**2).mean())) < 0.15
+    assert (np.abs(error) < 4.0 * one.notch_angle_deviation).all()
+    assert one.notch_angle_deviation.max() < np.radians(0.3)
+    assert abs(np.degrees(one.roll)) == pytest.approx(8.0, abs=2.0)
+    tip, _ = nf.tip_from_angles(ROBOT, ANGLES[None])
+    np.testing.assert_allclose(one.tip_position, tip[0], atol=0.03)
+
+
+def test_verb_writes_what_calibrate_reads(photograph, tmp_path, capsys):
+    table, document = tmp_path / "measured.csv", tmp_path / "measured.json"
+    words = ["measure", str(photograph), "--robot", "pacheco2021-a", "-o", str(table)]
+    assert run([*words, "--pattern", "wrist_{tension}N", "--json", str(document)]) == 0
+    assert "notch 5" in capsys.readouterr().out
+    read = nf.read_measurements(table, ROBOT, measured="edge")
+    assert read.load.tension.tolist() == [[0.5]]
+    np.testing.assert_allclose(read.observed["edge_angle"][0], ANGLES, atol=np.radians(0.4))
+    assert np.isfinite(read.deviation["edge_angle"]).all()
+    assert json.loads(document.read_text())["photographs"][0]["measured"]
+    overlay = cv2.imread(str(tmp_path / "measured-overlays" / "wrist_0.5N.png"))
+    assert overlay.shape[:2] == (620, 720)
+    green = (overlay[..., 1].astype(int) - overlay[..., 2] > 80).sum()
+    assert green > 500
+
+
+def test_nothing_to_see_is_refused():
+    table = chain_table(ROBOT)
+    random = np.random.default_rng(0)
+    blank = np.full((300, 400, 3), 150, np.uint8)
+    noise = random.integers(0, 256, blank.shape).astype(np.uint8)
+    rod = blank.copy()
+    cv2.line(rod, (30, 30), (360, 260), (40, 40, 40), 24)
+    for picture in (blank, noise, rod):
+        found = measure_picture(picture, table, "cat")
+        assert found.reason
+        assert np.isnan(found.notch_angle).all()
+
+
+@pytest.mark.nightly
+def test_another_robot_is_refused(photograph):
+    """A wrist with one notch more, and one with rings of another length, do not fit."""
+    more = ROBOT.replace(notch=(*ROBOT.notches, ROBOT.notches[0]))
+    for other in (more, ROBOT.with_value("notch.uncut_length", 1.5)):
+        (one,) = nf.measure(photograph, other).photographs
+        assert one.reason
+
+
+def test_a_refused_photograph_exits_with_1_and_writes_no_row(tmp_path, capsys):
+    file, table = tmp_path / "blank.png", tmp_path / "m.csv"
+    cv2.imwrite(str(file), np.full((200, 300), 128, np.uint8))
+    assert run(["measure", str(file), "--robot", "pacheco2021-a", "-o", str(table)]) == 1
+    assert not table.exists()
+    assert "refused" in capsys.readouterr().err
+    assert (tmp_path / "m-overlays" / "blank.png").exists()
+
+
+def test_bad_files(tmp_path, photograph):
+    data = photograph.read_bytes()
+    (tmp_path / "text.png").write_text("no photograph")
+    (tmp_path / "empty.jpg").write_bytes(b"")
+    (tmp_path / "half.png").write_bytes(data[:60])
+    huge = data[:16] + (20000).to_bytes(4, "big") + (10000).to_bytes(4, "big") + data[24:]
+    (tmp_path / "huge.png").write_bytes(huge)
+    tiny = cv2.imencode(".png", np.zeros((20, 20), np.uint8))[1].tobytes()
+    (tmp_path / "tiny.png").write_bytes(tiny)
+    for name, code in (
+        ("missing.png", "FILE_NOT_FOUND"),
+        ("", "FILE_FORMAT"),
+        ("text.png", "FILE_FORMAT"),
+        ("empty.jpg", "FILE_FORMAT"),
+        ("half.png", "FILE_FORMAT"),
+        ("huge.png", "OUT_OF_RANGE"),
+        ("tiny.png", "OUT_OF_RANGE"),
+    ):
+        with refused(code):
+            read_photograph(tmp_path / name)
+
+
+def test_mutated_files_are_read_or_refused(tmp_path, photograph):
+    grey = cv2.imread(str(photograph))
+    for suffix in (".png", ".jpg"):
+        whole = cv2.imencode(suffix, cv2.resize(grey, (120, 100)))[1].tobytes()
+        for seed in range(50):
+            random = np.random.default_rng(seed)
+            data = bytearray(whole)
+            for at in random.integers(0, len(data), 1 + seed % 9):
+                data[at] = int(random.integers(256))
+            file = tmp_path / f"mutated{suffix}"
+            file.write_bytes(bytes(data[: random.integers(1, len(data) + 1)]))
+            with suppress(nf.InputError):
+                assert read_photograph(file).ndim == 3
+
+
+def test_depths_and_channels(tmp_path):
+    grey = np.random.default_rng(1).integers(0, 256, (90, 80)).astype(np.uint8)
+    deep = grey.astype(np.uint16) * 257
+    see_through = np.dstack([grey, grey, grey, np.full_like(grey, 255)])
+    for name, picture in (("a.png", grey), ("b.png", deep), ("c.png", see_through)):
+        cv2.imwrite(str(tmp_path / name), picture)
+        read = read_photograph(tmp_path / name)
+        assert read.shape == (90, 80, 3)
+        assert read.dtype == np.uint8
+        assert np.abs(read[..., 0].astype(int) - grey).max() <= 1
+
+
+def test_robots_of_other_kinds(photograph):
+    for name in ("two-axis-wrist", "gao2017"):
+        with refused("UNSUPPORTED"):
+            nf.measure(photograph, nf.load_robot(name))
+    with refused("NO_DATA"):
+        nf.measure([], ROBOT)
+
+
+def test_loads_come_from_a_table_or_from_names(tmp_path, photograph):
+    name = photograph.name
+    table = tmp_path / "loads.csv"
+    for text, code in (
+        ("file,tendon_force_N\nx,1\n", "TABLE_COLUMNS"),
+        ("photograph,tendon_force_N\nother.png,1\n", "TABLE_ROWS"),
+        (f"photograph,tendon_force_N\n{name},1\n{name},2\n", "TABLE_ROWS"),
+    ):
+        table.write_text(text)
+        with refused(code):
+            nf.measure(photograph, ROBOT, loads=table)
+    for pattern in ("wrist", "pull_{tension}N", "{tension}{tension}"):
+        with refused("BAD_SYNTAX"):
+            nf.measure(photograph, ROBOT, pattern=pattern)
+    with refused("CONFLICT"):
+        nf.measure(photograph, ROBOT, loads=table, pattern="wrist_{tension}N")
+
+
+def test_overlays_have_names_of_their_own():
+    assert overlay_names(["a/x.jpg", "b/x.jpg", "y.png"]) == ["x-1.png", "x-2.png", "y.png"]
