@@ -12,6 +12,7 @@ from pathlib import Path
 import notchflex as nf
 
 DOCS = Path(__file__).resolve().parents[1]
+IMAGES = DOCS / "images"
 
 
 def main() -> None:
@@ -23,7 +24,7 @@ def main() -> None:
         file = Path(folder) / "limits.toml"
         file.write_text(text[1], encoding="utf-8")
         found = nf.tolerance_analysis(nf.load_robot("pacheco2021-a"), file, draws=6400)
-    nf.plot(found).save(DOCS / "images" / "tolerances.svg")
+    nf.plot(found).save(IMAGES / "tolerances.svg")
 
 
 if __name__ == "__main__":

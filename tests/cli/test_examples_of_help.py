@@ -9,8 +9,8 @@ import pytest
 
 from notchflex.cli.app import VERBS, run
 
-# What never ends by itself, takes minutes, or writes into the home folder.
-NOT_RUN = ("--open", "--port", "notchflex bench", "--install")
+# What never ends by itself, takes minutes, writes into the home folder, or needs photographs.
+NOT_RUN = ("--open", "--port", "notchflex bench", "--install", "notchflex measure")
 
 
 def script(verb):

@@ -102,10 +102,10 @@ def test_number_of_notches_and_stock():
             "stock": [
                 {
                     "values": ["tube.outer_diameter", "tube.inner_diameter", "tendon.radius"],
-                    "sizes": [[1.62, 1.40, 0.70], [1.2, 1.0, 0.5]],
+                    "sizes": [[1.70, 1.50, 0.75], [1.62, 1.40, 0.70]],
                 }
             ],
-            "variable": [{"value": "notch.height", "lower": 0.2, "upper": 1.0}],
+            "variable": [{"value": "notch.height", "lower": 0.2, "upper": 1.2}],
             "objective": [{"quantity": "length", "goal": "minimise"}],
             "constraint": [{"quantity": "closing_angle", "take": "sum", "equal": 120.0}],
         }
@@ -113,8 +113,11 @@ def test_number_of_notches_and_stock():
     # By hand: height of all notches together is 120 deg (r_o + y), whatever their number.
     assert made.converged, made.reason
     assert made.robot.number_of_notches == 3
-    assert made.robot.tube.outer_diameter == 1.2
+    assert made.robot.tube.outer_diameter == 1.62
     assert made.robot.tendon[0].end_body == 3
+    centroid = nf.annular_sector(0.81, 0.70, 1.40).centroid
+    height = made.robot.notches[0].height
+    assert 3.0 * height == pytest.approx(np.radians(120.0) * (0.81 + centroid), rel=1e-6)
 
 
 @pytest.mark.nightly

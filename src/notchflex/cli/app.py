@@ -97,12 +97,14 @@ VERBS = {
     ),
     "measure": (
         "Measure the angle of every notch in photographs of a bent robot.",
-        "notchflex measure pull_0.5N.jpg pull_1N.jpg --robot wrist.toml \\\n"
+        "notchflex measure pull_0.5N.jpg pull_1N.jpg --robot pacheco2021-a \\\n"
         '        --pattern "pull_{tension}N" -o measured.csv',
     ),
     "tolerance": (
         "Find out what tolerances do: worst case, yield, which dimension to control.",
-        "notchflex tolerance pacheco2021-a limits.toml\n"
+        "echo 'load.pulled.tension = 1.0' > limits.toml\n"
+        "    echo 'accept = [{quantity = \"total_angle\", upper = 60}]' >> limits.toml\n"
+        "    notchflex tolerance pacheco2021-a limits.toml\n"
         "    notchflex tolerance pacheco2021-a limits.toml --draws 10000 --plot tolerances.png \\\n"
         "        --csv robots.csv --json -",
     ),
