@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.cli.arguments.loads import BodyForceOption, ExternalLoads
+from notchflex._load_words import BodyForceOption
+from notchflex.cli.arguments.loads import ExternalLoads
 from notchflex.cli.verbs import simulate
 
 

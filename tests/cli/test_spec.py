@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from notchflex.cli.arguments.conversion import parse_spec, whole
-from notchflex.cli.arguments.loads import TendonCommand, load_columns
+from notchflex._load_words import TendonCommand, load_columns, parse_spec, whole
 from notchflex.errors import InputError
 
 NUMBERS = st.floats(-100.0, 100.0, allow_nan=False)

@@ -64,14 +64,18 @@ def test_a_stroke_passes_the_limit_point(cycle):
     assert not [text for text in path_warnings(path) if "snaps" in text]
 
 
+def random_wrist(random: np.random.Generator) -> nf.Robot:
+    return wrist(
+        random.uniform(0.0, 0.3),
+        plateau_stress=random.uniform(200.0, 500.0),
+        plateau_modulus=random.uniform(2000.0, 9000.0),
+    )
+
+
 def test_random_wrists_return_to_rest():
     random = np.random.default_rng(3)
     for _ in range(12):
-        robot = wrist(
-            random.uniform(0.0, 0.3),
-            plateau_stress=random.uniform(200.0, 500.0),
-            plateau_modulus=random.uniform(2000.0, 9000.0),
-        )
+        robot = random_wrist(random)
         loads = nf.pull(0.0, random.uniform(1.0, 5.0), steps=int(random.integers(3, 40))).release()
         path = nf.simulate(robot, loads)
         assert path.converged.all(), path.reason
@@ -81,11 +85,7 @@ def test_random_wrists_return_to_rest():
 def test_strokes_pass_limit_points_and_return():
     random = np.random.default_rng(0)
     for _ in range(8):
-        robot = wrist(
-            random.uniform(0.0, 0.3),
-            plateau_stress=random.uniform(200.0, 500.0),
-            plateau_modulus=random.uniform(2000.0, 9000.0),
-        )
+        robot = random_wrist(random)
         most, steps = random.uniform(1.5, 3.4), int(random.integers(3, 30))
         strokes = most * np.append(np.arange(1, steps + 1), np.arange(steps)[::-1]) / steps
         path = nf.simulate(robot, [nf.Load(stroke=float(stroke)) for stroke in strokes])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -36,3 +36,17 @@ class Document(Protocol):
     def save(self, file: Path) -> None:
         """Write it to a file, which is then renamed: `write` calls it with a temporary name."""
         ...
+
+
+@dataclass(frozen=True)
+class FileDocument:
+    """A document whose content is known; text is written as UTF-8."""
+
+    content: str | bytes
+    warnings: tuple[str, ...] = ()
+    facts: dict[str, Any] = field(default_factory=dict[str, Any])
+
+    def save(self, file: Path) -> None:
+        """Write it."""
+        content = self.content
+        file.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)

@@ -10,13 +10,6 @@ from typing import Any
 
 from cyclopts import Parameter, Token
 
-from notchflex._load_words import MOST_STEPS as MOST_STEPS
-from notchflex._load_words import SPEC as SPEC
-from notchflex._load_words import Vector as Vector
-from notchflex._load_words import number as number
-from notchflex._load_words import parse_spec as parse_spec
-from notchflex._load_words import vector as vector
-from notchflex._load_words import whole as whole
 from notchflex.errors import InputError
 
 

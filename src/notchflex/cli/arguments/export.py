@@ -8,7 +8,8 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
-from notchflex.cli.arguments.conversion import converted, flag, number
+from notchflex._load_words import number
+from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.export.options import DxfVersion, PatternOptions, Seam
 
 PATTERN = Group("Flat pattern (--dxf, --svg, --pdf)", sort_key=1)

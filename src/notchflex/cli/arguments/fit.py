@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, TypeVar
 from cyclopts import Group, Parameter
 
 from notchflex._extras import need
-from notchflex.cli.arguments.conversion import converted, number, whole
-from notchflex.cli.arguments.loads import TendonCommand, tendon_command
+from notchflex._load_words import TendonCommand, number, whole
+from notchflex.cli.arguments.conversion import converted
+from notchflex.cli.arguments.loads import tendon_command
 from notchflex.cli.arguments.robots import chosen_robot, robot_files, robot_label
 from notchflex.errors import InputError
 

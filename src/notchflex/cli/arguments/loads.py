@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from notchflex._load_words import BodyForceOption as BodyForceOption
-from notchflex._load_words import TendonCommand as TendonCommand
-from notchflex._load_words import load_columns as load_columns
-from notchflex._load_words import read_body_force, read_command
-from notchflex.cli.arguments.conversion import Vector, converted, flag, number, vector
+from notchflex._load_words import (
+    BodyForceOption,
+    Vector,
+    number,
+    read_body_force,
+    read_command,
+    vector,
+)
+from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:

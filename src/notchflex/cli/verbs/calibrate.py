@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from notchflex._load_words import load_columns
 from notchflex.cli import terminal
 from notchflex.cli.arguments.fit import (
     BeyondFit,
@@ -15,7 +16,6 @@ from notchflex.cli.arguments.fit import (
     ParameterSpec,
     Sources,
 )
-from notchflex.cli.arguments.loads import load_columns
 from notchflex.cli.arguments.robots import MeasuredAs, OnePath, Settings, read_data
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
 from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from notchflex._load_words import TendonCommand, load_columns, number
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, number
+from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.export import FINITE_ELEMENTS, SOLIDS, PatternArguments
-from notchflex.cli.arguments.loads import TendonCommand, load_columns, tendon_command
+from notchflex.cli.arguments.loads import tendon_command
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet, output_file
 from notchflex.cli.terminal import DONE, NOT_CONVERGED

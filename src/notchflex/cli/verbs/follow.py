@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from notchflex._load_words import number
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, number
+from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.loads import ExternalLoads
 from notchflex.cli.arguments.robots import (
     RobotName,

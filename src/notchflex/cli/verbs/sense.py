@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from notchflex._load_words import number
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, number
+from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.loads import ExternalLoads
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet

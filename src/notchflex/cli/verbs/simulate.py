@@ -8,14 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from notchflex._load_words import TendonCommand, Vector, load_columns, vector, whole
 from notchflex.cli import simulate_files, terminal
-from notchflex.cli.arguments.conversion import Vector, converted, flag, texts, vector, whole
-from notchflex.cli.arguments.loads import (
-    ExternalLoads,
-    TendonCommand,
-    load_columns,
-    tendon_command,
-)
+from notchflex.cli.arguments.conversion import converted, flag, texts
+from notchflex.cli.arguments.loads import ExternalLoads, tendon_command
 from notchflex.cli.arguments.robots import (
     RobotName,
     Settings,

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from notchflex._load_words import whole
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, whole
+from notchflex.cli.arguments.conversion import converted
 from notchflex.cli.arguments.robots import (
     RobotName,
     Settings,

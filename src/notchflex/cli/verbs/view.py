@@ -8,8 +8,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from notchflex._load_words import whole
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, flag, whole
+from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.arguments.robots import RobotName, Settings, chosen_robot, robot_files
 from notchflex.viewer import HOST, PORT, check_host, check_installed, exposed
 

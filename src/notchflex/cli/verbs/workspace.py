@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from notchflex._load_words import number, whole
 from notchflex.cli import terminal
-from notchflex.cli.arguments.conversion import converted, number, texts, whole
+from notchflex.cli.arguments.conversion import converted, texts
 from notchflex.cli.arguments.loads import ExternalLoads
 from notchflex.cli.arguments.robots import (
     RobotName,

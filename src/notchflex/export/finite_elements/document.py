@@ -6,19 +6,18 @@ import numpy as np
 
 from notchflex import __version__
 from notchflex.errors import InputError
-from notchflex.export.document import Subject
+from notchflex.export.document import FileDocument, Subject
 from notchflex.export.finite_elements.deck import deck
 from notchflex.export.finite_elements.half_tube import half_tube
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.tendon_spans import TendonSpan, tendon_spans
-from notchflex.export.simulators.document import TextDocument
 from notchflex.loads.external import NOTHING
 from notchflex.results import EquilibriumPath
 from notchflex.results.same_robot import robot_digest
 from notchflex.robot import ArcNotch, Linear
 
 
-def deck_document(subject: Subject, options: DeckOptions) -> TextDocument:
+def deck_document(subject: Subject, options: DeckOptions) -> FileDocument:
     """Make a deck of a robot under the tensions of its tendons.
 
     Raises:
@@ -55,7 +54,7 @@ def deck_document(subject: Subject, options: DeckOptions) -> TextDocument:
         *warnings,
     ]
     facts = {"nodes": len(mesh.place), "elements": len(mesh.elements)}
-    return TextDocument(deck(robot, mesh, spans, options, "\n".join(head)), warnings, facts)
+    return FileDocument(deck(robot, mesh, spans, options, "\n".join(head)), warnings, facts)
 
 
 def _check_state(path: EquilibriumPath, step: int) -> None:

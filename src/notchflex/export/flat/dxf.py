@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from notchflex.export.document import Subject
+from notchflex.export.document import FileDocument, Subject
 from notchflex.export.flat.drawing import LAYERS, PatternDrawing, pattern_drawing
 from notchflex.export.flat.pattern import flat_pattern
 from notchflex.export.options import PatternOptions
@@ -19,29 +17,7 @@ _COLOURS = {"CUT": 1, "CUT_OFF": 5, "REFERENCE": 8, "TEXT": 7}  # red, blue, gre
 _MM = 4  # $INSUNITS
 
 
-@dataclass(frozen=True)
-class DxfPattern:
-    """A pattern as the bytes of a DXF file."""
-
-    drawing: PatternDrawing
-    content: bytes
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences about the pattern."""
-        return self.drawing.pattern.warnings
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """Numbers about the pattern."""
-        return self.drawing.pattern.facts
-
-    def save(self, file: Path) -> None:
-        """Write it."""
-        file.write_bytes(self.content)
-
-
-def dxf_pattern(subject: Subject, options: PatternOptions) -> DxfPattern:
+def dxf_pattern(subject: Subject, options: PatternOptions) -> FileDocument:
     """Make the flat pattern of a robot as DXF.
 
     Lengths are in mm; with `y_unit="deg"` the y coordinates are degrees.
@@ -49,8 +25,8 @@ def dxf_pattern(subject: Subject, options: PatternOptions) -> DxfPattern:
     Raises:
         InputError: See `flat_pattern`.
     """
-    drawing = pattern_drawing(flat_pattern(subject, options))
-    return DxfPattern(drawing, _content_of(drawing))
+    pattern = flat_pattern(subject, options)
+    return FileDocument(_content_of(pattern_drawing(pattern)), pattern.warnings, pattern.facts)
 
 
 def _content_of(drawing: PatternDrawing) -> bytes:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
-from notchflex.export.document import Subject
+from notchflex.export.document import FileDocument, Subject
 from notchflex.export.flat.drawing import LAYERS, DrawnLine, PatternDrawing, pattern_drawing
 from notchflex.export.flat.pattern import flat_pattern
 from notchflex.export.flat.title import plain_name
@@ -18,34 +15,14 @@ _LINE = 0.02  # mm; width of a line
 _MARGIN = 1.0  # mm
 
 
-@dataclass(frozen=True)
-class SvgPattern:
-    """A pattern as the text of an SVG file."""
-
-    drawing: PatternDrawing
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences about the pattern."""
-        return self.drawing.pattern.warnings
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """Numbers about the pattern."""
-        return self.drawing.pattern.facts
-
-    def save(self, file: Path) -> None:
-        """Write it."""
-        file.write_text(_text_of(self.drawing), encoding="utf-8", newline="\n")
-
-
-def svg_pattern(subject: Subject, options: PatternOptions) -> SvgPattern:
+def svg_pattern(subject: Subject, options: PatternOptions) -> FileDocument:
     """Make the flat pattern of a robot as SVG, with the layers of the DXF as groups.
 
     Raises:
         InputError: See `flat_pattern`.
     """
-    return SvgPattern(pattern_drawing(flat_pattern(subject, options)))
+    pattern = flat_pattern(subject, options)
+    return FileDocument(_text_of(pattern_drawing(pattern)), pattern.warnings, pattern.facts)
 
 
 def _text_of(drawing: PatternDrawing) -> str:

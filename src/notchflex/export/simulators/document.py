@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from notchflex import __version__
 from notchflex._extras import install_command
-from notchflex.export.document import Subject
+from notchflex.export.document import FileDocument, Subject
 from notchflex.export.simulators.joint_model import JointModel, joint_model
 from notchflex.export.simulators.mjcf import mjcf
 from notchflex.export.simulators.mujoco_run import SimulatorError, has_mujoco, measure_errors
@@ -20,19 +19,6 @@ from notchflex.export.simulators.transmission import transmission_table
 from notchflex.export.simulators.urdf import urdf
 from notchflex.results.same_robot import robot_digest
 from notchflex.robot import Robot
-
-
-@dataclass(frozen=True)
-class TextDocument:
-    """A text file, complete before it is written."""
-
-    text: str
-    warnings: tuple[str, ...] = ()
-    facts: dict[str, Any] = field(default_factory=dict[str, Any])
-
-    def save(self, file: Path) -> None:
-        """Write it."""
-        file.write_text(self.text, encoding="utf-8", newline="\n")
 
 
 # MJCF, URDF and transmission table of one robot are often written together.
@@ -61,7 +47,7 @@ def _head(model: JointModel, *sentences: str) -> str:
     )
 
 
-def mjcf_document(subject: Subject, options: SimulatorOptions) -> TextDocument:
+def mjcf_document(subject: Subject, options: SimulatorOptions) -> FileDocument:
     """Make an MJCF file and measure its error by running it, where MuJoCo is installed."""
     model = _model_of(subject, options)
     about = (
@@ -80,7 +66,7 @@ def mjcf_document(subject: Subject, options: SimulatorOptions) -> TextDocument:
             "The error of the MJCF file against the chain was not measured, because MuJoCo 4.0 or "
             f"newer is not installed: {install_command('robotics')}."
         )
-        return TextDocument(mjcf(model, _head(model, *about, sentence)), (sentence,), facts)
+        return FileDocument(mjcf(model, _head(model, *about, sentence)), (sentence,), facts)
     errors = measure_errors(model, text)
     numbers = {
         f"tendon_{error.tendon}_{name}_error": value
@@ -89,7 +75,7 @@ def mjcf_document(subject: Subject, options: SimulatorOptions) -> TextDocument:
         if name not in ("tendon", "largest_tension") and value == value
     }
     head = _head(model, *about, *(_sentence(error) for error in errors))
-    return TextDocument(
+    return FileDocument(
         mjcf(model, head, numbers),
         _large(errors),
         {**facts, "errors": [error.as_dict() for error in errors]},
@@ -118,7 +104,7 @@ def _large(errors: list[SimulatorError]) -> tuple[str, ...]:
     )
 
 
-def urdf_document(subject: Subject, options: SimulatorOptions) -> TextDocument:
+def urdf_document(subject: Subject, options: SimulatorOptions) -> FileDocument:
     """Make a URDF file."""
     model = _model_of(subject, options)
     missing = (
@@ -127,10 +113,10 @@ def urdf_document(subject: Subject, options: SimulatorOptions) -> TextDocument:
         "writes."
     )
     text = urdf(model, _head(model, missing))
-    return TextDocument(text, (missing,), {"largest_tension_N": model.top})
+    return FileDocument(text, (missing,), {"largest_tension_N": model.top})
 
 
-def transmission_document(subject: Subject, options: SimulatorOptions) -> TextDocument:
+def transmission_document(subject: Subject, options: SimulatorOptions) -> FileDocument:
     """Make the table of levers and moments."""
     model = _model_of(subject, options)
-    return TextDocument(transmission_table(model), (), {"largest_tension_N": model.top})
+    return FileDocument(transmission_table(model), (), {"largest_tension_N": model.top})
