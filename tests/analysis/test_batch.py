@@ -125,7 +125,7 @@ def test_paths_of_unlike_lengths(wrist):
     "load",
     [
         nf.Load(tension=2.4),
-        nf.Load(tension=1.5, tip_force=(0.02, 0.0, -0.01)),
+        pytest.param(nf.Load(tension=1.5, tip_force=(0.02, 0.0, -0.01)), marks=pytest.mark.nightly),
         nf.Load(stroke=0.7),
     ],
 )

@@ -69,7 +69,7 @@ def differences(of, value: float) -> float:
     return (4.0 * narrow - wide) / 3.0
 
 
-LONG = ("links, loaded",)
+LONG = ("strips", "links, loaded")
 
 
 @pytest.mark.parametrize(

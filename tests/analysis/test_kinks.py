@@ -90,6 +90,7 @@ def test_robots_of_one_form_share_a_program():
     assert np.asarray(angle) == pytest.approx(expected, rel=1e-11)
 
 
+@pytest.mark.nightly
 def test_both_sides_by_the_force_at_one_step():
     """The force of the last step alone: the contacts let go on one side only."""
     loads = [nf.Load(tension=value, tip_force=(0.02, 0.0, 0.0)) for value in TENSION[:3]]

@@ -62,6 +62,7 @@ def test_jacobian_against_differences(wrist, found, margin):
         margin.within("jacobian", (own - expected) / np.abs(own).max(), 1e-5)
 
 
+@pytest.mark.nightly
 def test_without_friction_compliance_is_symmetric(wrist, margin):
     # Forces that keep their direction have a potential; moments at a bent tip have none.
     smooth = wrist.with_value("friction.kind", "frictionless")

@@ -97,6 +97,7 @@ def test_every_draw_has_its_own_history(wrist: nf.Robot, margin):
     assert one.median[7] > one.median[2]  # unloading at the same tension
 
 
+@pytest.mark.nightly
 def test_notches_of_their_own_average_out(linear: nf.Robot):
     load = nf.Load(tension=0.5)
     common = nf.uncertain(linear, load, {"notch.depth": 0.01}, draws=400)
@@ -210,6 +211,7 @@ def test_what_makes_no_bands(wrist: nf.Robot, options: dict, code: str):
     assert error.value.code.name == code
 
 
+@pytest.mark.nightly
 def test_closing_moves_with_the_tolerances(wrist: nf.Robot, margin):
     """Against the closing of robots that are solved one by one."""
     table = nf.closing(wrist)

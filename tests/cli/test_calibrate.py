@@ -92,6 +92,7 @@ def test_a_loop_without_any_hint_gives_the_constants_that_made_it(calibrate, tmp
     assert found.values[NAMES[0]] == pytest.approx(document["constants"][0]["value"], rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_robot_left_out_before_and_after_a_photograph(calibrate, tmp_path):
     # Linear, so that 12 % of force are 12 % of angle.
     nf.save_robot(nf.load_robot(ROBOT).with_value("material.kind", "linear"), tmp_path / "w.toml")

@@ -29,6 +29,7 @@ def test_path_compared_with_itself_has_no_error(call, loop):
     assert found["converged"] is True
 
 
+@pytest.mark.nightly
 def test_angles_of_a_table_are_compared_as_edge_angles(call, tmp_path):
     call("simulate", "pacheco2021-b-true", "--tension", "0:1.2:3", "--csv", "b.csv")
     rows = list(csv.DictReader((tmp_path / "b.csv").read_text().splitlines()))

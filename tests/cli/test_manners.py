@@ -12,6 +12,7 @@ import pytest
 import notchflex as nf
 
 PULL = ("simulate", "pacheco2021-a", "--tension", "0:3:4")
+LONGER = [pytest.param(name, marks=pytest.mark.nightly) for name in ("gao2017", "two-axis-wrist")]
 BESIDE = (*PULL, "--beside", "slick: friction.coefficient=0", "--beside", "Y: york2015")
 
 
@@ -68,7 +69,7 @@ def test_quiet_keeps_warnings_errors_and_documents(call):
     assert call("robots")[1]  # the next call is not quiet
 
 
-@pytest.mark.parametrize("robot", ["pacheco2021-a", "gao2017", "two-axis-wrist", "liu2022"])
+@pytest.mark.parametrize("robot", ["pacheco2021-a", "liu2022", *LONGER])
 def test_tables_fit_80_columns(call, robot):
     out = call("show", robot)[1]
     assert max(map(len, out.splitlines())) <= 80
@@ -83,7 +84,9 @@ def test_comparison_of_many_notches_fits_80_columns(call, tmp_path):
         assert f"n{notch} " in out.replace("\n", " ")
 
 
-@pytest.mark.parametrize(("columns", "shown"), [("80", False), ("130", True)])
+@pytest.mark.parametrize(
+    ("columns", "shown"), [pytest.param("80", False, marks=pytest.mark.nightly), ("130", True)]
+)
 def test_a_table_is_as_wide_as_the_terminal(columns, shown):
     loads = ("--tension", "0:2:3", "--gravity", "0,0.5,-9.81")
     out = on_a_terminal("simulate", "pacheco2021-a", *loads, COLUMNS=columns)

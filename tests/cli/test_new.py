@@ -103,6 +103,7 @@ def test_an_estimate_names_the_source_of_its_kind(monkeypatch, tmp_path, materia
     assert source in line
 
 
+@pytest.mark.nightly
 def test_a_new_wrist_is_warned_of_its_strain(monkeypatch, tmp_path, capsys):
     pipe(monkeypatch)
     assert run(command()) == 0

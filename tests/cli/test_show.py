@@ -49,6 +49,7 @@ def test_drawing_that_cannot_be_written(tmp_path, capsys):
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.nightly
 def test_a_force_loss_is_shown_with_its_unit(capsys):
     assert run(["show", "pacheco2021-a", "--set", "friction.constant_loss=0.05"]) == 0
     assert "constant loss 0.05 N" in " ".join(capsys.readouterr().out.split())

@@ -188,6 +188,7 @@ def test_several_tendons(call, tmp_path):
     assert call("simulate", "two.toml", "--tension", "2")[0] == 2
 
 
+@pytest.mark.nightly
 def test_loads_and_refinement_reach_the_solver_and_the_head_of_the_table(call, tmp_path):
     code, out, _ = call(
         *LOOP[:2], "--tension", "1", "--tip-force", "-0.05,0,0", "--refinement", "1",

@@ -72,6 +72,7 @@ def test_importing_the_package_does_not_import_jax():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.nightly
 def test_a_second_process_runs_what_the_first_has_compiled(tmp_path):
     # A real process each: a program that is only loaded must find all that it calls.
     asked = ("simulate", "pacheco2021-a", "--tension", "0:2:5", "--json", "-")

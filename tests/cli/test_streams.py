@@ -65,7 +65,8 @@ def test_closed_streams(shell):
     assert b"No answer to: Outer diameter" in done.stderr
 
 
-@pytest.mark.parametrize("encoding", ["ascii", pytest.param("cp1252", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 def test_other_encodings_get_the_nearest_characters(shell, tmp_path, encoding):
     made = shell(
         "notchflex new ü --title 'Größe Ω' --outer-diameter 1.62 --inner-diameter 1.40 "

@@ -117,6 +117,7 @@ assert (by_tension == slopes["tip_position"]["tension"][:, 2]).all() and by_tens
 """
 
 
+@pytest.mark.nightly
 def test_a_new_quantity_is_one_registration(tmp_path):
     """In a copy of the package, with nothing but the formula added and the script run."""
     shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))

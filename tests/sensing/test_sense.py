@@ -178,6 +178,7 @@ def test_known_loads_are_taken_into_account(wrist):
     assert ignored.force[0, 0] > 0.01
 
 
+@pytest.mark.nightly
 def test_a_stroke_drives_where_no_tension_was_measured(wrist):
     path = read(wrist, [0.3, 0.6], [0.01, 0.02])
     sensed = sense(wrist, None, path.stroke, tip=path.tip_position, noise=EXACT, largest=0.1)

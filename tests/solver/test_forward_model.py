@@ -50,6 +50,7 @@ def test_adjoint_is_the_transpose_of_the_tangents(name, load, outputs, margin):
     margin.within("adjoint", found / expected - 1.0, 1e-11)
 
 
+@pytest.mark.nightly
 def test_gradient_in_the_world_of_a_turned_base(margin):
     load = replace(nf.pull(0.5, 1.0, steps=2), base_rotation=np.array([0.3, 0.2, -0.1]))
     path = nf.simulate(nf.load_robot("pacheco2021-a"), load)

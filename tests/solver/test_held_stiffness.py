@@ -81,6 +81,7 @@ def test_as_by_dense_differentiation(name, margin):
     assert path.stable.tolist() == ((smallest > 0.0) & (sign > 0.0)).tolist()
 
 
+@pytest.mark.nightly
 def test_a_slender_robot_under_compression_is_unstable():
     stable = CASES["U-links, buckled"]().stable
     assert stable[0]

@@ -87,7 +87,11 @@ def test_a_batch_is_its_rows(path: nf.EquilibriumPath) -> None:
     assert np.abs(rows[0] - rows[1]).max() > 0.01
 
 
-@pytest.mark.parametrize("friction", [FREE, nf.Capstan(0.1)], ids=["frictionless", "capstan"])
+@pytest.mark.parametrize(
+    "friction",
+    [FREE, pytest.param(nf.Capstan(0.1), marks=pytest.mark.nightly)],
+    ids=["frictionless", "capstan"],
+)
 def test_derivatives_pass_through_the_memory(friction: nf.Capstan | nf.Frictionless) -> None:
     robot = dataclasses.replace(WRIST, friction=friction)
     values = {

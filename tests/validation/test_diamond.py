@@ -106,6 +106,7 @@ def test_the_loop_is_kept_whole(loop: tuple[np.ndarray, np.ndarray, int]) -> Non
     assert np.trapezoid(force, extension) == pytest.approx(11.48, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_the_rest_of_the_loop_follows_from_its_first_branches(loop, margin) -> None:
     extension, force, turn = loop
     first = extension[: turn + 1]

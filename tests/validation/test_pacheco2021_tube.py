@@ -39,6 +39,7 @@ def fit(constants, starts):
     return calibrate(*wrists(), constants, objective=SumOfRobotErrors(), starts=starts)
 
 
+@pytest.mark.nightly
 def test_the_ready_robots_hold_the_fitted_set():
     found = fit((*TUBE, FACTORS), 1)
     # 7.99888 from several starts; from the factors 1 the search stops at a kink beside the minimum.

@@ -75,6 +75,7 @@ def test_sideways_force(margin):
     margin.within("sideways bend", bend / solid[1] - 1.0, 0.07)
 
 
+@pytest.mark.nightly
 def test_rigid_ends_under_a_sideways_force():
     """The comparison can fail: rigid rings twist a sixth less, and bend half as much."""
     twist, bend, *solid = sideways(rigid(wrist()))

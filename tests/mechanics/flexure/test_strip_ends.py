@@ -86,6 +86,7 @@ def test_the_cells_repeat_the_full_meshes(margin):
         margin.within(f"link, {name}", 100.0 * (LINKS[0][key] / (22000.0 * value) - 1.0), 0.6, "%")
 
 
+@pytest.mark.nightly
 def test_liu_and_gao_at_small_loads(margin):
     found = compliance(liu(), nf.Tube(10.0, 6.0), 1000.406, 0.4)
     for name, value in LIU.items():

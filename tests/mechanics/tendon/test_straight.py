@@ -62,6 +62,7 @@ def test_friction_turns_with_the_tendon() -> None:
     assert state.span_tension[0, 1] == pytest.approx(np.exp(-0.3 * half), rel=1e-10)
 
 
+@pytest.mark.nightly
 def test_work_is_stored_without_friction_in_space() -> None:
     robot = wrist(3, nf.Frictionless(), 0.0, 100.0, 250.0)
     rising = np.linspace(0.0, 1.0, 201)
