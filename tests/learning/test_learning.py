@@ -76,9 +76,9 @@ def test_many_robots_in_one_call_are_as_many_environments(kind, margin):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("robot", ["two-axis-wrist", "liu2022", "gao2017"])
-def test_many_robots_of_other_kinds(robot, margin):
-    worst, ended = against_singles("Follow", 9, 25, robot=robot, steps=12)
+@pytest.mark.parametrize(("robot", "tension"), [("two-axis-wrist", None), ("liu2022", 6.0)])
+def test_many_robots_of_other_kinds(robot, tension, margin):
+    worst, ended = against_singles("Follow", 9, 25, robot=robot, tension=tension, steps=12)
     assert ended == 2 * 9
     margin.within(robot, worst, 1e-12)
 
@@ -106,6 +106,7 @@ def path_to(robot, tensions):
     return nf.simulate(robot, [nf.Load(tension=float(one)) for one in tensions]).state
 
 
+@pytest.mark.nightly
 def test_targets_are_states_of_the_robot_with_its_history():
     """A second robot pulled as the first was has met all targets at the end."""
     env = made("Follow", steps=30)
@@ -151,10 +152,10 @@ def test_an_episode_ends_when_it_is_told_to():
     assert reward > 0.9
 
 
-@pytest.mark.parametrize("rows", [1, 3])
-def test_tensions_without_equilibrium_are_refused_and_told(rows):
+def test_tensions_without_equilibrium_are_refused_and_told():
     """The robot stays where it is, and the episode goes on."""
     settings = {"robot": "two-axis-wrist", "tension": 1000.0, "rate": 500.0, "steps": 5}
+    rows = 3
     env = FollowVectorEnv(rows, **settings)
     env.reset(seed=0)
     pull = np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1))
@@ -170,13 +171,9 @@ def test_tensions_without_equilibrium_are_refused_and_told(rows):
     assert (reward < -1.0).all()
     assert not (terminated | truncated).any()
     env.step(-0.5 * pull)  # it goes on
-    if rows == 1:
-        single = FollowEnv(**settings)
-        single.reset(seed=0)
-        codes = [single.step(part * pull[0])[4]["code"] for part in (0.001, 1.0, 1.0)]
-        assert codes[-1] == "BENT_TOO_FAR"
 
 
+@pytest.mark.nightly
 def test_the_scripted_policy_knows_the_history():
     errors = {}
     for friction in (True, False):
@@ -215,7 +212,7 @@ def test_pictures_follow_the_robot():
     for _ in range(8):
         env.step(np.array([1.0]))
     assert (np.abs(env.render().astype(int) - before).max(axis=2) > 60).mean() > 0.01
-    assert made("Reach").render() is None
+    assert ReachEnv().render() is None
 
 
 @pytest.mark.parametrize(
