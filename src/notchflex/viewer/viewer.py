@@ -8,15 +8,19 @@ from collections.abc import Callable
 from pathlib import Path as FilePath
 from threading import Event
 
+import numpy as np
+
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.viewer import parts
 from notchflex.viewer.controls import STRETCH, Controls, reach_of
+from notchflex.viewer.overlays.overlays import Overlays
 from notchflex.viewer.page.page import Page
 from notchflex.viewer.page.readout import beyond
 from notchflex.viewer.scene.scene import Scene, Shown
 from notchflex.viewer.server import HOST, PORT, bracketed, check_host, check_installed, serve
 from notchflex.viewer.session import Session
+from notchflex.viewer.steering import steer
 from notchflex.viewer.tasks import TargetQueue, Tasks, WatchedFile
 
 # A browser does not show more steps a second than this.
@@ -61,7 +65,7 @@ class Viewer:
         self._file = WatchedFile(file) if file is not None and read is not None else None
         self._stopped, self._looked, self._updated = Event(), 0.0, 0.0
         self.server = serve(host, port)
-        self.scene = Scene(self.server, robot, self.reach, self.shown)
+        self._make_scene(robot)
         self.page = Page(self)
         self._draw(update=True)
 
@@ -118,18 +122,20 @@ class Viewer:
         if rest > 0.0:
             time.sleep(rest)
 
-    def advance(self, controls: Controls) -> None:
-        """Solve a setting and draw the result."""
+    def advance(self, controls: Controls, *, goes_on: bool = False) -> None:
+        """Solve a setting and draw the result; `goes_on`: another one follows at once."""
         if self.session.is_new(controls):
             self.page.busy("preparing: a new kind of load is compiled once, which takes seconds")
         if reason := self.session.go(controls):
             self.targets.clear(self.session.controls)
             self.message = f"Not reached: {reason}"
-        self._draw(update=not len(self.targets) or time.monotonic() - self._updated > _TEXT)
+        moving = goes_on or len(self.targets) > 0
+        self._draw(update=not moving or time.monotonic() - self._updated > _TEXT, moving=moving)
 
-    def _draw(self, update: bool) -> None:
+    def _draw(self, update: bool, moving: bool = False) -> None:
         """Move the robot; with `update` also update numbers and charts."""
         self.scene.update(self.session.solved, self.session.controls)
+        self.overlays.update(self.session, self.reach, self.shown, still=not moving)
         if update:
             self._updated = time.monotonic()
             self.page.update()
@@ -151,6 +157,19 @@ class Viewer:
             self.note = beyond(label, value, (low, high), number < len(self.session.controls.by))
         self.targets.set_number(number, kept)
         self.page.follow()
+
+    def steer(self, point: np.ndarray, last: bool = True) -> None:
+        """Bring the tip to a point (mm, in the world), or as near as the sliders allow.
+
+        `last`: no other point follows at once.
+        """
+        self._playing = False
+        self._quiet()
+        found = steer(self.session, self.reach, point)
+        if not found.reached:
+            self.note = f"Out of reach: the tip stays {found.error:.2g} mm away."
+        self.targets.clear(found.controls)
+        self.advance(found.controls, goes_on=not last)
 
     def drive_by(self, tendon: int, by: str) -> None:
         """Prescribe the tension or the stroke of a tendon (from 0) from now on; nothing moves."""
@@ -237,8 +256,17 @@ class Viewer:
     def _reshape(self, robot: Robot) -> None:
         self.reach = self._first_reach = reach_of(robot)
         self.scene.remove()
-        self.scene = Scene(self.server, robot, self.reach, self.shown)
+        self.overlays.remove()
+        self._make_scene(robot)
         self.page.rebuild()
+
+    def _make_scene(self, robot: Robot) -> None:
+        self.scene = Scene(self.server, robot, self.reach, self.shown)
+        length, arrow = self.scene.length, self.scene.arrow_scale
+        self.overlays = Overlays(
+            self.server, self.session, length, arrow, self.ask,
+            lambda point, last: self.tasks.add(lambda: self.steer(point, last), "aim"),
+        )  # fmt: skip
 
     def load(self, robot: Robot, file: WatchedFile | None = None) -> None:
         """Begin again with another robot; the former file is no longer watched."""
