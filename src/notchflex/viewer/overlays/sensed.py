@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 from notchflex.loads import Load
 from notchflex.plotting.style import GREEN
 from notchflex.robot import Robot
-from notchflex.sensing import SensedForce, sense
+from notchflex.sensing import SensedForce, SensorNoise, sense
 from notchflex.viewer.controls import POINTING
 from notchflex.viewer.overlays.background import Background
 from notchflex.viewer.scene.marks import linear, rgb
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import viser
 
 MOST_READINGS = 12
+# Of good sensors: most of the interval is what friction leaves open.
+NOISE = SensorNoise(tension=0.001, stroke=0.001)
 _NONE = 1e-9
 NAME = "/sensed"
 
@@ -62,7 +64,7 @@ class SensedArrow:
         self._interval = scene.add_line_segments(
             f"{NAME}/interval", nothing, rgb(GREEN), thickness=0.1 * radius, visible=False
         )
-        self._label = scene.add_label(f"{NAME}/label", "", visible=False, anchor="top-center")
+        self._label = scene.add_label(f"{NAME}/label", "", visible=False, anchor="top-left")
 
     def update(self, session: Session, shown: bool, still: bool) -> None:
         """Show or hide the arrow; sense again where the robot stands still and has moved.
@@ -89,6 +91,11 @@ class SensedArrow:
                     lambda: sensed(robot, session.pointing, *readings),
                     lambda found: self._show(wanted, tip, found),
                 )
+
+    @property
+    def label(self) -> str:
+        """The text that is shown; "" where there is none."""
+        return str(self._label.text) if self._label.visible else ""
 
     def remove(self) -> None:
         """Remove all of it."""
@@ -150,7 +157,8 @@ def sensed(
     Raises:
         InputError: Readings that tell nothing of a force.
     """
-    return sense(robot, tension, stroke, known=Load(base_rotation=POINTING[pointing]))
+    known = Load(base_rotation=POINTING[pointing])
+    return sense(robot, tension, stroke, noise=NOISE, known=known)
 
 
 def text(found: SensedForce) -> str:
