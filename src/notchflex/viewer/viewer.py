@@ -262,9 +262,8 @@ class Viewer:
 
     def _make_scene(self, robot: Robot) -> None:
         self.scene = Scene(self.server, robot, self.reach, self.shown)
-        length, arrow = self.scene.length, self.scene.arrow_scale
         self.overlays = Overlays(
-            self.server, self.session, length, arrow, self.ask,
+            self.server, self.session, self.scene.length, self.ask,
             lambda point, last: self.tasks.add(lambda: self.steer(point, last), "aim"),
         )  # fmt: skip
 

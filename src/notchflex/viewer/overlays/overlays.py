@@ -17,7 +17,8 @@ from notchflex.viewer.session import Session
 if TYPE_CHECKING:
     import viser
 
-_HANDLE = 0.25  # length of its arrows in lengths of the robot
+# Lengths of the arrows of the handle and of the sensed force in lengths of the robot.
+_HANDLE, _ARROW = 0.25, 0.3
 
 
 class Overlays:
@@ -27,7 +28,6 @@ class Overlays:
         server: The server.
         session: The robot.
         length: Its length, mm.
-        arrow: Length of the arrow of a force, mm per N.
         ask: Adds a task of the solver thread.
         aim: Called in the event loop with each place of the dragged handle; see `TipHandle`.
     """
@@ -37,14 +37,13 @@ class Overlays:
         server: viser.ViserServer,
         session: Session,
         length: float,
-        arrow: float,
         ask: Callable[[Callable[[], None]], None],
         aim: Callable[[np.ndarray, bool], None],
     ) -> None:
         outer = session.robot.tube.outer_radius
         self.handle = TipHandle(server, _HANDLE * length, aim)
         self.cloud = ReachableCloud(server, length, ask)
-        self.sensed = SensedArrow(server, outer, arrow, ask)
+        self.sensed = SensedArrow(server, outer, _ARROW * length, ask)
 
     def update(self, session: Session, ends: Reach, shown: Shown, still: bool) -> None:
         """Move what is shown to the present state.

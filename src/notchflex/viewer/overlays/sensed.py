@@ -24,6 +24,8 @@ MOST_READINGS = 12
 # Of good sensors: most of the interval is what friction leaves open.
 NOISE = SensorNoise(tension=0.001, stroke=0.001)
 _NONE = 1e-9
+# Arrow, interval and label below the tip, in outer radii.
+_BELOW = (1.8, 2.4, 2.7)
 NAME = "/sensed"
 
 
@@ -36,7 +38,7 @@ class SensedArrow:
     Args:
         server: The server.
         radius: Outer radius of the tube, mm.
-        scale: Length of arrows, mm per N.
+        longest: Length of what is drawn, mm; the label holds the size of the force.
         ask: Adds a task of the solver thread.
     """
 
@@ -44,10 +46,10 @@ class SensedArrow:
         self,
         server: viser.ViserServer,
         radius: float,
-        scale: float,
+        longest: float,
         ask: Callable[[Callable[[], None]], None],
     ) -> None:
-        self._scale = scale
+        self._radius, self._longest = radius, longest
         self._background: Background[SensedForce] = Background(ask)
         self._wanted: Any = None
         self.found: SensedForce | None = None
@@ -56,13 +58,13 @@ class SensedArrow:
             f"{NAME}/force",
             nothing,
             linear([GREEN]),
-            shaft_radius=0.12 * radius,
+            shaft_radius=0.15 * radius,
             head_radius=0.32 * radius,
             head_length=0.8 * radius,
             visible=False,
         )
         self._interval = scene.add_line_segments(
-            f"{NAME}/interval", nothing, rgb(GREEN), thickness=0.1 * radius, visible=False
+            f"{NAME}/interval", nothing, rgb(GREEN), thickness=0.2 * radius, visible=False
         )
         self._label = scene.add_label(f"{NAME}/label", "", visible=False, anchor="top-left")
 
@@ -114,13 +116,17 @@ class SensedArrow:
             return  # the robot has moved on
         self.found = found
         self._label.text, self._label.visible = text(found), True
-        self._label.position = tip
+        # Below the tip, beside the arrows of the loads and of the handle.
+        below = np.array([0.0, 0.0, -self._radius])
+        start, bar, self._label.position = (tip + far * below for far in _BELOW)
         if not found.converged[-1]:
             return
-        end = tip + self._scale * found.vector[-1]
-        self._arrow.points = np.stack([tip, end])[None].astype(np.float32)
+        ends = np.abs([found.low[-1], found.high[-1], found.force[-1]])
+        scale = self._longest / max(float(ends.max()), _NONE)
+        end = start + scale * found.vector[-1]
+        self._arrow.points = np.stack([start, end])[None].astype(np.float32)
         self._arrow.visible = bool(np.abs(found.vector[-1]).max() > _NONE)
-        self._interval.points = intervals(found, tip, self._scale).astype(np.float32)
+        self._interval.points = intervals(found, bar, scale).astype(np.float32)
         self._interval.visible = True
 
 
@@ -177,7 +183,7 @@ def text(found: SensedForce) -> str:
 def intervals(
     found: SensedForce, tip: Float[np.ndarray, " 3"], scale: float
 ) -> Float[np.ndarray, "d 2 3"]:
-    """Return the interval of each component as a segment through the end of the arrow, mm."""
+    """Return the interval of each component as a segment that an arrow from `tip` ends on, mm."""
     force = found.force[-1]
     ends = np.stack([found.low[-1], found.high[-1]], axis=1)
     others = found.vector[-1] - force[:, None] * found.directions

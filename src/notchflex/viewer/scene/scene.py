@@ -175,14 +175,9 @@ class Scene:
             label.text, label.position, label.visible = one.label, end, True
 
     def _arrow(self, one: AppliedLoad) -> NDArray[np.float64]:
-        size = max(self.arrow_scale * one.size, _SHORTEST * self.length)
-        return size * one.vector / one.size
-
-    @property
-    def arrow_scale(self) -> float:
-        """Length of arrows, mm per N; short ones are longer."""
         most = max(self.reach.force, GRAVITY * self.reach.mass)
-        return _ARROW * self.length / most
+        size = max(one.size / most, _SHORTEST / _ARROW) * _ARROW * self.length
+        return size * one.vector / one.size
 
     def eye(self, pointing: str, side: bool = False, aspect: float = 1.0) -> CameraPose:
         """Return the first camera, with room for the robot to bend; see `first_eye`."""
