@@ -110,7 +110,7 @@ def test_the_cloud_and_the_sensed_force_come_and_go(visit):
     switch(visit, "reachable cloud")
     switch(visit, "sensed force")
     wait(lambda: not len(viewer.overlays.cloud.points))
-    assert viewer.overlays.sensed.label == ""
+    wait(lambda: viewer.overlays.sensed.label == "")
     visit.no_notice()
     assert visit.errors == []
 

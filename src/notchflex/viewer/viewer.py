@@ -27,6 +27,8 @@ from notchflex.viewer.tasks import TargetQueue, Tasks, WatchedFile
 MOST_STEPS = 60.0
 # Intervals in which charts and numbers are updated, and in which the file is checked [s].
 _TEXT, _LOOK = 0.1, 0.5
+# Distance of the tip from its target that is worth a note, in outer radii.
+_SEEN = 0.05
 
 
 class Viewer:
@@ -166,7 +168,7 @@ class Viewer:
         self._playing = False
         self._quiet()
         found = steer(self.session, self.reach, point)
-        if not found.reached:
+        if found.error > _SEEN * self.session.robot.tube.outer_radius:
             self.note = f"Out of reach: the tip stays {found.error:.2g} mm away."
         self.targets.clear(found.controls)
         self.advance(found.controls, goes_on=not last)
@@ -245,6 +247,10 @@ class Viewer:
     def show(self, name: str, value: bool) -> None:
         """Show or hide something in the scene; see `Shown`."""
         setattr(self.shown, name, value)
+        if name == "handle" and value:  # what is compiled now does not hold up the first drag
+            self.page.busy("preparing to follow: compiled once, which takes seconds")
+            steer(self.session, self.reach, self.session.state.tip_position)
+            self.page.follow()
         self._draw(update=False)
 
     def _repeated(self, reason: str) -> None:
