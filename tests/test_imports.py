@@ -31,6 +31,7 @@ ORDER = (
     "photographs",
     "plotting",
     "export",
+    "learning",
     "viewer",
     "bench",
     "cli",

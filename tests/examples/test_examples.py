@@ -285,3 +285,17 @@ def test_follow_with_hysteresis(margin):
         at = np.argsort(total[branch], kind="stable")
         expected = np.interp(angle[target], total[branch][at], tension[branch][at])
         margin.within("tension", found.tension[target, 0] - expected, 1e-4, "N")
+
+
+def test_learning(margin):
+    pytest.importorskip("gymnasium", reason="needs the extra learn")
+    names, printed = ran(17)
+    assert np.median(names["missed"]) < 1e-4  # of the policy that knows the history
+    assert float(re.search(r"misses by ([\d.]+) mm", printed)[1]) > 0.1
+    # The wrists after their first step, by the equations of the paper.
+    settings = names["envs"].unwrapped.settings
+    seen = names["observations"]
+    angle, _ = A.pull(settings.change)
+    margin.within("tension", seen[:, 0] * settings.largest - settings.change, 1e-12, "N")
+    tip = nf.tip_from_angles(settings.model, np.array(angle))[0]
+    margin.within("tip", seen[:, 1:4] * settings.length - tip, 1e-6, "mm")

@@ -8,21 +8,27 @@ from collections.abc import Callable
 from pathlib import Path as FilePath
 from threading import Event
 
+import numpy as np
+
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.viewer import parts
 from notchflex.viewer.controls import STRETCH, Controls, reach_of
+from notchflex.viewer.overlays.overlays import Overlays
 from notchflex.viewer.page.page import Page
 from notchflex.viewer.page.readout import beyond
 from notchflex.viewer.scene.scene import Scene, Shown
 from notchflex.viewer.server import HOST, PORT, bracketed, check_host, check_installed, serve
 from notchflex.viewer.session import Session
+from notchflex.viewer.steering import steer
 from notchflex.viewer.tasks import TargetQueue, Tasks, WatchedFile
 
 # A browser does not show more steps a second than this.
 MOST_STEPS = 60.0
 # Intervals in which charts and numbers are updated, and in which the file is checked [s].
 _TEXT, _LOOK = 0.1, 0.5
+# Distance of the tip from its target that is worth a note, in outer radii.
+_SEEN = 0.05
 
 
 class Viewer:
@@ -61,7 +67,7 @@ class Viewer:
         self._file = WatchedFile(file) if file is not None and read is not None else None
         self._stopped, self._looked, self._updated = Event(), 0.0, 0.0
         self.server = serve(host, port)
-        self.scene = Scene(self.server, robot, self.reach, self.shown)
+        self._make_scene(robot)
         self.page = Page(self)
         self._draw(update=True)
 
@@ -118,18 +124,20 @@ class Viewer:
         if rest > 0.0:
             time.sleep(rest)
 
-    def advance(self, controls: Controls) -> None:
-        """Solve a setting and draw the result."""
+    def advance(self, controls: Controls, *, goes_on: bool = False) -> None:
+        """Solve a setting and draw the result; `goes_on`: another one follows at once."""
         if self.session.is_new(controls):
             self.page.busy("preparing: a new kind of load is compiled once, which takes seconds")
         if reason := self.session.go(controls):
             self.targets.clear(self.session.controls)
             self.message = f"Not reached: {reason}"
-        self._draw(update=not len(self.targets) or time.monotonic() - self._updated > _TEXT)
+        moving = goes_on or len(self.targets) > 0
+        self._draw(update=not moving or time.monotonic() - self._updated > _TEXT, moving=moving)
 
-    def _draw(self, update: bool) -> None:
+    def _draw(self, update: bool, moving: bool = False) -> None:
         """Move the robot; with `update` also update numbers and charts."""
         self.scene.update(self.session.solved, self.session.controls)
+        self.overlays.update(self.session, self.reach, self.shown, still=not moving)
         if update:
             self._updated = time.monotonic()
             self.page.update()
@@ -151,6 +159,19 @@ class Viewer:
             self.note = beyond(label, value, (low, high), number < len(self.session.controls.by))
         self.targets.set_number(number, kept)
         self.page.follow()
+
+    def steer(self, point: np.ndarray, last: bool = True) -> None:
+        """Bring the tip to a point (mm, in the world), or as near as the sliders allow.
+
+        `last`: no other point follows at once.
+        """
+        self._playing = False
+        self._quiet()
+        found = steer(self.session, self.reach, point)
+        if found.error > _SEEN * self.session.robot.tube.outer_radius:
+            self.note = f"Out of reach: the tip stays {found.error:.2g} mm away."
+        self.targets.clear(found.controls)
+        self.advance(found.controls, goes_on=not last)
 
     def drive_by(self, tendon: int, by: str) -> None:
         """Prescribe the tension or the stroke of a tendon (from 0) from now on; nothing moves."""
@@ -226,6 +247,10 @@ class Viewer:
     def show(self, name: str, value: bool) -> None:
         """Show or hide something in the scene; see `Shown`."""
         setattr(self.shown, name, value)
+        if name == "handle" and value:  # what is compiled now does not hold up the first drag
+            self.page.busy("preparing to follow: compiled once, which takes seconds")
+            steer(self.session, self.reach, self.session.state.tip_position)
+            self.page.follow()
         self._draw(update=False)
 
     def _repeated(self, reason: str) -> None:
@@ -237,8 +262,16 @@ class Viewer:
     def _reshape(self, robot: Robot) -> None:
         self.reach = self._first_reach = reach_of(robot)
         self.scene.remove()
-        self.scene = Scene(self.server, robot, self.reach, self.shown)
+        self.overlays.remove()
+        self._make_scene(robot)
         self.page.rebuild()
+
+    def _make_scene(self, robot: Robot) -> None:
+        self.scene = Scene(self.server, robot, self.reach, self.shown)
+        self.overlays = Overlays(
+            self.server, self.session, self.scene.length, self.ask,
+            lambda point, last: self.tasks.add(lambda: self.steer(point, last), "aim"),
+        )  # fmt: skip
 
     def load(self, robot: Robot, file: WatchedFile | None = None) -> None:
         """Begin again with another robot; the former file is no longer watched."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +23,16 @@ _SHOWN = {
     "frames": "base and tip frames",
     "loads": "loads at the tip",
     "see_through": "transparent tube",
+}
+_OVERLAYS = {
+    "handle": "drag the tip",
+    "cloud": "reachable cloud",
+    "sensed": "sensed force",
+}
+_HINTS = {
+    "handle": "arrows at the tip: the tendons bring it where the mouse pulls them",
+    "cloud": "where the tip can be under the loads at the tip: blue loading, orange unloading",
+    "sensed": "the force that tensions and strokes tell, with its interval",
 }
 _CHOOSE = "choose ..."
 
@@ -190,11 +199,14 @@ class PartControls:
 
 
 def add_robot_folders(viewer: Viewer) -> list[Any]:
-    """Add and return the folders "Show", "Robot" and "Save"."""
+    """Add and return the folders "Follow and sense", "Show", "Robot" and "Save"."""
     gui = viewer.server.gui
+    with gui.add_folder("Follow and sense", order=2.5) as overlays:
+        for name, label in _OVERLAYS.items():
+            _add_switch(viewer, name, label, _HINTS[name])
     with gui.add_folder("Show", order=5.0, expand_by_default=False) as show:
-        for field in dataclasses.fields(viewer.shown):
-            _add_switch(viewer, field.name)
+        for name, label in _SHOWN.items():
+            _add_switch(viewer, name, label)
         side = "View from the side"
         add_button(gui, side, lambda _: viewer.ask(lambda: viewer.page.look(side=True)))
         add_button(gui, "View as at first", lambda _: viewer.ask(viewer.page.look))
@@ -225,7 +237,7 @@ def add_robot_folders(viewer: Viewer) -> list[Any]:
              saving.send_robot),
         ):  # fmt: skip
             add_button(gui, label, sender(sentence, send), hint)
-    return [show, robot, save]
+    return [overlays, show, robot, save]
 
 
 def _load(viewer: Viewer, name: str) -> None:
@@ -233,8 +245,8 @@ def _load(viewer: Viewer, name: str) -> None:
         viewer.ask(lambda: viewer.load(load_robot(name)))
 
 
-def _add_switch(viewer: Viewer, name: str) -> None:
-    box = viewer.server.gui.add_checkbox(_SHOWN[name], getattr(viewer.shown, name))
+def _add_switch(viewer: Viewer, name: str, label: str, hint: str | None = None) -> None:
+    box = viewer.server.gui.add_checkbox(label, getattr(viewer.shown, name), hint=hint)
 
     @box.on_update
     async def _(event: Any) -> None:

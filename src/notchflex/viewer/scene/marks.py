@@ -107,6 +107,9 @@ class Shown:
     frames: bool = True
     loads: bool = True
     see_through: bool = False
+    handle: bool = False
+    cloud: bool = False
+    sensed: bool = False
 
 
 class Marks:

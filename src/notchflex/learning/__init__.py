@@ -1,0 +1,22 @@
+"""Environments of gymnasium for learning to control a robot (`pip install 'notchflex[learn]'`).
+
+Importing this module registers `notchflex/Follow-v0` and `notchflex/Reach-v0`. `gymnasium.make`
+imports it by itself where the identifier begins with its name:
+`gymnasium.make("notchflex.learning:notchflex/Follow-v0")`.
+"""
+
+from notchflex._extras import need
+
+need("gymnasium", "learn", "notchflex.learning")
+
+from notchflex.learning.environments import FollowEnv, ReachEnv  # noqa: E402
+from notchflex.learning.registration import register_environments  # noqa: E402
+from notchflex.learning.scripted import ScriptedPolicy  # noqa: E402
+from notchflex.learning.vector_environments import (  # noqa: E402
+    FollowVectorEnv,
+    ReachVectorEnv,
+)
+
+register_environments()
+
+__all__ = ["FollowEnv", "FollowVectorEnv", "ReachEnv", "ReachVectorEnv", "ScriptedPolicy"]

@@ -1,0 +1,75 @@
+"""Drives that bring the tip of a session's robot to a point, from the state it is in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.control import Limits, TargetSearch, reach
+from notchflex.control.limits import Drive
+from notchflex.loads import Load
+from notchflex.viewer.controls import POINTING, STROKE, TENSION, Controls, Reach
+from notchflex.viewer.session import Session
+
+# Finer than a screen shows, and never longer than an update may take.
+_SEARCH = TargetSearch(tolerance=1e-3, solves=8)
+
+
+class Steered(NamedTuple):
+    """Settings that bring the tip to a point, or next to it.
+
+    Attributes:
+        controls: The settings.
+        error: Distance of the tip from the point, mm.
+        reached: Whether the tip is there.
+    """
+
+    controls: Controls
+    error: float
+    reached: bool
+
+
+def steer(session: Session, ends: Reach, point: Float[np.ndarray, " 3"]) -> Steered:
+    """Find settings of the tendons that bring the tip to a point, within their sliders.
+
+    Tendons that are pulled by tension are driven, all others held; where there are none, all
+    strokes.
+
+    Args:
+        session: The robot in its present state, with its friction history.
+        ends: Ends of the sliders.
+        point: Where the tip is to be, in the world, mm.
+    """
+    here, robot = session.controls, session.robot
+    drive: Drive = TENSION if TENSION in here.by else STROKE
+    driven = [by == drive for by in here.by]
+    held = [None if free else value for free, value in zip(driven, here.value, strict=True)]
+    none = [None] * len(held)
+    load = Load(
+        tension=none if drive == TENSION else held,
+        stroke=held if drive == TENSION else none,
+        tip_force=here.tip_force,
+        tip_mass=here.tip_mass,
+        base_rotation=POINTING[session.pointing],
+    )
+    low, high = zip(*(ends.ends(tendon, drive) for tendon in range(len(held))), strict=True)
+    limits = Limits(tension=(low, high)) if drive == TENSION else Limits(stroke=(low, high))
+    state = session.solved.state
+    found = reach(
+        robot,
+        point,
+        state=state,
+        load=load,
+        drive=drive,
+        limits=limits,
+        approach="direct",
+        search=_SEARCH,
+    )
+    path = found.following.load
+    values = (path.tension if drive == TENSION else path.stroke)[-1]
+    numbers = here.numbers
+    count = len(held)
+    numbers[:count] = np.where(driven, values, numbers[:count])
+    return Steered(here.with_numbers(numbers), found.error, found.reached)

@@ -1,0 +1,114 @@
+"""What steers the tip and what is sensed, without a browser."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.viewer.controls import STROKE, reach_of
+from notchflex.viewer.overlays.background import Background
+from notchflex.viewer.overlays.sensed import intervals, read, sensed, turning_points
+from notchflex.viewer.session import Session
+from notchflex.viewer.steering import steer
+
+
+@pytest.fixture(scope="module")
+def ends():
+    return reach_of(nf.load_robot("pacheco2021-a"))
+
+
+def test_the_tip_goes_to_places_of_both_branches(ends):
+    """Each place needs another tension on the way back."""
+    wrist = nf.load_robot("pacheco2021-a")
+    session = Session(wrist)
+    path = nf.simulate(wrist, nf.pull(0.3, 1.5, steps=4).release())
+    for number, tip in enumerate(path.tip_position):
+        found = steer(session, ends, tip)
+        assert found.reached
+        assert not session.go(found.controls)
+        assert session.controls.value[0] == pytest.approx(path.tension[number, 0], abs=2e-3)
+
+
+def test_a_place_out_of_reach_is_approached_within_the_slider(ends):
+    session = Session(nf.load_robot("pacheco2021-a"))
+    found = steer(session, ends, np.array([60.0, 0.0, 0.0]))
+    assert not found.reached
+    assert 0.0 <= found.controls.value[0] <= ends.tension[0]
+    assert not session.go(found.controls)
+    assert session.state.tip_position[0] > 3.0
+    assert found.error > 40.0
+
+
+@pytest.mark.nightly
+def test_strokes_are_driven_where_no_tension_is_given(ends):
+    wrist = nf.load_robot("pacheco2021-a")
+    session = Session(wrist)
+    session.go(session.controls.with_tendon(0, STROKE, 0.2))
+    tip = nf.solve(wrist, nf.Load(stroke=0.9)).tip_position
+    found = steer(session, ends, tip)
+    assert found.controls.by == (STROKE,)
+    assert found.controls.value[0] == pytest.approx(0.9, abs=1e-3)
+
+
+@pytest.mark.nightly
+def test_a_tube_that_lies_on_its_side_is_steered_in_the_world(ends):
+    session = Session(nf.load_robot("pacheco2021-a"), "sideways")
+    controls = session.controls.with_numbers([0.9, 0.0, 0.0, 0.0, 1.0])  # a weight
+    assert not session.go(controls)
+    tip = np.array(session.state.tip_position)
+    again = Session(session.robot, "sideways")
+    again.go(again.controls.with_numbers([0.0, 0.0, 0.0, 0.0, 1.0]))
+    assert steer(again, ends, tip).controls.value[0] == pytest.approx(0.9, abs=2e-3)
+
+
+def test_turns_of_tension_and_stroke_are_read():
+    rows = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [1.5, 2.0], [1.0, 1.0], [1.0, 1.2]])
+    assert turning_points(rows).tolist() == [2, 3, 4, 5]
+    session = Session(nf.load_robot("pacheco2021-a"))
+    assert len(read(session.history)[0]) == 0  # at rest there is nothing to sense by
+
+
+@pytest.mark.nightly
+def test_the_interval_holds_the_force_of_the_slider():
+    session = Session(nf.load_robot("pacheco2021-a"))
+    for numbers in ([0.6], [1.2], [0.8], [0.8, 0.015], [0.8, 0.03]):
+        full = [*numbers, 0.0, 0.0, 0.0, 0.0][:5]
+        assert not session.go(session.controls.with_numbers(full))
+    found = sensed(session.robot, "up", *read(session.history))
+    assert found.contact[-1]
+    low, high = intervals(found, np.zeros(3), 1.0)[0]
+    assert low[0] < 0.03 < high[0]
+    assert low[1:].tolist() == high[1:].tolist()
+
+
+def test_the_last_request_counts():
+    tasks, done, gate = [], [], threading.Event()
+    background = Background(tasks.append)
+
+    def work(number):
+        gate.wait(10.0)
+        return number
+
+    for number in range(4):
+        background.request(lambda number=number: work(number), done.append)
+        while number == 0 and background._waiting is not None:
+            time.sleep(0.001)
+    gate.set()
+    end = time.monotonic() + 10.0
+    while len(tasks) < 2 and time.monotonic() < end:
+        time.sleep(0.001)
+    for task in tasks:
+        task()
+    assert done == [0, 3]
+
+
+def test_what_goes_wrong_beside_is_raised_by_the_solver_thread():
+    tasks = []
+    Background(tasks.append).request(lambda: 1 / 0, lambda one: None)
+    end = time.monotonic() + 10.0
+    while not tasks and time.monotonic() < end:
+        time.sleep(0.001)
+    with pytest.raises(ZeroDivisionError):
+        tasks[0]()
