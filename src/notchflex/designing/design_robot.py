@@ -22,8 +22,9 @@ from notchflex.designing.result import (
 from notchflex.designing.search.problem import Evaluation, Problem, Progress
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.search import Searches, search
-from notchflex.designing.specification.parts import DesignConstraint, DesignSpec
+from notchflex.designing.specification.asked import DesignConstraint
 from notchflex.designing.specification.reading import read_design, robot_of, spec_from_table
+from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import InputError
 from notchflex.loads.validation import short_repr
 from notchflex.robot import Robot

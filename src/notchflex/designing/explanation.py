@@ -12,7 +12,7 @@ from notchflex.designing.search.optimality import Held, multipliers
 from notchflex.designing.search.problem import Problem
 from notchflex.designing.search.rows import TOLERANCE, Row
 from notchflex.designing.search.search import Outcome
-from notchflex.designing.specification.parts import DesignObjective
+from notchflex.designing.specification.asked import DesignObjective
 
 # The most sentences about limits, the dearest first.
 _MOST = 12

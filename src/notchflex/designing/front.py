@@ -26,7 +26,7 @@ from notchflex.designing.search.problem import Evaluation, Problem, Progress, Ve
 from notchflex.designing.search.rows import TOLERANCE, objective_reading
 from notchflex.designing.search.search import Outcome, Searches
 from notchflex.designing.search.starts import draw, evaluate_all, smooth
-from notchflex.designing.specification.parts import DesignSpec
+from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 

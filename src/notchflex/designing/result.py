@@ -12,7 +12,8 @@ from notchflex._summary import Displayed, Summary, short
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import Problem
 from notchflex.designing.search.search import Outcome, Searches
-from notchflex.designing.specification.parts import DesignConstraint, DesignObjective, DesignSpec
+from notchflex.designing.specification.asked import DesignConstraint, DesignObjective
+from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import ConvergenceError
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot

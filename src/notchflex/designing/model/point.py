@@ -21,7 +21,7 @@ from notchflex.designing.model.load_states import PROBE, Direction, Probe, State
 from notchflex.designing.model.quantities import OF_ROBOTS, edge_unit
 from notchflex.designing.model.reading import Reading
 from notchflex.designing.model.variables import LoadNumber, Variables
-from notchflex.designing.specification.parts import TargetCurve
+from notchflex.designing.specification.asked import TargetCurve
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.mechanics.chain.mass import body_lengths

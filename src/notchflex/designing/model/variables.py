@@ -11,7 +11,8 @@ from math import comb, isfinite
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.designing.specification.parts import DesignState, DesignVariable
+from notchflex.designing.specification.chosen import DesignVariable
+from notchflex.designing.specification.spec import DesignState
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest

@@ -25,7 +25,7 @@ from notchflex.designing.search.rows import (
     rows_of,
     violations,
 )
-from notchflex.designing.specification.parts import DesignConstraint, DesignObjective
+from notchflex.designing.specification.asked import DesignConstraint, DesignObjective
 from notchflex.errors import InputError
 
 Vector = Float[np.ndarray, " v"]
