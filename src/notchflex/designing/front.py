@@ -111,6 +111,11 @@ def design_front(
             f"a front needs 2 or {_MOST} objectives, and curves as one of them; got "
             f"{len(asked.objective)}"
         )
+    if asked.is_robust:
+        raise InputError.UNSUPPORTED(
+            "a front is of robots as drawn: leave out `robust` and `wanted_yield`, and make the "
+            "point that you choose robust."
+        )
     if points < 2 or generations < 1:
         raise InputError.OUT_OF_RANGE("a front needs 2 points and 1 generation or more")
     problems = problems_of(asked, first)

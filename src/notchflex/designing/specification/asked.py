@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from notchflex.designing.specification.fields import REFUSE, Name, Numbers, Vector, number
+from notchflex.designing.specification.fields import REFUSE, WANTED, Name, Numbers, Vector, number
 from notchflex.robot.part import Float, ProblemError, part, quantity
 
 
@@ -76,6 +76,8 @@ class DesignConstraint(Measured):
         order: Along the notches the value must fall ("tip-first": the tip closes first) or rise
             ("base-first").
         margin: By how much at least, from one notch to the next.
+        wanted_yield: Part of the robots made within the tolerances that must meet it; without it
+            the robot of the drawing must.
     """
 
     equal: Annotated[Float | None, number("value it must have")] = None
@@ -86,6 +88,7 @@ class DesignConstraint(Measured):
         Field(description='"tip-first" or "base-first"'),
     ] = None
     margin: Annotated[Float, number("difference from notch to notch", ge=0.0)] = 0.0
+    wanted_yield: Annotated[Float | None, WANTED] = None
 
     @model_validator(mode="after")
     def _asks_one_thing(self) -> "DesignConstraint":
@@ -93,6 +96,9 @@ class DesignConstraint(Measured):
         if [self.equal is not None, limits, self.order is not None].count(True) != 1:
             text = "asks for nothing, or for too much; give `equal`, `lower` and/or `upper`, or "
             raise ProblemError([("", f"{text}`order`.")])
+        if self.equal is not None and self.wanted_yield is not None:
+            text = "is for limits: no robot with tolerances meets `equal`; give `lower` and `upper`"
+            raise ProblemError([("wanted_yield", f"{text}.")])
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
             text = f"is {self.lower:g}, not less than `upper`, {self.upper:g}; exchange them, or "
             raise ProblemError([("lower", f"{text}use `equal`.")])

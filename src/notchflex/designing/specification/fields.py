@@ -28,3 +28,6 @@ Numbers = Annotated[tuple[Int, ...], BeforeValidator(_one_or_several)]
 Commanded = Annotated[tuple[FloatOrInf, ...], BeforeValidator(_one_or_several)]
 Vector = Annotated[tuple[Float, ...], Field(min_length=3, max_length=3)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=40)]
+WANTED = Field(
+    ge=0.5, le=0.9999, description="part of the robots made within tolerances that must meet limits"
+)

@@ -9,6 +9,7 @@ from notchflex.designing.specification.asked import DesignConstraint, DesignObje
 from notchflex.designing.specification.chosen import DesignVariable, Stock
 from notchflex.designing.specification.fields import (
     REFUSE,
+    WANTED,
     Commanded,
     Name,
     Numbers,
@@ -16,6 +17,7 @@ from notchflex.designing.specification.fields import (
     number,
 )
 from notchflex.robot.part import Float, Int, ProblemError, part
+from notchflex.robot.tolerance import Tolerances
 
 
 @part(kw_only=True, refuse=REFUSE)
@@ -74,6 +76,23 @@ class SearchOptions:
     iterations: Annotated[Int, Field(ge=1, le=10_000, description="most iterations")] = 150
 
 
+@part(kw_only=True, refuse=REFUSE)
+class RobustOptions:
+    """How robots made within tolerances are to meet the limits.
+
+    Args:
+        wanted_yield: Part of the robots that must meet all limits. Without it, and where no
+            constraint has one of its own, the yield is made as great as possible, instead of the
+            objectives.
+        draws: About how many robots the yield is counted of.
+        seed: Seed of the draws.
+    """
+
+    wanted_yield: Annotated[Float | None, WANTED] = None
+    draws: Annotated[Int, Field(ge=100, le=1_000_000, description="robots that are drawn")] = 4000
+    seed: Annotated[Int, Field(ge=0, le=2**31, description="seed of the draws")] = 0
+
+
 @part(refuse=REFUSE, kw_only=True)
 class DesignSpec:
     """What a design is asked for.
@@ -89,6 +108,9 @@ class DesignSpec:
         constraint: The constraints.
         curve: The curves to be followed.
         search: How hard the search tries.
+        tolerance: Within what robots are made, as in a robot file; where not given, the tolerances
+            of the robot, and assumed ones.
+        robust: How robots made within the tolerances are to meet the limits.
     """
 
     _: KW_ONLY
@@ -114,6 +136,15 @@ class DesignSpec:
     search: Annotated[SearchOptions, Field(description="how hard the search tries")] = (
         SearchOptions()
     )
+    tolerance: Annotated[Tolerances, Field(description="how far values may lie from these")] = ()
+    robust: Annotated[
+        RobustOptions | None, Field(description="what robots made within the tolerances must meet")
+    ] = None
+
+    @property
+    def is_robust(self) -> bool:
+        """Whether tolerances count."""
+        return self.robust is not None or any(one.wanted_yield for one in self.constraint)
 
     @model_validator(mode="after")
     def _something(self) -> "DesignSpec":
