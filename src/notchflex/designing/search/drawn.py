@@ -53,8 +53,7 @@ def met_by(
     drawn = VariedRobots(exact, values_at(sources, np.clip(levels, TAIL, 1.0 - TAIL)))
     valid = drawn.valid()
     robots = drawn.take(valid)
-    loads = [solver.path_at(x)] if solver.paths.pieces else []
-    arrays, converged = solved(solver, robots, loads)
+    arrays, converged = solved(solver, robots, [x])
     wishes = [problem.constraints[number] for number in numbers]
     # Robots are made only where something is asked of the robot itself.
     of_states = all(one.asked.quantity in (*OF_STATES, COMPLIANCE) for one in wishes)

@@ -72,10 +72,8 @@ def evaluate_all(
             problem.failures[str(error)] = problem.failures.get(str(error), 0) + 1
             robots.append(None)
     good = [number for number, robot in enumerate(robots) if robot is not None]
-    loads = [solver.path_at(problem.x(vectors[i])) for i in good]
-    same = all(column.load is None for column in solver.variables.columns)
     every = [robot for robot in robots if robot is not None]
-    arrays, converged = solved(solver, every, loads[:1] if same else loads)
+    arrays, converged = solved(solver, every, [problem.x(vectors[i]) for i in good])
     solver.counts["solves"] += len(good)
     found: list[tuple[Vector, Evaluation | None]] = [(z, None) for z in vectors]
     for row, number in enumerate(good):
@@ -92,14 +90,14 @@ def evaluate_all(
 
 
 def solved(
-    solver: Solver, robots: Sequence[Robot], loads: Sequence[LoadPath]
+    solver: Solver, robots: Sequence[Robot], vectors: Sequence[Vector]
 ) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " robots"]]:
     """Solve robots by batches.
 
     Args:
         solver: The solver.
         robots: The robots.
-        loads: All states of a design: for all robots, or for each its own.
+        vectors: The vector of each, or one for all, of which the loads are.
 
     Returns:
         Quantities of every step of all robots, and whether all their steps converged.
@@ -107,6 +105,8 @@ def solved(
     paths = solver.paths
     if not len(robots) or not paths.pieces:
         return {}, np.ones(len(robots), bool)
+    same = all(column.load is None for column in solver.variables.columns)
+    loads = [solver.path_at(x) for x in (vectors[:1] if same else vectors)]
     pieces: list[dict[str, np.ndarray]] = []
     start = 0
     for length in paths.lengths:
