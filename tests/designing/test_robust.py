@@ -59,6 +59,7 @@ def counted(robot: nf.Robot, draws: int = 4000) -> tuple[float, float]:
     return float(strained.mean()), float((strained & bent).mean())
 
 
+@pytest.mark.nightly
 def test_a_quantile_is_held():
     """90 % of the parts hold the strain; of the plain design a third does."""
     angle, strain = SPEC["constraint"]
@@ -104,6 +105,7 @@ def test_the_yield_is_as_great_as_possible():
             assert counted(other)[1] <= best + 0.01
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("holds", [{}, {0: Hold(0.9, 1.3), 1: Hold(0.95, 1.7)}])
 def test_derivatives_of_quantiles_and_of_the_yield(holds):
     (problem,) = problems_of(spec_from_table(SPEC), nf.load_robot(SPEC["robot"]))

@@ -9,6 +9,7 @@ from notchflex.designing.front import design_front as design_front
 from notchflex.designing.result import Design as Design
 from notchflex.designing.result import VariableResult as VariableResult
 from notchflex.designing.result import WishResult as WishResult
+from notchflex.designing.search.robust_search import YieldOf as YieldOf
 from notchflex.designing.specification.asked import DesignConstraint as DesignConstraint
 from notchflex.designing.specification.asked import DesignObjective as DesignObjective
 from notchflex.designing.specification.asked import TargetCurve as TargetCurve
@@ -17,4 +18,5 @@ from notchflex.designing.specification.chosen import Stock as Stock
 from notchflex.designing.specification.reading import read_design as read_design
 from notchflex.designing.specification.spec import DesignSpec as DesignSpec
 from notchflex.designing.specification.spec import DesignState as DesignState
+from notchflex.designing.specification.spec import RobustOptions as RobustOptions
 from notchflex.designing.specification.spec import SearchOptions as SearchOptions
