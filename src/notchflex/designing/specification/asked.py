@@ -5,7 +5,15 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from notchflex.designing.specification.fields import REFUSE, WANTED, Name, Numbers, Vector, number
+from notchflex.designing.specification.fields import (
+    REFUSE,
+    WANTED,
+    Name,
+    Numbers,
+    Vector,
+    check_order,
+    number,
+)
 from notchflex.robot.part import Float, ProblemError, part, quantity
 
 
@@ -99,9 +107,8 @@ class DesignConstraint(Measured):
         if self.equal is not None and self.wanted_yield is not None:
             text = "is for limits: no robot with tolerances meets `equal`; give `lower` and `upper`"
             raise ProblemError([("wanted_yield", f"{text}.")])
-        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
-            text = f"is {self.lower:g}, not less than `upper`, {self.upper:g}; exchange them, or "
-            raise ProblemError([("lower", f"{text}use `equal`.")])
+        if self.lower is not None and self.upper is not None:
+            check_order(self.lower, self.upper, "use `equal`")
         return self
 
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from notchflex.designing.specification.fields import REFUSE, number
+from notchflex.designing.specification.fields import REFUSE, check_order, number
 from notchflex.robot.part import Float, Int, ProblemError, part
 
 
@@ -32,9 +32,7 @@ class DesignVariable:
 
     @model_validator(mode="after")
     def _in_order(self) -> "DesignVariable":
-        if not self.lower < self.upper:
-            text = f"is {self.lower:g}, not less than `upper`, {self.upper:g}; exchange them, or "
-            raise ProblemError([("lower", f"{text}set the value in the robot file.")])
+        check_order(self.lower, self.upper, "set the value in the robot file")
         return self
 
 

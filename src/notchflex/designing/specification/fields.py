@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from notchflex.errors import InputError
-from notchflex.robot.part import Float, FloatOrInf, Int
+from notchflex.robot.part import Float, FloatOrInf, Int, ProblemError
 
 REFUSE = InputError.INVALID_SPECIFICATION
 
@@ -16,6 +16,13 @@ _LARGE = 1e9
 def number(text: str, **limits: float) -> Any:
     """Describe a number whose unit is that of a quantity."""
     return Field(description=text, **({"ge": -_LARGE, "le": _LARGE} | limits))  # pyright: ignore
+
+
+def check_order(lower: float, upper: float, otherwise: str) -> None:
+    """Raise if a least value is not less than the greatest; `otherwise` says what else to do."""
+    if not lower < upper:
+        text = f"is {lower:g}, not less than `upper`, {upper:g}; exchange them, or {otherwise}."
+        raise ProblemError([("lower", text)])
 
 
 def _one_or_several(value: Any) -> Any:
