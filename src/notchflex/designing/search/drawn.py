@@ -20,8 +20,8 @@ from notchflex.robot.varied import VariedRobots
 from notchflex.tolerancing.study import TAIL
 from notchflex.tolerancing.yields import points_of_each, replicates
 
-# Error of polynomials in place of robots, in sizes of the limits, and robots where it is measured.
-_ERROR, _CHECKS = 1e-5, 6
+# Error of polynomials in place of robots, in standard deviations, and robots where it is measured.
+_ERROR, _CHECKS = 0.01, 12
 
 
 def levels_of(
@@ -104,18 +104,24 @@ def _of_robots(
     table = robots.table
     low, high = table.min(axis=0), table.max(axis=0)
     half = np.maximum(0.5 * (high - low), 1e-9 * np.maximum(np.abs(high), 1e-3))
-    rows = [row for one in wishes for row in rows_of(one)]
+    checks = table[np.linspace(0, len(table) - 1, _CHECKS).astype(int)]
+
+    def at(numbers: Float[np.ndarray, " d"]) -> Float[np.ndarray, " m"]:
+        return values_of(robots.at(dict(zip(robots.names, numbers, strict=True))))
+
+    exact = np.stack([at(one) for one in checks])
+    spread = np.maximum(exact.std(axis=0), 1e-9 * np.abs(exact).max(axis=0) + 1e-300)
     made = fit_polynomial(
-        lambda numbers: values_of(robots.at(dict(zip(robots.names, numbers, strict=True)))),
+        at,
         0.5 * (low + high) - half,
         0.5 * (low + high) + half,
         [list(range(len(low)))],
-        lambda sizes: row_sizes(rows, sizes),
-        [np.arange(len(rows))],
+        lambda _: spread,
+        [np.arange(len(spread))],
         tolerance=_ERROR,
         aim=0.1 * _ERROR,
         most=len(table) // 3,
-        checks=table[np.linspace(0, len(table) - 1, _CHECKS).astype(int)],
+        checks=checks,
     )
     if made is None:
         values = np.stack([values_of(robots[row]) for row in range(len(robots))])
