@@ -98,7 +98,7 @@ def robust_search(
 
     Returns:
         The searches of the robust design, and the yields: of all limits together, and of every
-        constraint with limits.
+        constraint with limits; no yields if Ctrl-C ended it before any was counted.
 
     Raises:
         InputError: No constraint has a limit, or nothing deviates.
@@ -106,14 +106,18 @@ def robust_search(
     options = spec.robust or RobustOptions()
     best = plain.best
     numbers = limited(best.problem)
-    levels = levels_of(best.problem, tolerances, options.draws, options.seed)
     wanted = _wanted(spec, options, best.problem, numbers)
 
     def counted(one: Outcome) -> Counted:
+        levels = levels_of(one.problem, tolerances, options.draws, options.seed)
         return Counted(met_by(one.problem, one.found.z, tolerances, levels, numbers))
 
-    before = counted(best)
-    searches, count = Searches([best], plain.interrupted), before
+    searches = Searches([best], plain.interrupted)
+    try:
+        before = count = counted(best)
+    except KeyboardInterrupt:
+        searches.interrupted = True
+        return searches, ()
     starts = sorted(plain.outcomes, key=lambda one: one.merit)[:_STARTS]
     factors = [float(ndtri(one.part)) for one in wanted]
     try:
@@ -129,7 +133,7 @@ def robust_search(
             if _is_better(wanted, tried.best, here, searches.best, count):
                 searches, count = tried, here
             starts = [tried.best]
-            if not wanted or not _recalibrate(wanted, factors, here, len(levels)):
+            if not wanted or not _recalibrate(wanted, factors, here):
                 break
     except KeyboardInterrupt:
         searches.interrupted = True
@@ -181,13 +185,13 @@ def _robust(
     if first is None:
         return None
     problem.set_sizes([first])
+    if holds:  # the same sum, whose size several robots have shown
+        vars(problem)["total_size"] = start.problem.total_size
     found: Found = search_from(problem, start.found.z, iterations)
     return None if found.evaluation is None else Outcome(problem, start.number, found.z, found)
 
 
-def _recalibrate(
-    wanted: Sequence[Wanted], factors: list[float], count: Counted, draws: int
-) -> bool:
+def _recalibrate(wanted: Sequence[Wanted], factors: list[float], count: Counted) -> bool:
     """Move factors by what the counted yields lack; False where all are right."""
     right = True
     for number, one in enumerate(wanted):
@@ -195,7 +199,7 @@ def _recalibrate(
         if one.part <= low <= one.part + _ABOVE * (1.0 - one.part):
             continue
         aim = one.part + 0.5 * _ABOVE * (1.0 - one.part)
-        edge = 0.5 / draws
+        edge = 0.5 / len(count.met)
         move = float(ndtri(aim) - ndtri(np.clip(low, edge, 1.0 - edge)))
         after = max(factors[number] + move, 0.0)
         right = right and after == factors[number]
