@@ -2,13 +2,16 @@
 
 Prints solves and CPU seconds of `nf.design` for the wrist whose tip closes first, of differential
 evolution (SciPy) for the same sum and penalties, of ten random starts, of a grid of robots, and of
-a robot of 27 links. Give `de`, `starts`, `grid` or `links` for one of them alone.
+a robot of 27 links. Give `de`, `de-each` (a depth for every notch), `starts`,
+`grid` or `links` for one of them alone.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,7 @@ from notchflex.designing.forms import problems_of
 from notchflex.designing.search.local import search_from
 from notchflex.designing.search.problem import Problem
 from notchflex.designing.specification.reading import spec_from_table
+from notchflex.robot.varied import VariedRobots
 
 # What a limit missed by its size adds to the sum, in sizes of the sum.
 _PENALTY = 10.0
@@ -41,33 +45,43 @@ def merit(problem: Problem, z: np.ndarray) -> float:
     return one.total + _PENALTY * float(np.abs(problem.violation(one)).sum())
 
 
-def against_evolution() -> None:
+def against_evolution(along: str = "polynomial", generations: int = 300) -> None:
     """Solves of both searches until they reach the same height to 0.1 %."""
-    nf.design(tip_first(), robot=wide_wrist())  # compiles
-    begin = time.process_time()
-    made = nf.design(tip_first(), robot=wide_wrist())
-    height = made.robot.notches[0].height
-    print(f"design: {made.solves} solves, {made.gradients} derivatives, height {height:.6f} mm,")
-    print(f"  {time.process_time() - begin:.2f} s of CPU, {made.starts} starts")
-    one = nf.design(tip_first() | {"search": {"starts": 1}}, robot=wide_wrist())
-    print(f"  from one start: {one.solves} solves, {one.gradients} derivatives")
-    problem = problem_of()
+    spec = tip_first(along)
+    nf.design(spec | {"search": {"starts": 1}}, robot=wide_wrist())  # compiles
+    counts: list[int] = []
+    best = np.inf
+    for starts in (1, 3):
+        begin = time.process_time()
+        made = nf.design(spec | {"search": spec["search"] | {"starts": starts}}, robot=wide_wrist())
+        best = min(best, made.robot.notches[0].height)
+        counts.append(made.solves + made.gradients)
+        print(
+            f"design, {starts} start(s): {made.solves} solves, {made.gradients} derivatives, ",
+            end="",
+        )
+        print(f"height {made.robot.notches[0].height:.6f} mm, ", end="")
+        print(f"{time.process_time() - begin:.2f} s of CPU", flush=True)
+    problem = problem_of(along)
 
     def reached(intermediate_result: Any) -> bool:
-        return bool(intermediate_result.fun <= 1.001 * height)
+        return bool(intermediate_result.fun <= 1.001 * best)
 
+    begin = time.process_time()
     found = differential_evolution(
         lambda z: merit(problem, z),
         [(0.0, 1.0)] * problem.count,
         rng=0,
-        maxiter=150,
+        maxiter=generations,
         callback=reached,
         polish=False,
+        tol=0.0,
     )
     solves = problem.solver.counts["solves"]
-    print(f"differential evolution: {solves} solves, sum {found.fun:.6f} mm")
-    print(f"ratio: {solves / (made.solves + made.gradients):.0f} (all starts), ", end="")
-    print(f"{solves / (one.solves + one.gradients):.0f} (one start)")
+    print(f"differential evolution, {problem.count} variables: {solves} solves, ", end="")
+    print(f"sum {found.fun:.6f} mm, {100.0 * (found.fun / best - 1.0):.3f} % above the design, ")
+    print(f"  {time.process_time() - begin:.1f} s of CPU; ", end="")
+    print(f"{solves / counts[0]:.0f} x as many as one start, {solves / counts[1]:.0f} x as three")
 
 
 def random_starts() -> None:
@@ -84,30 +98,77 @@ def random_starts() -> None:
         print(f"{time.process_time() - begin:.1f} s", flush=True)
 
 
-def grid(each: int = 32) -> None:
-    """The best of a grid of depth at base and tip, height and tendon radius."""
+def grid(each: int = 100) -> None:
+    """The best of 1e6 robots: depth at base and tip and tendon radius, each with its least height.
+
+    Tensions that close a notch and strains of closed ones do not depend on the height, and the
+    angle of closed notches is proportional to it. So a batch of one height finds which robots are
+    closed between 1.4 and 1.6 N, and the height that each needs; those of least height are then
+    evaluated as the design is, until one meets all limits.
+    """
     made = nf.design(tip_first(), robot=wide_wrist())
     best = made.robot.notches[0].height
     problem = problem_of()
-    # The height enters the angle alone: closing tensions and strains do not depend on it.
-    at = np.linspace(0.0, 1.0, each)
-    depth, tip, radius = (one.ravel() for one in np.meshgrid(at, at, at, indexing="ij"))
-    least = np.inf
-    tried = 0
-    for a, b, c in zip(depth.tolist(), tip.tolist(), radius.tolist(), strict=True):
-        one = problem.evaluate(np.array([a, b, 1.0, c]))
-        tried += each
-        if one is None:
-            continue
-        rows = np.abs(problem.violation(one))
-        if rows[:-1].max() > 1e-9:
-            continue
-        for height in at:
-            other = problem.evaluate(np.array([a, b, height, c]))
-            if other is not None and problem.worst(other) <= 1e-9:
-                least = min(least, other.total)
+    begin = time.process_time()
+    box = np.array([(0.0, 1.0)] * 3)
+    around = problem.solver.variables
+    there = (np.array([one.value for one in made.variables]) - around.lower) / around.span
+    for name, low, high in (
+        ("all", box[:, 0], box[:, 1]),
+        ("a tenth about the design", there[[0, 1, 3]] - 0.05, there[[0, 1, 3]] + 0.05),
+    ):
+        low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
+        axes = [np.linspace(a, b, each) for a, b in zip(low, high, strict=True)]
+        points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
+        found = [closed(problem, part) for part in np.array_split(points, 20)]
+        height = np.concatenate(found)
+        order = np.argsort(height)
+        tried, least = 0, np.inf
+        for k in order[: int(np.isfinite(height).sum())].tolist():
+            z = np.insert(points[k], 2, (height[k] - 0.4) / 1.1)
+            one = problem.evaluate(z)
+            tried += 1
+            if one is not None and problem.worst(one) <= 1e-6:
+                least = one.total
                 break
-    print(f"grid of {tried} robots: least height {least:.6f} mm; design {best:.6f} mm")
+        steps = (high - low) * around.span[[0, 1, 3]] / (each - 1)
+        print(
+            f"grid of {len(points)} robots ({name}; steps {steps.round(6).tolist()} mm): ", end=""
+        )
+        print(
+            f"{np.isfinite(height).sum()} close as asked, {tried} of them evaluated; least height "
+        )
+        print(
+            f"  {least:.6f} mm; design {best:.6f} mm, {100.0 * (least / best - 1.0):.3f} %; ",
+            end="",
+        )
+        print(f"{time.process_time() - begin:.0f} s of CPU", flush=True)
+
+
+def closed(problem: Problem, points: np.ndarray) -> np.ndarray:
+    """Height that robots need for the angle, mm; inf where strain or closing is not as asked."""
+    variables = problem.solver.variables
+    z = np.insert(points, 2, 0.5, axis=1)
+    x = variables.lower + z * variables.span
+    names = [f"notch[{number}].depth" for number in range(1, 6)]
+    along = np.linspace(0.0, 1.0, 5)
+    depths = x[:, :1] * (1.0 - along) + x[:, 1:2] * along
+    numbers = dict(zip(names, depths.T, strict=True)) | {
+        "notch.height": x[:, 2],
+        "tendon.radius": x[:, 3],
+    }
+    robots = VariedRobots(variables.robot, numbers)
+    valid = robots.valid()
+    load = nf.LoadPath(np.array([[0.7], [1.4], [1.6], [1.65]]), np.full((4, 1), np.nan))
+    outputs = ("gap", "contact_force", "outer_strain", "total_angle", "converged")
+    batch = nf.simulate_batch(robots.take(valid), load, outputs=outputs)
+    good = batch["converged"].all(axis=1) & (batch["contact_force"][:, 1] < 1e-6).all(axis=1)
+    good &= (batch["gap"][:, 2] < 1e-9).all(axis=1)
+    good &= (batch["outer_strain"][:, 3] <= 0.06 * (1.0 + 1e-6)).all(axis=1)
+    height = np.full(len(points), np.inf)
+    needed = x[valid, 2] * np.radians(90.0) / batch["total_angle"][:, 3]
+    height[valid] = np.where(good & (needed <= 1.5), needed, np.inf)
+    return height
 
 
 def links() -> None:
@@ -134,6 +195,12 @@ def links() -> None:
 
 
 if __name__ == "__main__":
-    runs = {"de": against_evolution, "starts": random_starts, "grid": grid, "links": links}
+    runs: dict[str, Callable[[], None]] = {
+        "de": against_evolution,
+        "de-each": partial(against_evolution, "each"),
+        "starts": random_starts,
+        "grid": grid,
+        "links": links,
+    }
     for name in sys.argv[1:] or runs:
         runs[name]()

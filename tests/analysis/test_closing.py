@@ -62,6 +62,31 @@ def test_failures_beside_a_closing_cost_a_trial(failing):
     assert tension == pytest.approx(roots, rel=1e-10)
 
 
+def test_a_kink_where_false_position_crawls():
+    """The overlap of a notch that closes falls back to a lower slope: 100 trials were too few."""
+    root = np.array([1.2699152222578])
+
+    def overlap(tension):
+        steep, flat = 1.63 * (tension - root), 0.6 * (tension - root)
+        return np.where(tension > root, flat, np.where(tension < 0.9, 0.97 * tension - 1.23, steep))
+
+    tension, status = closing_tensions(overlap, np.array([1.66]))
+    assert list(status) == ["closes"]
+    assert tension == pytest.approx(root, rel=1e-10)
+
+
+@pytest.mark.parametrize("slope", [1e-4, 1e-2, 10.0, 1e4])
+def test_closings_take_few_solves(slope):
+    counts = []
+
+    def overlap(tension):
+        counts.append(1)
+        return np.where(tension > 1.27, slope, 1.0) * (tension - 1.27)
+
+    closing_tensions(overlap, np.array([1.66]))
+    assert len(counts) <= 70
+
+
 def test_what_is_not_found_is_told_from_never():
     roots = np.array([1.0, 1000.0, 2.0, 1000.0])
     own = np.array([False, False, False, True])

@@ -102,8 +102,7 @@ VERBS = {
     ),
     "tolerance": (
         "Find out what tolerances do: worst case, yield, which dimension to control.",
-        "echo 'load.pulled.tension = 1.0' > limits.toml\n"
-        "    echo 'accept = [{quantity = \"total_angle\", upper = 60}]' >> limits.toml\n"
+        "notchflex new limits --tolerance\n"
         "    notchflex tolerance pacheco2021-a limits.toml\n"
         "    notchflex tolerance pacheco2021-a limits.toml --draws 10000 --plot tolerances.png \\\n"
         "        --csv robots.csv --json -",
@@ -112,6 +111,7 @@ VERBS = {
         "Choose dimensions so that a robot does what is asked.",
         "notchflex new wish --design\n"
         "    notchflex design wish.toml -o designed\n"
+        "    notchflex design wish.toml -o robust --robust\n"
         "    notchflex design wish.toml --json - --quiet",
     ),
     "friction-rig": (

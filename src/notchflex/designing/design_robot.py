@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from notchflex.designing.explanation import curves_missed, explain
+from notchflex.analysis.uncertainty.assumed import tolerances_of
+from notchflex.designing.explanation import curves_missed, explain, yield_sentences
 from notchflex.designing.forms import problems_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.result import (
@@ -20,20 +22,24 @@ from notchflex.designing.result import (
     total_counts,
 )
 from notchflex.designing.search.problem import Evaluation, Problem, Progress
+from notchflex.designing.search.robust_search import YieldOf, check_limits, robust_search
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.search import Searches, search
-from notchflex.designing.specification.parts import DesignConstraint, DesignSpec
+from notchflex.designing.specification.asked import DesignConstraint
 from notchflex.designing.specification.reading import read_design, robot_of, spec_from_table
+from notchflex.designing.specification.spec import DesignSpec, RobustOptions
 from notchflex.errors import InputError
 from notchflex.loads.validation import short_repr
 from notchflex.robot import Robot
 from notchflex.robot.robot import remember_source, source_of
+from notchflex.robot.tolerance import Tolerance
 
 
 def design(
     spec: DesignSpec | Mapping[str, Any] | str | os.PathLike[str],
     *,
     robot: Robot | None = None,
+    robust: bool = False,
     progress: Progress | None = None,
 ) -> Design:
     """Choose numbers of a robot so that it does what is asked.
@@ -41,6 +47,8 @@ def design(
     Args:
         spec: A design file, its table, or a `DesignSpec`.
         robot: The robot to begin with, instead of the one that the specification names.
+        robust: Make the yield of robots made within the tolerances as great as possible, or what
+            `robust` and `wanted_yield` of the specification say.
         progress: Called with the stage, what is done of it and how much there is.
 
     Returns:
@@ -60,9 +68,46 @@ def design(
         '0.627 mm'
     """
     asked, first = given(spec, robot)
+    if robust and not asked.is_robust:
+        asked = replace(asked, robust=RobustOptions())
     problems = problems_of(asked, first)
+    tolerances = _tolerances(asked, first, problems) if asked.is_robust else ()
     searches = search(problems, asked.search, progress)
-    return made_of(asked, first, problems, searches)
+    if not asked.is_robust:
+        return made_of(asked, first, problems, searches)
+    searches, yields = robust_search(asked, tolerances, searches, progress)
+    return with_yields(made_of(asked, first, problems, searches), yields)
+
+
+def _tolerances(
+    spec: DesignSpec, robot: Robot, problems: Sequence[Problem]
+) -> tuple[Tolerance, ...]:
+    """Return the tolerances that a robust design is made for.
+
+    Raises:
+        InputError: They do not fit the robot, nothing deviates, or no constraint has a limit.
+    """
+    given = robot.replace(tolerance=spec.tolerance).tolerance
+    tolerances = given or tolerances_of(robot)[0]
+    check_limits(problems, tolerances)
+    return tolerances
+
+
+def with_yields(made: Design, yields: tuple[YieldOf, ...]) -> Design:
+    """Add to a design which parts of the robots made within tolerances meet its limits."""
+    missed = {one.title for one in yields if not one.met}
+    wishes = tuple(replace(w, met=False) if w.title in missed else w for w in made.wishes)
+    reason = made.reason
+    if missed and not reason:
+        reason = "the wanted yield cannot be reached; this is the robot that comes nearest"
+    return replace(
+        made,
+        yields=yields,
+        wishes=wishes,
+        converged=not reason,
+        reason=reason,
+        explanation=(*yield_sentences(yields), *made.explanation),
+    )
 
 
 def given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
@@ -106,7 +151,7 @@ def made_of(spec: DesignSpec, first: Robot, problems: list[Problem], searches: S
         reason = far[0].rstrip(".")
     elif not found.stationary:
         reason = "the search ended before it settled; try more starts or iterations"
-    solves, gradients = total_counts(problems)
+    solves, gradients = total_counts([*problems, *(one.problem for one in searches.outcomes)])
     return Design(
         spec=spec,
         before=first,

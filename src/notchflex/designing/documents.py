@@ -14,7 +14,7 @@ def design_document(made: Design) -> dict[str, Any]:
     Returns:
         `robot` (its description) and `name` as in every document, `design` (its name),
         `converged`, `met`, `reason`, `wishes`, `variables`, `explanation`, `solves`, `gradients`
-        and `starts`. Angles in deg, lengths in mm, forces in N.
+        and `starts`, and of a robust design `yields`. Angles in deg, lengths in mm, forces in N.
     """
     return {
         **document_head(made.robot),
@@ -39,6 +39,7 @@ def design_document(made: Design) -> dict[str, Any]:
         "solves": made.solves,
         "gradients": made.gradients,
         "starts": made.starts,
+        **({"yields": [vars(one) for one in made.yields]} if made.yields else {}),
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import floor, log10
 
 import numpy as np
@@ -10,9 +11,10 @@ from notchflex._summary import short
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.optimality import Held, multipliers
 from notchflex.designing.search.problem import Problem
+from notchflex.designing.search.robust_search import YieldOf
 from notchflex.designing.search.rows import TOLERANCE, Row
 from notchflex.designing.search.search import Outcome
-from notchflex.designing.specification.parts import DesignObjective
+from notchflex.designing.specification.asked import DesignObjective
 
 # The most sentences about limits, the dearest first.
 _MOST = 12
@@ -36,6 +38,25 @@ def curves_missed(outcome: Outcome) -> tuple[str, ...]:
                 f"({shown}), up to {short(float(far.max()))} mm away; asked {curve.within:g} mm."
             )
     return tuple(told)
+
+
+def yield_sentences(yields: Sequence[YieldOf]) -> tuple[str, ...]:
+    """Return a sentence for the yield of all limits, and for every one that is wanted."""
+    return tuple(_yield_sentence(one) for one in yields if one is yields[0] or one.wanted)
+
+
+def _yield_sentence(one: YieldOf) -> str:
+    low, high = (_percent(end) for end in one.interval)
+    wanted = "" if one.wanted is None else f", wanted {_percent(one.wanted)} %"
+    meets = "meet" if one.title == "all limits" else "meet the limit of"
+    return (
+        f"{_percent(one.achieved)} % of the robots made within the tolerances {meets} {one.title} "
+        f"({low} to {high} %{wanted}); without regard to tolerances {_percent(one.plain)} %."
+    )
+
+
+def _percent(part: float) -> str:
+    return f"{100.0 * part:.4g}"
 
 
 def explain(outcome: Outcome) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from notchflex.designing.documents import HEADS, design_document, wish_rows
+from notchflex.designing.explanation import yield_sentences
 from notchflex.designing.result import Design, numbers
 from notchflex.errors import InputError
 from notchflex.results.files.json import write_json
@@ -109,6 +110,7 @@ def designed_text(made: Design) -> str:
         achieved = f"{numbers(one.achieved)} {one.unit}".rstrip()
         missed = " (not met)" if one.met is False else ""
         lines.append(f"#   {one.title}: asked {one.asked}, achieved {achieved}{missed}")
+    lines += [f"#   {sentence}" for sentence in yield_sentences(made.yields)]
     return "\n".join([*map(_one_line, lines), "", robot_text(made.robot, source_of(made.robot))])
 
 

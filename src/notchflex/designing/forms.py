@@ -8,10 +8,11 @@ from typing import Any
 from notchflex.designing.model.load_states import StatePaths, check_states, state_paths
 from notchflex.designing.model.point import Solver
 from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
+from notchflex.designing.model.resolving import wishes_of
 from notchflex.designing.model.variables import variables_of
-from notchflex.designing.model.wishes import Wish, wishes_of
+from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import Problem
-from notchflex.designing.specification.parts import DesignSpec
+from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import InputError
 from notchflex.robot import Robot, from_table, to_table
 from notchflex.robot.robot import remember_source, source_of

@@ -26,7 +26,7 @@ from notchflex.designing.search.problem import Evaluation, Problem, Progress, Ve
 from notchflex.designing.search.rows import TOLERANCE, objective_reading
 from notchflex.designing.search.search import Outcome, Searches
 from notchflex.designing.search.starts import draw, evaluate_all, smooth
-from notchflex.designing.specification.parts import DesignSpec
+from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 
@@ -110,6 +110,11 @@ def design_front(
         raise InputError.UNSUPPORTED(
             f"a front needs 2 or {_MOST} objectives, and curves as one of them; got "
             f"{len(asked.objective)}"
+        )
+    if asked.is_robust:
+        raise InputError.UNSUPPORTED(
+            "a front is of robots as drawn: leave out `robust` and `wanted_yield`, and make the "
+            "point that you choose robust."
         )
     if points < 2 or generations < 1:
         raise InputError.OUT_OF_RANGE("a front needs 2 points and 1 generation or more")

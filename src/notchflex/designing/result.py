@@ -11,8 +11,10 @@ from typing import Any
 from notchflex._summary import Displayed, Summary, short
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import Problem
+from notchflex.designing.search.robust_search import YieldOf
 from notchflex.designing.search.search import Outcome, Searches
-from notchflex.designing.specification.parts import DesignConstraint, DesignObjective, DesignSpec
+from notchflex.designing.specification.asked import DesignConstraint, DesignObjective
+from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import ConvergenceError
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
@@ -81,6 +83,8 @@ class Design(Displayed):
         solves: Number of robots solved.
         gradients: Number of robots differentiated.
         starts: Number of searches.
+        yields: Of a robust design, which part of robots made within the tolerances meets all
+            limits, and each of them.
     """
 
     spec: DesignSpec
@@ -95,6 +99,7 @@ class Design(Displayed):
     gradients: int
     starts: int
     outcome: Outcome
+    yields: tuple[YieldOf, ...] = ()
 
     @property
     def met(self) -> bool:
@@ -179,16 +184,17 @@ def asked_in_words(wish: Wish) -> str:
         return f"{asked.order}: {way} toward the tip{by}"
     if asked.equal is not None:
         return f"{asked.equal:g}{unit}"
+    of = "" if asked.wanted_yield is None else f" for {100.0 * asked.wanted_yield:g} % of robots"
     if asked.lower is not None and asked.upper is not None:
-        return f"{asked.lower:g} to {asked.upper:g}{unit}"
+        return f"{asked.lower:g} to {asked.upper:g}{unit}{of}"
     if asked.lower is not None:
-        return f"at least {asked.lower:g}{unit}"
-    return f"at most {asked.upper:g}{unit}"
+        return f"at least {asked.lower:g}{unit}{of}"
+    return f"at most {asked.upper:g}{unit}{of}"
 
 
 def total_counts(problems: Sequence[Problem]) -> tuple[int, int]:
     """Return how many robots were solved and differentiated."""
-    counts = [problem.solver.counts for problem in problems]
+    counts = {id(one.solver.counts): one.solver.counts for one in problems}.values()
     return sum(one["solves"] for one in counts), sum(one["gradients"] for one in counts)
 
 

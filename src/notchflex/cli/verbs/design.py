@@ -10,6 +10,7 @@ from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import flag
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.errors import InputError
 from notchflex.results.files.writing import check_folder
 
 if TYPE_CHECKING:
@@ -33,6 +34,13 @@ def design(
         bool,
         flag("Find the front between two or three objectives: point_01.toml and so on, front.csv."),
     ] = False,
+    robust: Annotated[
+        bool,
+        flag(
+            "Make the yield of robots made within the tolerances as great as possible, or what "
+            "`[robust]` and `wanted_yield` of the design file say."
+        ),
+    ] = False,
     json: JsonFile = None,
     plot: PlotFile = None,
     quiet: Quiet = False,
@@ -51,10 +59,12 @@ def design(
     with terminal.working("loading the solver"):
         terminal.use_compile_cache()
         import notchflex.designing as designing
+    if front and robust:
+        raise InputError.CONFLICT("--front is of robots as drawn; leave out --robust.")
     if front:
         return _front(spec, output, outputs)
     with terminal.bars("ranking robots") as progress:
-        made = designing.design(spec, progress=progress)
+        made = designing.design(spec, robust=robust, progress=progress)
     if output is not None:
         written = write_design(made, output, inputs=[spec])
         terminal.note(f"written: {', '.join(map(str, written))}.")

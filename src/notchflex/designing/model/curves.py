@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from notchflex._jax import constant
 from notchflex.analysis.axis_points import AxisPlaces, axis_places, points_on_axis
 from notchflex.designing.model.reading import Reading
-from notchflex.designing.specification.parts import TargetCurve
+from notchflex.designing.specification.asked import TargetCurve
 from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.robot import Robot
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from notchflex.designing.model.variables import LoadNumber
-from notchflex.designing.specification.parts import DesignState
+from notchflex.designing.specification.spec import DesignState
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.external import ExternalLoad

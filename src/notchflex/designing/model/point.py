@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -17,11 +17,12 @@ from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.derivatives.tangent import Change
 from notchflex.designing.model.closings import closing_slopes
 from notchflex.designing.model.curves import Bodies, distances, offsets, target_points
+from notchflex.designing.model.deviations import Deviation, deviations_of
 from notchflex.designing.model.load_states import PROBE, Direction, Probe, StatePaths
 from notchflex.designing.model.quantities import OF_ROBOTS, edge_unit
 from notchflex.designing.model.reading import Reading
 from notchflex.designing.model.variables import LoadNumber, Variables
-from notchflex.designing.specification.parts import TargetCurve
+from notchflex.designing.specification.asked import TargetCurve
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.mechanics.chain.mass import body_lengths
@@ -71,16 +72,17 @@ class Point:
 
     def closings(self) -> Reading:
         """Closing tensions, N; NaN for a notch that does not close."""
-        table: Closing = self._once("closing", lambda: closing(self.robot))
+        table: Closing = self.once("closing", lambda: closing(self.robot))
         if self.slopes_of is None or not np.isfinite(table.tension).all():
             return Reading(table.tension, None)
 
         def slopes() -> np.ndarray:
             return closing_slopes(self.robot, table, self._changes)
 
-        return Reading(table.tension, self._once("closing slopes", slopes))
+        return Reading(table.tension, self.once("closing slopes", slopes))
 
-    def _once(self, key: Any, made: Callable[[], Any]) -> Any:
+    def once(self, key: Any, made: Callable[[], Any]) -> Any:
+        """Return what was worked out before under a key, or work it out."""
         if key not in self.kept:
             self.kept[key] = made()
         return self.kept[key]
@@ -95,7 +97,13 @@ class Point:
         values = np.array(list(found.values()))
         if self.slopes_of is None:
             return Reading(values, None)
-        return Reading(values, np.stack([self.variables.parts_of(one) for one in found]))
+        slopes = np.stack([self.variables.parts_of(one) for one in found])
+        by = [[self._deviates(one, path) for one in self.deviations] for path in found]
+        return Reading(values, np.hstack([slopes, np.reshape(by, (len(values), -1))]))
+
+    def _deviates(self, deviation: Deviation, path: str) -> float:
+        sds = (sd for name, sd in deviation.sd.items() if path in numbers_at(self.robot, name))
+        return next(sds, 0.0)
 
     def _of_robot(self, formula: Callable[[Robot], np.ndarray]) -> Reading:
         values = formula(self.robot)
@@ -107,7 +115,17 @@ class Point:
             else slope(lambda t, n=number: formula(self.moved(n, t)), 0.0, order=2) / column.span
             for number, column in enumerate(self.variables.columns)
         ]
+        slopes += [
+            slope(lambda t, one=one: formula(one.moved(self.robot, t)), 0.0, order=2)
+            for one in self.deviations
+        ]
         return Reading(values, np.stack(slopes, axis=1))
+
+    @property
+    def deviations(self) -> Sequence[Deviation]:
+        """What deviates in robots made within the tolerances."""
+        tolerances = self.variables.tolerances
+        return self.once("deviations", lambda: deviations_of(self.robot, tolerances))
 
     def compliance(self, state: str, direction: Direction) -> Reading:
         """The tip compliance along a direction, mm/N: a force to either side, and its travel."""
@@ -137,11 +155,25 @@ class Point:
         """Return the robot with a variable moved by a part of its span."""
         x = self.x.copy()
         x[number] += part * self.variables.columns[number].span
-        return self._once(("robot", number, part), lambda: self.variables.robot_at(x))
+        return self.once(("robot", number, part), lambda: self.variables.robot_at(x))
 
     def _changes(self, model: ForwardModel, load: LoadPath) -> list[Change]:
         """Directions of all variables for a model whose loads do not depend on them."""
-        return [self.change(model, load, number) for number in range(len(self.x))]
+        own = [self.change(model, load, number) for number in range(len(self.x))]
+        return own + self.changes_of_deviations(model, load)
+
+    def changes_of_deviations(self, model: ForwardModel, load: LoadPath) -> list[Change]:
+        """Directions of one standard deviation of everything that deviates, for a model."""
+        found: list[Change] = []
+        for one in self.deviations:
+            if one.law is not None:
+                by = model.change(self.robot, load, one.law)
+                assert by.chain is not None
+                found.append(Change(None, one.sd[one.law] * by.chain))
+            else:
+                move = partial(one.moved, self.robot)
+                found.append(model.change_along(move, 0.0, load, order=2))
+        return found
 
     def change(self, model: ForwardModel, load: LoadPath, number: int) -> Change:
         """Direction of a variable of the robot for a model; nothing for one of the loads."""
@@ -197,8 +229,7 @@ class Solver:
         self.counts["solves"] += 1
         if not self.paths.pieces:
             return self._without_states(robot, x)
-        numbers = self.variables.loads_at(x)
-        load = self.paths.path(numbers)
+        load = self.path_at(x)
         model = self._model(robot, load)
         path = model.solve(robot, load)
         if not path.converged.all():
@@ -216,12 +247,16 @@ class Solver:
         point = Point(self.variables, x, robot, self.paths, arrays, slopes_of)
         return point
 
+    def path_at(self, x: Float[np.ndarray, " v"]) -> LoadPath:
+        """Return the loads of a vector."""
+        return self.paths.path(self.variables.loads_at(x))
+
     def path(self, x: Float[np.ndarray, " v"]) -> EquilibriumPath | None:
         """Return the states of the robot of a vector; None if there are none."""
         if not self.paths.pieces:
             return None
         robot = self.variables.robot_at(x)
-        load = self.paths.path(self.variables.loads_at(x))
+        load = self.path_at(x)
         return self._model(robot, load).solve(robot, load)
 
     def _without_states(self, robot: Robot, x: np.ndarray) -> Point:
@@ -239,6 +274,7 @@ class Solver:
             if column.load is not None:
                 change = Change(self._load_change(model, path, point.x, column.load), change.chain)
             changes.append(change)
+        changes += point.changes_of_deviations(model, path.load)
         found = model.derivatives(path, changes, self.outputs)
         wrong = [name for name, one in found.items() if not _known(name, one, path)]
         if wrong:

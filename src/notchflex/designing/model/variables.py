@@ -11,10 +11,12 @@ from math import comb, isfinite
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.designing.specification.parts import DesignState, DesignVariable
+from notchflex.designing.specification.chosen import DesignVariable
+from notchflex.designing.specification.spec import DesignState
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest
+from notchflex.robot.tolerance import Tolerance
 from notchflex.robot.value_names import described_at, numbers_at
 
 _LOAD = re.compile(r"state\.([\w-]+)\.(tension|stroke)(?:\[([1-9]\d{0,3})\])?")
@@ -70,11 +72,14 @@ class Variables:
         robot: The robot with its stock and number of notches.
         states: The states by name.
         columns: The numbers of the vector.
+        tolerances: Within what robots are made; derivatives by what deviates follow those by the
+            vector.
     """
 
     robot: Robot
     states: Mapping[str, DesignState]
     columns: tuple[Column, ...]
+    tolerances: tuple[Tolerance, ...] = ()
 
     @cached_property
     def lower(self) -> Float[np.ndarray, " v"]:

@@ -25,7 +25,7 @@ from notchflex.designing.search.rows import (
     rows_of,
     violations,
 )
-from notchflex.designing.specification.parts import DesignConstraint, DesignObjective
+from notchflex.designing.specification.asked import DesignConstraint, DesignObjective
 from notchflex.errors import InputError
 
 Vector = Float[np.ndarray, " v"]
@@ -129,11 +129,14 @@ class Problem:
     def evaluate(self, z: Vector) -> Evaluation | None:
         """Return the design at a scaled vector; None where there is no robot or no equilibrium."""
         try:
-            point = self.solver.point(self.x(z))
+            point = self._solved(z)
             found = self.read(point.plain, z)
         except InputError as error:
             return self._failed(str(error))
         return None if found is None else replace(found, point=point)
+
+    def _solved(self, z: Vector) -> Point:
+        return self.solver.point(self.x(z))
 
     def with_slopes(self, one: Evaluation, z: Vector) -> Evaluation | None:
         """Return the design at a scaled vector with its derivatives; None if they are not known."""
@@ -149,24 +152,32 @@ class Problem:
 
     def read(self, point: Point, z: Vector) -> Evaluation | None:
         """Return what is asked of a solved robot; None where it is no number."""
-        span = self.solver.variables.span
+        terms, total = self._terms(point, z)
+        bounded = tuple(self._joined([one.wish.every(point)]) for one in self.bounds)
+        has_slopes = point.slopes_of is not None
+        rows = self._joined(self._row_readings(point))
+        made = Evaluation(point, self._sum(terms), rows, bounded, total, has_slopes)
+        if made.objective.slopes is not None:
+            size = float(np.linalg.norm(made.objective.slopes * self.solver.variables.span))
+            self.steepest = max(self.steepest, size if np.isfinite(size) else 0.0)
+        return made if self._is_finite(made) else None
+
+    def _terms(self, point: Point, z: Vector) -> tuple[list[Reading], float]:
+        """Return what is minimised without what bounds stand for, and the whole sum."""
+        if not self.objectives:  # the smallest change of the robot
+            off = z[: self.count] - self.start
+            by = 2.0 * off / self.solver.variables.span
+            total = float(off @ off)
+            return [Reading(np.array([total]), by[None])], total
         smooth = {id(one.wish) for one in self.bounds}
         terms = [objective_reading(one, point) for one in self.objectives if id(one) not in smooth]
         total = sum(float(objective_reading(one, point).values.sum()) for one in self.objectives)
-        if not self.objectives:  # the smallest change of the robot
-            off = z[: self.count] - self.start
-            slopes = 2.0 * off / span
-            terms = [Reading(np.array([float(off @ off)]), slopes[None])]
-            total = float(off @ off)
-        rows = [row_reading(one, point) for one in self.constraints]
-        rows += [objective_reading(one, point) for one, _ in self.extra]
-        bounded = tuple(one.wish.every(point) for one in self.bounds)
-        has_slopes = point.slopes_of is not None
-        made = Evaluation(point, self._sum(terms), self._joined(rows), bounded, total, has_slopes)
-        if made.objective.slopes is not None:
-            size = float(np.linalg.norm(made.objective.slopes * span))
-            self.steepest = max(self.steepest, size if np.isfinite(size) else 0.0)
-        return made if self._is_finite(made) else None
+        return terms, total
+
+    def _row_readings(self, point: Point) -> list[Reading]:
+        """Return the numbers of the rows, in their order."""
+        own = [row_reading(one, point) for one in self.constraints]
+        return own + [objective_reading(one, point) for one, _ in self.extra]
 
     def _sum(self, terms: Sequence[Reading]) -> Reading:
         joined = self._joined(terms)
@@ -174,7 +185,7 @@ class Problem:
 
     def _joined(self, readings: Sequence[Reading]) -> Reading:
         values = np.concatenate([np.zeros(0), *(one.values for one in readings)])
-        known = [one.slopes for one in readings if one.slopes is not None]
+        known = [one.slopes[:, : self.count] for one in readings if one.slopes is not None]
         if len(known) < len(readings):
             return Reading(values, None)
         return Reading(values, np.concatenate([np.zeros((0, self.count)), *known]))

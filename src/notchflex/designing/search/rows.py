@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from notchflex.designing.model.reading import Reading, pairs, taken
 from notchflex.designing.model.wishes import Source, Wish
-from notchflex.designing.specification.parts import DesignConstraint, DesignObjective
+from notchflex.designing.specification.asked import DesignConstraint, DesignObjective
 
 # A number is at its limit, or within it, up to this part of its size.
 TOLERANCE = 1e-6

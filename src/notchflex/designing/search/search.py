@@ -20,7 +20,7 @@ from notchflex.designing.search.starts import (
     smooth,
     spread_out,
 )
-from notchflex.designing.specification.parts import SearchOptions
+from notchflex.designing.specification.spec import SearchOptions
 from notchflex.errors import InputError
 
 # A robot that misses by less than this part is searched from once more.

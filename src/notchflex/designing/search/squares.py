@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import Evaluation, Problem, Vector
 from notchflex.designing.search.rows import squared
-from notchflex.designing.specification.parts import DesignObjective
+from notchflex.designing.specification.asked import DesignObjective
 
 _EVALUATIONS = 30
 _INSIDE, _PRECISION = 1e-9, 1e-5

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.stats import qmc
 
 from notchflex.analysis.batch import simulate_batch
@@ -72,8 +72,8 @@ def evaluate_all(
             problem.failures[str(error)] = problem.failures.get(str(error), 0) + 1
             robots.append(None)
     good = [number for number, robot in enumerate(robots) if robot is not None]
-    own_vectors = [problem.x(vectors[i]) for i in good]
-    arrays, converged = _solved(solver, [robots[i] for i in good], own_vectors)
+    every = [robot for robot in robots if robot is not None]
+    arrays, converged = solved(solver, every, [problem.x(vectors[i]) for i in good])
     solver.counts["solves"] += len(good)
     found: list[tuple[Vector, Evaluation | None]] = [(z, None) for z in vectors]
     for row, number in enumerate(good):
@@ -89,22 +89,31 @@ def evaluate_all(
     return found
 
 
-def _solved(
-    solver: Solver, robots: Sequence[Robot | None], vectors: Sequence[Vector]
-) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Quantities of every step of all robots, and whether all their steps converged."""
-    every = [robot for robot in robots if robot is not None]
+def solved(
+    solver: Solver, robots: Sequence[Robot], vectors: Sequence[Vector]
+) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " robots"]]:
+    """Solve robots by batches.
+
+    Args:
+        solver: The solver.
+        robots: The robots.
+        vectors: The vector of each, or one for all, of which the loads are.
+
+    Returns:
+        Quantities of every step of all robots, and whether all their steps converged.
+    """
     paths = solver.paths
-    if not every or not paths.pieces:
-        return {}, np.ones(len(every), bool)
-    loads = [paths.path(solver.variables.loads_at(x)) for x in vectors]
+    if not len(robots) or not paths.pieces:
+        return {}, np.ones(len(robots), bool)
     same = all(column.load is None for column in solver.variables.columns)
+    loads = [solver.path_at(x) for x in (vectors[:1] if same else vectors)]
     pieces: list[dict[str, np.ndarray]] = []
     start = 0
     for length in paths.lengths:
-        parts: list[LoadPath] = [one.part(start, length) for one in loads[: 1 if same else None]]
+        parts: list[LoadPath] = [one.part(start, length) for one in loads]
         names = (*solver.outputs, "converged")
-        pieces.append(dict(simulate_batch(every, parts[0] if same else parts, outputs=names)))
+        common = parts[0] if len(parts) == 1 else parts
+        pieces.append(dict(simulate_batch(robots, common, outputs=names)))
         start += length
     joined = {name: np.concatenate([one[name] for one in pieces], axis=1) for name in pieces[0]}
     return joined, np.asarray(joined["converged"].all(axis=1))

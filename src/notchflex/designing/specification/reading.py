@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from notchflex.designing.specification.parts import DesignSpec
+from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import InputError
 from notchflex.results.files.writing import read_text
 from notchflex.robot.error_messages import sentences

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from notchflex.designing.specification.parts import DesignSpec
+from notchflex.designing.specification.spec import DesignSpec
 from notchflex.robot.schema import schema_of
 
 

@@ -10,7 +10,7 @@ from notchflex.plotting.output import Picture
 from notchflex.plotting.shapes.panel import plane_of, shape_panel
 from notchflex.plotting.sheet import (
     BELOW,
-    BESIDE,
+    Bars,
     Cell,
     Curve,
     Mark,
@@ -20,7 +20,7 @@ from notchflex.plotting.sheet import (
     dots,
     stack,
 )
-from notchflex.plotting.style import BLACK, BLUE, GREY, VERMILLION
+from notchflex.plotting.style import BLACK, BLUE, GREY, SKY, VERMILLION
 
 if TYPE_CHECKING:
     from notchflex.designing import Design, WishResult
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 BEFORE, AFTER = GREY, BLUE
 _STATES, _VALUES = 3, 12
+# The values before stand below the bars, clear of the numbers at their ends.
+_BELOW = 0.38
 
 
 def design_picture(made: Design, *, title: str = "") -> Picture:
@@ -78,17 +80,17 @@ def _variables(made: Design) -> Panel:
     chosen = made.variables[:_VALUES]
     if not chosen:
         return Panel([Note("no variables")], "", "", title="variables")
-    at = np.arange(1, len(chosen) + 1, dtype=float)
-    after = np.array([(v.value - v.lower) / (v.upper - v.lower) for v in chosen])
-    was = np.array([(v.before - v.lower) / (v.upper - v.lower) for v in chosen])
+    after = [(v.value - v.lower) / (v.upper - v.lower) for v in chosen]
+    was = [(v.before - v.lower) / (v.upper - v.lower) for v in chosen]
+    names = [f"{v.name}\n{v.value:.4g} {v.unit}".rstrip() for v in chosen]
+    points = np.stack([was, np.arange(len(chosen)) + _BELOW], axis=1)
     items: list[Mark] = [
-        Span("y", 0.0, 0.0, BLACK),
-        Span("y", 1.0, 1.0, BLACK),
-        dots(np.stack([at, was], axis=1), BEFORE, 4.0, name="before", hollow=True),
-        dots(np.stack([at, after], axis=1), AFTER, 5.0, name="designed"),
+        Bars(after, names, [SKY] * len(chosen)),
+        Span("x", 1.0, 1.0, BLACK),
+        dots(points, BLACK, 4.0, name="before", hollow=True, layer=4),
     ]
-    labels = "variable [number]", "from least (0) to greatest (1)"
-    return Panel(items, *labels, title="variables", legend=BESIDE, whole="x", y_range=(-0.08, 1.08))
+    label = "from least (0) to greatest (1) value"
+    return Panel(items, label, "", title="variables", legend=BELOW, x_range=(0.0, 1.15))
 
 
 def _numbers(one: WishResult) -> Panel:

@@ -6,7 +6,7 @@ import os
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from cyclopts import Group, Parameter
 
@@ -23,8 +23,24 @@ NOTCHES = Group("Notches (one value for all, or one for each, base to tip)", sor
 TENDONS = Group("Tendons (one value for each)", sort_key=3)
 MATERIAL = Group("Material and friction", sort_key=4)
 
-TEMPLATE = Path(__file__).parents[3] / "designing" / "specification" / "template.toml"
-"""The design file that `--design` writes."""
+
+class Template(NamedTuple):
+    """A commented file that is written unasked."""
+
+    file: str
+    kind: str
+    command: str
+
+
+_PACKAGE = Path(__file__).parents[3]
+TEMPLATES = {
+    "--design": Template(
+        "designing/specification/template.toml", "design file", "notchflex design {} -o FOLDER"
+    ),
+    "--tolerance": Template(
+        "tolerancing/template.toml", "file of tolerances", "notchflex tolerance ROBOT {}"
+    ),
+}
 
 _SECTIONS = ("notch", "tendon", "material", "friction")
 
@@ -115,6 +131,10 @@ def new(
     design: Annotated[
         bool, flag("Write a commented design file for `notchflex design` instead; asks nothing.")
     ] = False,
+    tolerance: Annotated[
+        bool,
+        flag("Write a commented file of tolerances for `notchflex tolerance`; asks nothing."),
+    ] = False,
 ) -> None:
     """Ask for the calliper readings of a wrist and write a commented robot file.
 
@@ -129,15 +149,14 @@ def new(
             f"{path} is already there; choose another name, or remove it first."
         )
     check_output(str(path), "NAME")
-    if design:
-        if set_ or answers != Answers():
+    if design or tolerance:
+        option = "--design" if design else "--tolerance"
+        if set_ or answers != Answers() or (design and tolerance):
             raise InputError.CONFLICT(
-                "--design takes no other options: edit the design file that it writes."
+                f"{option} takes no other options: edit the {TEMPLATES[option].kind} that it "
+                "writes."
             )
-        write_text(path, read_text(TEMPLATE, "design file"))
-        print(
-            f"Wrote {path}. Edit it, then run: notchflex design {shlex.quote(str(path))} -o FOLDER"
-        )
+        _write_template(TEMPLATES[option], path)
         return
     settings = dict(map(_setting, set_ or ()))
     options = {f"--{key.replace('_', '-')}": answer for key, answer in vars(answers).items()}
@@ -154,6 +173,12 @@ def new(
         )
     write_text(path, text)
     print(f"Wrote {path}. Look at it with: notchflex show {shlex.quote(str(path))}")
+
+
+def _write_template(template: Template, path: Path) -> None:
+    write_text(path, read_text(_PACKAGE / template.file, template.kind))
+    command = template.command.format(shlex.quote(str(path)))
+    print(f"Wrote {path}. Edit it, then run: {command}")
 
 
 def _setting(text: str) -> tuple[str, str]:
