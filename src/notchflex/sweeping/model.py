@@ -148,7 +148,9 @@ def _middle(robot: Robot, between: Mapping[str, tuple[float, float]]) -> Robot:
         InputError: It has no such number, or the numbers make no valid robot.
     """
     try:
-        return robot.with_values({name: 0.5 * (low + high) for name, (low, high) in between.items()})
+        return robot.with_values(
+            {name: 0.5 * (low + high) for name, (low, high) in between.items()}
+        )
     except InputError as problem:
         message = f"in the middle of all variables there must be a valid robot: {problem}"
         invalid = problem.code is ErrorCode.INVALID_ROBOT
@@ -200,7 +202,13 @@ def column_name(one: Criterion, named: bool) -> str:
     step = [f"step_{one.step + 1}"] if "step " in one.name else []
     return "_".join(
         part
-        for part in [one.quantity.name, *places, unit, *([f"at_{one.load}"] if named else []), *step]
+        for part in [
+            one.quantity.name,
+            *places,
+            unit,
+            *([f"at_{one.load}"] if named else []),
+            *step,
+        ]
         if part
     )
 

@@ -78,7 +78,9 @@ class Sweep(Displayed):
     def counts(self) -> dict[str, int]:
         """How many rows have each code."""
         found = np.sum([one["codes"] for one in self.heads.values()], axis=0)
-        return dict(zip(CODES, np.broadcast_to(found, len(CODES)).astype(int).tolist(), strict=True))
+        return dict(
+            zip(CODES, np.broadcast_to(found, len(CODES)).astype(int).tolist(), strict=True)
+        )
 
     @cached_property
     def failures(self) -> list[int]:
@@ -205,7 +207,9 @@ class Sweep(Displayed):
             bins: Number of bins; that of the plan if None.
         """
         sketch = self._sketches[self._column(column)]
-        return sketch.histogram(self.plan.output.bins if bins is None else bins, self._scales[column])
+        return sketch.histogram(
+            self.plan.output.bins if bins is None else bins, self._scales[column]
+        )
 
     def _column(self, name: str) -> str:
         if name not in self.columns:

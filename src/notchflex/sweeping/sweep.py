@@ -83,9 +83,7 @@ def sweep(
     check_target(directory, [Path(one) for one in inputs])
     model = model_of(chosen, robot)
     manifest = Manifest.of(chosen, model)
-    pieces = range(
-        (first - 1) * manifest.pieces // count, first * manifest.pieces // count
-    )
+    pieces = range((first - 1) * manifest.pieces // count, first * manifest.pieces // count)
     prepare_folder(directory, manifest)
     folder = os.path.abspath(directory)
     if pieces:

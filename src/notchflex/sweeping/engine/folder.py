@@ -33,7 +33,9 @@ def manifest_in(folder: str | os.PathLike[str]) -> Manifest:
     """
     file = Path(folder) / MANIFEST
     if not Path(folder).is_dir():
-        raise InputError.FILE_NOT_FOUND(f"{folder} is no folder of a sweep: there is no such folder.")
+        raise InputError.FILE_NOT_FOUND(
+            f"{folder} is no folder of a sweep: there is no such folder."
+        )
     if not file.exists():
         raise InputError.FILE_NOT_FOUND(f"{folder} is no folder of a sweep: it has no {MANIFEST}.")
     return Manifest.read(read_text(file, "manifest"), str(file))

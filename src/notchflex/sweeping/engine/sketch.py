@@ -78,9 +78,7 @@ class Sketch:
     counts: Int[np.ndarray, " bins"] = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @classmethod
-    def of(
-        cls, values: Float[np.ndarray, " k"], start: int, scale: Scale, extremes: int
-    ) -> Sketch:
+    def of(cls, values: Float[np.ndarray, " k"], start: int, scale: Scale, extremes: int) -> Sketch:
         """Describe a column of a piece, whose first row has the number `start`; NaN is left out."""
         rows = np.arange(start, start + len(values))
         good = np.isfinite(values)

@@ -23,8 +23,12 @@ NOTCHES = Group("Notches (one value for all, or one for each, base to tip)", sor
 TENDONS = Group("Tendons (one value for each)", sort_key=3)
 MATERIAL = Group("Material and friction", sort_key=4)
 
-TEMPLATE = Path(__file__).parents[3] / "designing" / "specification" / "template.toml"
-"""The design file that `--design` writes."""
+_PACKAGE = Path(__file__).parents[3]
+TEMPLATES = {
+    "design": _PACKAGE / "designing" / "specification" / "template.toml",
+    "sweep": _PACKAGE / "sweeping" / "plan" / "template.toml",
+}
+"""The files that `--design` and `--sweep` write, by the verb that reads them."""
 
 _SECTIONS = ("notch", "tendon", "material", "friction")
 
@@ -115,6 +119,9 @@ def new(
     design: Annotated[
         bool, flag("Write a commented design file for `notchflex design` instead; asks nothing.")
     ] = False,
+    sweep: Annotated[
+        bool, flag("Write a commented plan file for `notchflex sweep` instead; asks nothing.")
+    ] = False,
 ) -> None:
     """Ask for the calliper readings of a wrist and write a commented robot file.
 
@@ -129,14 +136,15 @@ def new(
             f"{path} is already there; choose another name, or remove it first."
         )
     check_output(str(path), "NAME")
-    if design:
-        if set_ or answers != Answers():
+    if design or sweep:
+        verb = "design" if design else "sweep"
+        if set_ or answers != Answers() or (design and sweep):
             raise InputError.CONFLICT(
-                "--design takes no other options: edit the design file that it writes."
+                f"--{verb} takes no other options: edit the file that it writes."
             )
-        write_text(path, read_text(TEMPLATE, "design file"))
+        write_text(path, read_text(TEMPLATES[verb], f"{verb} file"))
         print(
-            f"Wrote {path}. Edit it, then run: notchflex design {shlex.quote(str(path))} -o FOLDER"
+            f"Wrote {path}. Edit it, then run: notchflex {verb} {shlex.quote(str(path))} -o FOLDER"
         )
         return
     settings = dict(map(_setting, set_ or ()))
