@@ -147,7 +147,7 @@ class Sweep(Displayed):
 
         if not self.finished or not self.plan.output.rows or self.manifest.rows > _MOST_XARRAY:
             raise InputError.UNSUPPORTED(
-                f"to_xarray needs all rows of a finished sweep, at most {_MOST_XARRAY:g}; use lazy()."
+                "to_xarray needs all rows of a finished sweep, at most 1e8; use lazy()."
             )
         plan, frame = self.plan, self.lazy().collect()
         axes = {one.value: axis_values(one) for one in plan.grid}

@@ -122,7 +122,7 @@ def entries_of(
         index = tuple(choice[one] for choice, one in zip(choices, place, strict=True))
         if not np.isfinite(values[index]):  # beyond the end of a tendon
             continue
-        words = " ".join([entry_words(limit.quantity, quantity.per, index), ", ".join(at)]).strip()
+        words = " ".join([_entry(limit.quantity, quantity.per, index), ", ".join(at)]).strip()
         yield Criterion(words, quantity, load, step - 1, index, lower, upper)
 
 
@@ -142,7 +142,7 @@ def _places(limit: Limited, axis: str, size: int) -> Sequence[int]:
     return [number - first]
 
 
-def entry_words(name: str, per: tuple[str, ...], index: tuple[int, ...]) -> str:
+def _entry(name: str, per: tuple[str, ...], index: tuple[int, ...]) -> str:
     words = [
         AXES[place] if axis == "axis" else str(place + FIRST.get(axis, 1))
         for axis, place in zip(per, index, strict=True)

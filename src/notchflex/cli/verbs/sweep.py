@@ -149,7 +149,7 @@ def _look(
     """Print a sweep that is there, or draw it."""
     if plot is None and output is not None:
         raise InputError.CONFLICT(
-            f"{folder} is the folder of a sweep; -o is for plan files, or for the picture of --plot."
+            f"{folder} is the folder of a sweep; -o is for plan files, or for --plot."
         )
     if plot is not None:
         if output is None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from notchflex.errors import InputError
 from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import BELOW, Area, Curve, Mark, Panel, dots, grid
+from notchflex.plotting.sheet import BESIDE, Area, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, ORANGE, VERMILLION
 from notchflex.robot.error_messages import nearest
 from notchflex.robot.value_names import described_at
@@ -38,6 +38,8 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
     Raises:
         InputError: There is no such column, or no row.
     """
+    import polars
+
     frame = found.lazy()
     columns = [one for one in frame.collect_schema().names() if one != "code"]
     for name in (x, y):
@@ -46,8 +48,12 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
                 f'the sweep has no column "{name}"{nearest(name, columns)}; there are '
                 f"{', '.join(columns)}."
             )
-    step = -(-found.rows // MOST_POINTS) if found.plan.output.rows else 1
-    table = frame.select("row", "code", x=x, y=y).gather_every(step).collect()
+    if found.rows > MOST_POINTS and found.plan.output.rows:
+        # Every k-th row would be a regular part of a grid or of a Sobol sequence.
+        scattered = polars.col("row") % 2**31 * 2_654_435_761 % 2**32
+        frame = frame.filter(scattered < 2**32 * MOST_POINTS // found.rows)
+    table = frame.select("row", "code", polars.col(x).alias("x"), polars.col(y).alias("y"))
+    table = table.collect()
     code = table["code"].cast(str).to_numpy()
     both = table.select("x", "y").cast(float).to_numpy()
     good = np.isfinite(both).all(axis=1)
@@ -65,7 +71,7 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
         floor = both[good, 1].min() if good.any() else 0.0
         places = np.column_stack([both[lost, 0], np.full(lost.sum(), floor)])
         items.append(dots(places, VERMILLION, 4.0, name="no result", group="lost", marker="X"))
-    panel = Panel(items, _label(found, x), _label(found, y), legend=BELOW)
+    panel = Panel(items, _label(found, x), _label(found, y), legend=BESIDE)
     title = f"{found.plan.name}: {found.rows} rows"
     return Picture(title, 6.4, 4.8, grid([panel], 1))
 

@@ -21,9 +21,9 @@ from notchflex.sweeping.plan.parts import SweepPlan
 from notchflex.sweeping.plan.reading import plan_from_table, plan_table
 
 FORMAT = 1
-_PIECES = 64
+_PIECES = 16
 """A sweep is cut into about so many pieces, unless they would be too small or too large."""
-_LEAST, _MOST = 2**10, 2**18
+_LEAST, _MOST = 2**12, 2**18
 _MOST_BYTES = 2**27
 """What the solver returns of one piece at most, so that a worker needs less than 1 GiB."""
 

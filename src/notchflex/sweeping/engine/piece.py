@@ -86,13 +86,16 @@ class Worker:
     def _head(self, piece: int, start: int, found: Outcomes) -> dict[str, Any]:
         output = self.plan.output
         failed = np.flatnonzero(found.codes >= FAILED)[: output.failures] + start
-        columns = zip(self.model.columns, found.values.T, self.scales, strict=True)
+        names = list(self.model.columns)
+        columns = zip(names, found.values.T, self.scales, strict=True)
         return {
             "sweep": self.manifest.digest,
             "piece": piece,
             "codes": np.bincount(found.codes, minlength=len(CODES)).tolist(),
             "failures": failed.tolist(),
-            "scales": {name: [one.middle, one.half] for name, one in zip(self.model.columns, self.scales, strict=True)},
+            "scales": {
+                name: [one.middle, one.half] for name, one in zip(names, self.scales, strict=True)
+            },
             "columns": {
                 name: Sketch.of(np.ascontiguousarray(values), start, scale, output.extremes)
                 .document()
