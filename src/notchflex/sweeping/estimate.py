@@ -60,7 +60,7 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
     need("polars", "data", "sweep")
     chosen, robot = plan_and_robot(plan)
     model = model_of(chosen, robot)
-    manifest = Manifest.of(chosen, model)
+    manifest = Manifest.of(chosen, robot, model)
     worker = Worker(manifest, model)
     assert worker.scales
     start = time.perf_counter()

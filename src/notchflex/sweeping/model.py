@@ -44,12 +44,10 @@ class SweepModel(Study):
     """A study whose robots lie between limits, with polynomials that depend on the plan alone.
 
     Attributes:
-        source: The robot as the plan names it; `robot` is that in the middle of the limits.
         between: The limits, by name.
         sample: Numbers of some rows from all over the sweep.
     """
 
-    source: Robot | None = None
     between: Mapping[str, tuple[float, float]] = dataclasses.field(
         default_factory=dict[str, tuple[float, float]]
     )
@@ -137,7 +135,7 @@ def model_of(plan: SweepPlan, robot: Robot) -> SweepModel:
         raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
     return SweepModel(
         base, (), paths, tuple(criteria.values()), None, plan.refinement, 1,
-        source=robot, between=between, sample=_sample(plan),
+        between=between, sample=_sample(plan),
     )  # fmt: skip
 
 

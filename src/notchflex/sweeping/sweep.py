@@ -82,7 +82,7 @@ def sweep(
     inputs = [plan] if isinstance(plan, str | os.PathLike) else []
     check_target(directory, [Path(one) for one in inputs])
     model = model_of(chosen, robot)
-    manifest = Manifest.of(chosen, model)
+    manifest = Manifest.of(chosen, robot, model)
     pieces = range((first - 1) * manifest.pieces // count, first * manifest.pieces // count)
     prepare_folder(directory, manifest)
     folder = os.path.abspath(directory)

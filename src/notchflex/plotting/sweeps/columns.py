@@ -55,7 +55,7 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
     table = frame.select("row", "code", polars.col(x).alias("x"), polars.col(y).alias("y"))
     table = table.collect()
     code = table["code"].cast(str).to_numpy()
-    both = table.select("x", "y").cast(float).to_numpy()
+    both = table.select("x", "y").cast(polars.Float64).to_numpy()
     good = np.isfinite(both).all(axis=1)
     if not np.isfinite(both[:, 0]).any():
         raise InputError.NO_DATA(f"no row has a number of {x}.")

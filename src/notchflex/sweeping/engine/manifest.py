@@ -50,18 +50,23 @@ class Manifest:
     document: Mapping[str, Any]
 
     @classmethod
-    def of(cls, plan: SweepPlan, model: SweepModel) -> Manifest:
-        """Make the manifest of a plan."""
+    def of(cls, plan: SweepPlan, robot: Robot, model: SweepModel) -> Manifest:
+        """Make the manifest of a plan.
+
+        Args:
+            plan: The plan.
+            robot: The robot that it names.
+            model: The model of both.
+        """
         size = plan.piece or _piece_rows(plan.rows, _row_bytes(model))
         table = plan_table(plan)
-        robot = to_table(model.source)
         document = {
             "program": "notchflex",
             "kind": "sweep",
             "format": FORMAT,
             "versions": versions(),
             "plan": {key: value for key, value in table.items() if key != "robot"},
-            "robot": robot,
+            "robot": to_table(robot),
             "rows": plan.rows,
             "piece": size,
             "pieces": -(-plan.rows // size),

@@ -57,7 +57,7 @@ def local_cluster(workers: int) -> Generator[Any]:
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            dashboard_address=None,
+            dashboard_address=None,  # pyright: ignore[reportArgumentType] - no dashboard
             silence_logs=50,
         ) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
@@ -108,7 +108,7 @@ def on_cluster(client: Any, text: str, folder: str, pieces: Iterable[int]) -> Ge
     lost: Counter[int] = Counter()
     waiting = iter(pieces)
     running: dict[Any, int] = {}
-    finished = distributed.as_completed()
+    finished = distributed.as_completed(loop=client.loop)
 
     def submit(numbers: Iterator[int]) -> None:
         for piece in numbers:
@@ -133,7 +133,7 @@ def on_cluster(client: Any, text: str, folder: str, pieces: Iterable[int]) -> Ge
                 continue
             submit(islice(waiting, 1))
             yield done
-    except (distributed.comm.CommClosedError, distributed.CancelledError, OSError) as problem:
+    except (distributed.CancelledError, OSError) as problem:
         words = " ".join(str(problem).split())[:100]
         raise InputError.NO_CONNECTION(
             f"the scheduler is gone ({words}); all finished pieces are kept: start it again, and "

@@ -148,10 +148,11 @@ class Sketch:
     @classmethod
     def read(cls, document: dict[str, Any]) -> Sketch:
         """Make a description of its plain values."""
-        pairs = {
+        changed: dict[str, Any] = {
             key: [(value, row) for value, row in document[key]] for key in ("smallest", "largest")
         }
-        return cls(**{**document, **pairs, "counts": np.array(document["counts"], np.int64)})
+        changed["counts"] = np.array(document["counts"], np.int64)
+        return cls(**(document | changed))
 
 
 def _least(
