@@ -77,7 +77,7 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
     return Estimate(
         manifest.rows, manifest.pieces, manifest.document["piece"], cores, each,
         each * manifest.rows / cores, size, shutil.disk_usage(".").free, solved,
-        sum(head["codes"][FAILED:]), None in model.chains.values(),
+        sum(head["codes"][FAILED:]), model.one_by_one,
     )  # fmt: skip
 
 

@@ -71,6 +71,11 @@ class SweepModel(Study):
             for name, load in self.loads.items()
         }
 
+    @property
+    def one_by_one(self) -> bool:
+        """Whether robots are assembled one by one, under any load."""
+        return None in self.chains.values()
+
     @cached_property
     def columns(self) -> dict[str, Criterion]:
         """The kept numbers by the names of their columns."""

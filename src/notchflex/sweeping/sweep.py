@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from pathlib import Path
 
 from notchflex._extras import need
-from notchflex.errors import InputError
+from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.validation import check_integer, short_repr
 from notchflex.robot import Robot, load_robot
 from notchflex.sweeping.engine.folder import (
@@ -93,8 +93,14 @@ def sweep(
             there = [one for one in found if one is not None]
             left = [piece for piece, one in zip(pieces, found, strict=True) if one is None]
             worker = Worker(manifest, model)
-            with _running(worker, folder, left, workers, scheduler) as running:
-                _watch(running, there, manifest, pieces, progress)
+            try:
+                with _running(worker, folder, left, workers, scheduler) as running:
+                    _watch(running, there, manifest, pieces, progress)
+            except InputError as problem:
+                if problem.code is not ErrorCode.FILE_UNWRITABLE:
+                    raise
+                message = f"{problem} All finished pieces are kept: make room, and call again."
+                raise InputError.FILE_UNWRITABLE(message) from None
             tidy(folder, pieces.start, pieces.stop)
     result = read_sweep(directory)
     if result.finished:

@@ -24,6 +24,9 @@ FORMAT = 1
 _PIECES = 16
 """A sweep is cut into about so many pieces, unless they would be too small or too large."""
 _LEAST, _MOST = 2**12, 2**18
+_MOST_SLOW = 2**12
+"""Rows of a piece at most where robots are assembled one by one, which takes a thousand times as
+long: a piece that is lost, or waited for, is then no longer either."""
 _MOST_BYTES = 2**27
 """What the solver returns of one piece at most, so that a worker needs less than 1 GiB."""
 
@@ -58,7 +61,7 @@ class Manifest:
             robot: The robot that it names.
             model: The model of both.
         """
-        size = plan.piece or _piece_rows(plan.rows, _row_bytes(model))
+        size = plan.piece or _piece_rows(plan.rows, _row_bytes(model), model.one_by_one)
         table = plan_table(plan)
         document = {
             "program": "notchflex",
@@ -192,8 +195,8 @@ def _row_bytes(model: SweepModel) -> int:
     return 8 * sum(sizes.values())
 
 
-def _piece_rows(rows: int, row_bytes: int) -> int:
+def _piece_rows(rows: int, row_bytes: int, slow: bool) -> int:
     """Return the rows of a piece, a power of two."""
     size = 2 ** math.ceil(math.log2(max(rows / _PIECES, 1)))
     most = 2 ** int(math.log2(max(_MOST_BYTES / row_bytes, 16)))
-    return min(max(size, _LEAST), _MOST, most)
+    return min(max(size, _LEAST), _MOST_SLOW if slow else _MOST, most)

@@ -89,10 +89,12 @@ class Sketch:
         bins = scale.bins(values)
         first = int(bins.min())
         moved = values - scale.middle
+        with np.errstate(over="ignore"):
+            total, squares = float(moved.sum()), float(np.square(moved).sum())
         return cls(
             len(values),
-            float(moved.sum()),
-            float(moved @ moved),
+            total,
+            squares,
             _least(values, rows, max(extremes, 1)),
             [(-value, row) for value, row in _least(-values, rows, max(extremes, 1))],
             first,
@@ -127,7 +129,7 @@ class Sketch:
             return math.nan
         wanted = part * self.count
         below = np.concatenate([[0], np.cumsum(self.counts)])
-        place = min(int(np.searchsorted(below, wanted, side="right")), len(self.counts)) - 1
+        place = max(int(np.searchsorted(below, wanted)) - 1, 0)
         inside = (wanted - below[place]) / max(int(self.counts[place]), 1)
         value = float(scale.edge(np.array(self.first + place + inside)))
         return min(max(value, self.smallest[0][0]), self.largest[0][0])
