@@ -196,7 +196,11 @@ def kills(count: int, rows: int, seed: int) -> None:
                     code = cluster.processes["client"].wait(timeout=600)
             finally:
                 cluster.stop()
-            same = digests(folder) == wanted
+            found = digests(folder)
+            same = found == wanted
+            for name in sorted({*found, *wanted}):
+                if found.get(name) != wanted.get(name):
+                    print(f"  {name}: {found.get(name)} for {wanted.get(name)}", flush=True)
             wrong += not same
             print(f"round {rounds + 1}: {'identical' if same else 'DIFFERENT'}", flush=True)
             rounds += 1

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
-import multiprocessing
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,30 +19,7 @@ import notchflex as nf
 from notchflex.cli import run
 from notchflex.sweeping.engine import piece as pieces
 from notchflex.sweeping.engine.folder import locked
-
-TABLE: dict[str, Any] = {
-    "robot": "pacheco2021-a",
-    "piece": 32,
-    "variable": [
-        {"value": "notch.depth", "lower": 1.36, "upper": 1.42},
-        {"value": "friction.coefficient", "values": [0.0, 0.1]},
-    ],
-    "sampling": {"points": 100, "seed": 4},
-    "load": {"pulled": {"tension": "0:1:3"}},
-    "keep": [{"quantity": "total_angle", "upper": 60.0}, {"quantity": "notch_angle", "notch": 2}],
-    "output": {"extremes": 3},
-}
-
-
-def plan(**changes: Any) -> nf.SweepPlan:
-    return nf.SweepPlan(**(TABLE | changes))
-
-
-def digests(folder: Path) -> dict[str, str]:
-    files = sorted(one for one in folder.rglob("*") if one.is_file())
-    names = [str(one.relative_to(folder)) for one in files]
-    sums = [hashlib.sha256(one.read_bytes()).hexdigest() for one in files]
-    return dict(zip(names, sums, strict=True))
+from swept import TABLE, digests, plan
 
 
 @pytest.fixture(scope="module")
@@ -169,28 +146,31 @@ def test_another_plan_version_or_robot_is_refused(whole, tmp_path, monkeypatch, 
     assert digests(whole) == before
 
 
-def hold(folder: str, ready: Any, end: Any) -> None:
-    with locked(folder, 0, 7):
-        ready.set()
-        end.wait(60)
+HOLD = """
+import fcntl, sys
+file = open(sys.argv[1], "ab")
+fcntl.lockf(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB, 2, 3)
+print("held", flush=True)
+sys.stdin.read()
+"""
 
 
-def test_two_at_once_on_one_folder(whole, tmp_path, refused):
-    """Another process holds the folder; a folder held by this process is refused too."""
-    context = multiprocessing.get_context("spawn")
-    ready, end = context.Event(), context.Event()
-    other = context.Process(target=hold, args=(str(whole), ready, end))
-    other.start()
-    try:
-        assert ready.wait(60)
+def test_two_at_once_on_one_folder(whole, refused):
+    """Another process holds pieces 3 and 4 of seven; what this process holds is refused too."""
+    pytest.importorskip("fcntl")
+    command = [sys.executable, "-c", HOLD, str(whole / ".lock")]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "held\n"
         refused("CONFLICT", "two at once", plan(), whole)
-        refused("CONFLICT", "two at once, a part", plan(), whole, part=(7, 7))
-    finally:
-        end.set()
-        other.join()
+        refused("CONFLICT", "two at once, a part", plan(), whole, part=(4, 7))
+        nf.sweep(plan(), whole, part=(7, 7))
+        other.communicate("")
     with locked(whole, 0, 2):
         refused("CONFLICT", "two at once in a process", plan(), whole)
-        nf.sweep(plan(), whole, part=(7, 7))  # other pieces
+        nf.sweep(plan(), whole, part=(7, 7))
     nf.sweep(plan(), whole)
 
 
@@ -204,23 +184,42 @@ def test_a_full_disk_loses_nothing(whole, tmp_path, refused):
     assert digests(folder) == digests(whole)
 
 
-def test_failures_are_rows_with_codes(tmp_path):
-    """A notch deeper than the tube is no robot, and beyond some stroke there is no result."""
+def test_failures_are_rows_with_codes(tmp_path, capsys):
+    """A notch deeper than the tube is no robot; where all are, the exit code is 1."""
+    depths = {"value": "notch.depth", "values": [-0.1, 1.7]}
+    changes = {"variable": [depths], "sampling": None, "keep": [{"quantity": "total_angle"}]}
+    with pytest.raises(nf.InputError):
+        plan(**changes, output={"rows": "all"})
+    found = nf.sweep(plan(**changes), tmp_path / "none")
+    rows = found.lazy().collect()
+    assert rows["code"].to_list() == ["INVALID_ROBOT"] * 2
+    assert rows["total_angle_deg"].to_list() == [None, None]
+    assert found.counts["INVALID_ROBOT"] == 2
+    assert found.first_failures()["row"].to_list() == [0, 1]
+    file = tmp_path / "plan.toml"
+    table = {key: value for key, value in (TABLE | changes).items() if value is not None}
+    file.write_text(tomlkit.dumps(table), encoding="utf-8")
+    assert run(["sweep", str(file), "-o", str(tmp_path / "again")]) == 1
+    assert "2 of 2 rows have no result" in capsys.readouterr().err
+
+
+@pytest.mark.nightly
+def test_failures_among_results(tmp_path):
+    """Beyond some stroke the notches are closed, and there is no result."""
     changes: dict[str, Any] = {
-        "variable": [{"value": "notch.depth", "values": [1.38, 1.4, 1.41, 1.42, 1.7]}],
+        "variable": [{"value": "notch.height", "values": [0.1, 0.2, 1.0, 1.2, -0.9]}],
         "sampling": None,
         "load": {"drawn": {"stroke": 2.0}},
         "keep": [{"quantity": "total_angle"}],
     }
-    with pytest.raises(nf.InputError):  # in the middle there is a robot, but none that is whole
-        nf.sweep(plan(**changes, output={"rows": "all"}), tmp_path / "bad")
     found = nf.sweep(plan(**changes), tmp_path / "failures")
     rows = found.lazy().collect()
-    assert len(rows) == 5
-    assert rows["code"].to_list()[-1] == "INVALID_ROBOT"
-    assert rows["total_angle_deg"].to_list()[-1] is None
-    assert found.counts["INVALID_ROBOT"] == 1
-    assert 4 in found.first_failures()["row"].to_list()
+    codes = ["NOT_CONVERGED", "NOT_CONVERGED", "accepted", "accepted", "INVALID_ROBOT"]
+    assert rows["code"].to_list() == codes
+    assert rows["total_angle_deg"].is_null().to_list() == [True, True, False, False, True]
+    robot = nf.load_robot("pacheco2021-a").with_value("notch.height", 1.2)
+    path = nf.simulate(robot, nf.LoadPath(np.array([[np.nan]]), np.array([[2.0]])))
+    assert np.isclose(rows["total_angle_deg"][3], np.degrees(path.total_angle[-1]), rtol=1e-9)
 
 
 def test_without_rows_only_extremes_and_failures_are_kept(whole, tmp_path):

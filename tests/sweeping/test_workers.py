@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 import tomlkit
-from test_sweep import TABLE, digests, plan
 
 import notchflex as nf
+from swept import TABLE, digests, plan
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.nightly
@@ -92,6 +92,9 @@ def test_workers_of_this_machine_and_a_killed_client(many, tmp_path, start):
     while len(list((folder / "pieces").glob("piece-*"))) < 20:
         assert client.poll() is None
         time.sleep(0.05)
+    with pytest.raises(nf.InputError) as caught:  # two clients at once
+        nf.sweep(plan(**MANY), folder)
+    assert caught.value.code.name == "CONFLICT"
     os.kill(client.pid, signal.SIGKILL)
     client.wait()
     nf.sweep(plan(**MANY), folder, workers=4)
