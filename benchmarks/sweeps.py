@@ -35,19 +35,19 @@ OUTPUTS = ("total_angle", "tip_position", "converged")
 CHUNK = 1_000_000
 
 
-def plan(rows: int, piece: int | None = None) -> nf.SweepPlan:
+def plan(rows: int) -> nf.SweepPlan:
     """Return the plan: depth and height of the notches of wrist A, under 1 N."""
-    return nf.SweepPlan(
-        robot="pacheco2021-a",
-        piece=piece,
-        variable=[
+    table: dict[str, Any] = {
+        "robot": "pacheco2021-a",
+        "variable": [
             {"value": "notch.depth", "lower": 1.36, "upper": 1.42},
             {"value": "notch.height", "lower": 0.8, "upper": 1.2},
-        ],  # pyright: ignore[reportArgumentType]
-        sampling={"points": rows},  # pyright: ignore[reportArgumentType]
-        load={"pulled": {"tension": 1.0}},
-        keep=[{"quantity": "total_angle"}, {"quantity": "tip_position", "axis": "x"}],  # pyright: ignore[reportArgumentType]
-    )
+        ],
+        "sampling": {"points": rows},
+        "load": {"pulled": {"tension": 1.0}},
+        "keep": [{"quantity": "total_angle"}, {"quantity": "tip_position", "axis": "x"}],
+    }
+    return nf.SweepPlan(**table)
 
 
 def spent() -> float:

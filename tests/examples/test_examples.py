@@ -285,3 +285,18 @@ def test_follow_with_hysteresis(margin):
         at = np.argsort(total[branch], kind="stable")
         expected = np.interp(angle[target], total[branch][at], tension[branch][at])
         margin.within("tension", found.tension[target, 0] - expected, 1e-4, "N")
+
+
+def test_sweep_of_designs():
+    """The best wrist has the same angle and strain as by itself; its neighbours are no better."""
+    names, printed = ran(18)
+    best, rows = names["best"], names["rows"]
+    wrist = nf.load_robot("pacheco2021-a")
+    for one in (best, rows.row(-1, named=True)):
+        values = {name: one[name] for name in ("notch.depth", "notch.height")}
+        state = nf.solve(wrist.with_values(values), nf.Load(tension=1.0))
+        assert np.degrees(state.total_angle) == pytest.approx(one["total_angle_deg"], rel=2e-5)
+        assert state.peak_strain[0] == pytest.approx(one["peak_strain_1"], rel=2e-5)
+    assert rows["total_angle_deg"].is_between(55.0, 65.0).all()
+    assert len(rows) == names["found"].counts["accepted"]
+    assert f"{len(rows)} of 4096" in printed

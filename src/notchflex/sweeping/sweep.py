@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from notchflex._extras import need
 from notchflex.errors import ErrorCode, InputError
@@ -23,6 +24,7 @@ from notchflex.sweeping.engine.piece import Done, Worker
 from notchflex.sweeping.engine.running import in_threads, local_cluster, on_cluster, scheduler_at
 from notchflex.sweeping.model import model_of
 from notchflex.sweeping.plan import SweepPlan, read_plan
+from notchflex.sweeping.plan.reading import plan_from_table
 from notchflex.sweeping.result import Sweep, read_sweep, write_summary
 
 Progress = Callable[[int, int, int, int], None]
@@ -30,7 +32,7 @@ Progress = Callable[[int, int, int, int], None]
 
 
 def sweep(
-    plan: SweepPlan | str | os.PathLike[str],
+    plan: SweepPlan | Mapping[str, Any] | str | os.PathLike[str],
     directory: str | os.PathLike[str],
     *,
     workers: int | None = None,
@@ -44,7 +46,7 @@ def sweep(
     it was. The files do not depend on who works on the pieces, and in which order.
 
     Args:
-        plan: The plan, or the file that holds it.
+        plan: The plan, or the file that holds it; or its tables, as in the file.
         directory: The folder of the sweep; it is made if it is missing.
         workers: Number of processes of dask on this machine; threads of this process if None.
         scheduler: Address of a scheduler of dask, whose workers see the same folder.
@@ -69,7 +71,7 @@ def sweep(
         ...     "keep": [{"quantity": "total_angle"}],
         ... }
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     nf.sweep(nf.SweepPlan(**table), folder).rows
+        ...     nf.sweep(table, folder).rows
         7
     """
     need("polars", "data", "sweep")
@@ -108,12 +110,16 @@ def sweep(
     return result
 
 
-def plan_and_robot(plan: SweepPlan | str | os.PathLike[str]) -> tuple[SweepPlan, Robot]:
+def plan_and_robot(
+    plan: SweepPlan | Mapping[str, Any] | str | os.PathLike[str],
+) -> tuple[SweepPlan, Robot]:
     """Return a plan and the robot that it names.
 
     Raises:
         InputError: It is no plan, or its file or its robot cannot be read.
     """
+    if isinstance(plan, Mapping):
+        plan = plan_from_table(plan)
     if isinstance(plan, SweepPlan):
         return plan, load_robot(plan.robot)
     if not isinstance(plan, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]

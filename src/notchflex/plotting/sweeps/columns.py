@@ -16,7 +16,7 @@ from notchflex.robot.value_names import described_at
 if TYPE_CHECKING:
     from notchflex.sweeping import Sweep
 
-MOST_POINTS = 4000
+MOST_POINTS = 2000
 """Rows that are drawn; of more, an even selection."""
 
 _BINS = 24
