@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -42,12 +41,20 @@ class Sweep(Displayed):
     Attributes:
         directory: The folder.
         manifest: What the sweep is.
-        heads: What is summed up of every piece that is there, by its number.
+        pieces: Numbers of the pieces that are there.
+        counts: How many rows have each code.
+        failures: Numbers of the first rows without a result, as many as the plan asks for.
+        sketches: Statistics of every kept quantity.
+        scales: Scales of the statistics.
     """
 
     directory: Path
     manifest: Manifest
-    heads: dict[int, dict[str, Any]]
+    pieces: tuple[int, ...]
+    counts: dict[str, int]
+    failures: list[int]
+    sketches: dict[str, Sketch]
+    scales: dict[str, Scale]
 
     @property
     def plan(self) -> SweepPlan:
@@ -62,46 +69,17 @@ class Sweep(Displayed):
     @property
     def rows(self) -> int:
         """Rows that are there."""
-        return sum(b - a for a, b in map(self.manifest.between, self.heads))
+        return sum(b - a for a, b in map(self.manifest.between, self.pieces))
 
     @property
     def finished(self) -> bool:
         """Whether all pieces are there."""
-        return len(self.heads) == self.manifest.pieces
+        return len(self.pieces) == self.manifest.pieces
 
     @property
     def columns(self) -> list[str]:
         """Names of the kept quantities, with their units."""
         return self.manifest.document["columns"]
-
-    @cached_property
-    def counts(self) -> dict[str, int]:
-        """How many rows have each code."""
-        found = np.sum([one["codes"] for one in self.heads.values()], axis=0)
-        return dict(
-            zip(CODES, np.broadcast_to(found, len(CODES)).astype(int).tolist(), strict=True)
-        )
-
-    @cached_property
-    def failures(self) -> list[int]:
-        """Numbers of the first rows without a result, as many as the plan asks for."""
-        found = [row for one in self.heads.values() for row in one["failures"]]
-        return found[: self.plan.output.failures]
-
-    @cached_property
-    def _scales(self) -> dict[str, Scale]:
-        first = next(iter(self.heads.values()), None)
-        if first is None:
-            return {}
-        return {name: Scale(*pair) for name, pair in first["scales"].items()}
-
-    @cached_property
-    def _sketches(self) -> dict[str, Sketch]:
-        found: dict[str, Sketch] = {name: Sketch() for name in self.columns}
-        for head in self.heads.values():
-            for name, document in head["columns"].items():
-                found[name] = found[name].merged(Sketch.read(document), self.plan.output.extremes)
-        return found
 
     def lazy(self) -> LazyFrame:
         """Return the rows as a lazy frame of polars, in their order.
@@ -115,15 +93,15 @@ class Sweep(Displayed):
         """
         import polars
 
-        if not self.heads:
+        if not self.pieces:
             raise InputError.NO_DATA(f"{self.directory} has no finished piece yet.")
-        files = [piece_file(self.directory, piece) for piece in self.heads]
+        files = [piece_file(self.directory, piece) for piece in self.pieces]
         if not self.plan.output.rows:
             return polars.scan_parquet(files)
         if self.finished and self.manifest.rows < 2**32:  # an index of polars has 32 bits
             row = polars.col("row").cast(polars.Int64)
             return polars.scan_parquet(files).with_row_index("row").with_columns(row)
-        return polars.concat([self._numbered(piece) for piece in self.heads])
+        return polars.concat([self._numbered(piece) for piece in self.pieces])
 
     def _numbered(self, piece: int) -> LazyFrame:
         """Return the rows of a piece with their numbers."""
@@ -178,7 +156,7 @@ class Sweep(Displayed):
         """
         import polars
 
-        sketch = self._sketches[self._column(column)]
+        sketch = self.sketches[self._column(column)]
         pairs = (sketch.largest if largest else sketch.smallest)[: self.plan.output.extremes]
         return self._rows([row for _, row in pairs]).sort(
             polars.col(column), descending=largest, maintain_order=True
@@ -195,9 +173,9 @@ class Sweep(Displayed):
             column: Name of the quantity, as in `columns`.
             parts: Numbers between 0 and 1; those of the plan if None.
         """
-        sketch = self._sketches[self._column(column)]
+        sketch = self.sketches[self._column(column)]
         wanted = self.plan.output.quantiles if parts is None else parts
-        return [sketch.quantile(part, self._scales[column]) for part in wanted]
+        return [sketch.quantile(part, self.scales[column]) for part in wanted]
 
     def histogram(self, column: str, bins: int | None = None) -> tuple[list[float], list[int]]:
         """Return edges and counts of a histogram of a kept quantity.
@@ -206,9 +184,9 @@ class Sweep(Displayed):
             column: Name of the quantity, as in `columns`.
             bins: Number of bins; that of the plan if None.
         """
-        sketch = self._sketches[self._column(column)]
+        sketch = self.sketches[self._column(column)]
         return sketch.histogram(
-            self.plan.output.bins if bins is None else bins, self._scales[column]
+            self.plan.output.bins if bins is None else bins, self.scales[column]
         )
 
     def _column(self, name: str) -> str:
@@ -234,11 +212,11 @@ class Sweep(Displayed):
     def document(self) -> dict[str, Any]:
         """Return what is summed up of all rows, as plain values."""
         columns: dict[str, Any] = {}
-        for name, one in self._sketches.items():
+        for name, one in self.sketches.items():
             edges, counts = self.histogram(name)
             mean = one.total / one.count if one.count else math.nan
             variance = max(one.squares / one.count - mean**2, 0.0) if one.count else math.nan
-            scale = self._scales.get(name, Scale(0.0, 1.0))
+            scale = self.scales.get(name, Scale(0.0, 1.0))
             columns[name] = {
                 "count": one.count,
                 "mean": mean + scale.middle,
@@ -259,7 +237,7 @@ class Sweep(Displayed):
             "version": self.manifest.document["versions"]["notchflex"],
             "robot": self.robot.name,
             "rows": self.rows,
-            "pieces": len(self.heads),
+            "pieces": len(self.pieces),
             "finished": self.finished,
             "codes": self.counts,
             "first_failures": self.failures,
@@ -270,7 +248,7 @@ class Sweep(Displayed):
         done = "" if self.finished else f" of {self.manifest.rows}"
         title = f"Sweep {self.plan.name}: {self.rows}{done} rows"
         rows = [(code, str(count)) for code, count in self.counts.items() if count]
-        for name, one in self._sketches.items():
+        for name, one in self.sketches.items():
             if one.count:
                 rows.append((name, f"{short(one.smallest[0][0])} to {short(one.largest[0][0])}"))
         return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
@@ -290,13 +268,25 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
     """
     need("polars", "data", "read_sweep")
     manifest = manifest_in(directory)
-    heads: dict[int, dict[str, Any]] = {}
+    output = manifest.plan.output
+    pieces: list[int] = []
+    codes = np.zeros(len(CODES), int)
+    failures: list[int] = []
+    sketches = {name: Sketch() for name in manifest.document["columns"]}
+    scales: dict[str, Scale] = {}
     for piece in range(manifest.pieces):
         file = piece_file(directory, piece)
-        head = head_of(file) if file.exists() else None
-        if head is not None and head["sweep"] == manifest.digest and head["piece"] == piece:
-            heads[piece] = head
-    return Sweep(Path(directory), manifest, heads)
+        head = head_of(file, manifest, piece)
+        if head is None:
+            continue
+        pieces.append(piece)
+        codes += np.array(head["codes"])
+        failures += head["failures"][: output.failures - len(failures)]
+        scales = {name: Scale(*pair) for name, pair in head["scales"].items()}
+        for name, document in head["columns"].items():
+            sketches[name] = sketches[name].merged(Sketch.read(document), output.extremes)
+    counts: dict[str, int] = dict(zip(CODES, codes.tolist(), strict=True))
+    return Sweep(Path(directory), manifest, tuple(pieces), counts, failures, sketches, scales)
 
 
 def write_summary(found: Sweep) -> None:

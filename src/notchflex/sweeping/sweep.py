@@ -8,6 +8,8 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from notchflex._extras import need
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.validation import check_integer, short_repr
@@ -83,31 +85,45 @@ def sweep(
     chosen, robot = plan_and_robot(plan)
     inputs = [plan] if isinstance(plan, str | os.PathLike) else []
     check_target(directory, [Path(one) for one in inputs])
-    model = model_of(chosen, robot)
-    manifest = Manifest.of(chosen, robot, model)
-    pieces = range((first - 1) * manifest.pieces // count, first * manifest.pieces // count)
-    prepare_folder(directory, manifest)
-    folder = os.path.abspath(directory)
-    if pieces:
-        with locked(folder, pieces.start, pieces.stop):
-            tidy(folder, pieces.start, pieces.stop)
-            found = [done_piece(folder, manifest, piece) for piece in pieces]
-            there = [one for one in found if one is not None]
-            left = [piece for piece, one in zip(pieces, found, strict=True) if one is None]
-            worker = Worker(manifest, model)
-            try:
-                with _running(worker, folder, left, workers, scheduler) as running:
-                    _watch(running, there, manifest, pieces, progress)
-            except InputError as problem:
-                if problem.code is not ErrorCode.FILE_UNWRITABLE:
-                    raise
-                message = f"{problem} All finished pieces are kept: make room, and call again."
-                raise InputError.FILE_UNWRITABLE(message) from None
-            tidy(folder, pieces.start, pieces.stop)
+    # Products of matrices by several threads may have other last digits.
+    with threadpool_limits(1):
+        model = model_of(chosen, robot)
+        manifest = Manifest.of(chosen, robot, model)
+        pieces = range((first - 1) * manifest.pieces // count, first * manifest.pieces // count)
+        prepare_folder(directory, manifest)
+        if pieces:
+            with locked(directory, pieces.start, pieces.stop):
+                worker = Worker(manifest, model)
+                _work_on(worker, os.path.abspath(directory), pieces, workers, scheduler, progress)
     result = read_sweep(directory)
     if result.finished:
         write_summary(result)
     return result
+
+
+def _work_on(
+    worker: Worker,
+    folder: str,
+    pieces: range,
+    workers: int | None,
+    scheduler: str | None,
+    progress: Progress | None,
+) -> None:
+    """Work on those of the pieces that are not there."""
+    manifest = worker.manifest
+    tidy(folder, pieces.start, pieces.stop)
+    found = [done_piece(folder, manifest, piece) for piece in pieces]
+    there = [one for one in found if one is not None]
+    left = [piece for piece, one in zip(pieces, found, strict=True) if one is None]
+    try:
+        with _running(worker, folder, left, workers, scheduler) as running:
+            _watch(running, there, manifest, pieces, progress)
+    except InputError as problem:
+        if problem.code is not ErrorCode.FILE_UNWRITABLE:
+            raise
+        message = f"{problem} All finished pieces are kept: make room, and call again."
+        raise InputError.FILE_UNWRITABLE(message) from None
+    tidy(folder, pieces.start, pieces.stop)
 
 
 def plan_and_robot(
@@ -175,8 +191,7 @@ def _watch(
     """Count what is done."""
     before = done = sum(one.rows for one in there)
     unsolved = sum(one.unsolved for one in there)
-    last = manifest.between(pieces.stop - 1)[1] if pieces else 0
-    total = last - manifest.between(pieces.start)[0] if pieces else 0
+    total = manifest.between(pieces.stop - 1)[1] - manifest.between(pieces.start)[0]
     for one in running:
         done, unsolved = done + one.rows, unsolved + one.unsolved
         if progress is not None:

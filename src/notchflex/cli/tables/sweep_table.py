@@ -60,7 +60,7 @@ def print_sweep(found: Sweep) -> None:
     """Print counts, and quantiles of every kept quantity."""
     console = terminal.output(terminal.width())
     counts = ", ".join(f"{count} {code}" for code, count in found.counts.items() if count)
-    state = "" if found.finished else f" of {found.manifest.rows}, {len(found.heads)} of "
+    state = "" if found.finished else f" of {found.manifest.rows}, {len(found.pieces)} of "
     state += "" if found.finished else f"{found.manifest.pieces} pieces"
     console.print(f"{found.plan.name}: {found.rows} rows{state}; {counts or 'none'}")
     if not found.rows:

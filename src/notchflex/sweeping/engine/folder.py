@@ -18,6 +18,9 @@ from notchflex.tolerancing.study import FAILED
 
 MANIFEST, PIECES, LOCK = "sweep.json", "pieces", ".lock"
 
+_OF_MANIFEST = 2**40
+"""The byte of the lock that stands for the manifest, behind those of all pieces."""
+
 
 class _Held:
     """Ranges of pieces that this process works on: the system's locks do not tell its threads."""
@@ -73,11 +76,16 @@ def prepare_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
         manifest.check_same(manifest_in(path), str(folder))
     try:
         (path / PIECES).mkdir(parents=True, exist_ok=True)
+        lock = open(path / LOCK, "ab")  # noqa: SIM115 - held below
     except OSError as problem:
         words = problem.strerror or problem
         raise InputError.FILE_UNWRITABLE(f"-o {folder} cannot be made: {words}.") from None
-    if not (path / MANIFEST).exists():
-        write_text(path / MANIFEST, manifest.text)
+    with lock:  # of two clients that begin at once the second finds the manifest of the first
+        _lock(lock, _OF_MANIFEST, 1, wait=True)
+        if (path / MANIFEST).exists():
+            manifest.check_same(manifest_in(path), str(folder))
+        else:
+            write_text(path / MANIFEST, manifest.text)
 
 
 @contextlib.contextmanager
@@ -115,17 +123,18 @@ def locked(folder: str | os.PathLike[str], first: int, last: int) -> Generator[N
         file.close()
 
 
-def _lock(file: Any, first: int, count: int) -> None:
-    """Lock so many bytes of a file, one for each piece."""
+def _lock(file: Any, first: int, count: int, *, wait: bool = False) -> None:
+    """Lock so many bytes of a file, one for each piece, until it is closed."""
     if sys.platform == "win32":
         import msvcrt
 
         file.seek(first)
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, count)
+        msvcrt.locking(file.fileno(), msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK, count)
         return
     import fcntl
 
-    fcntl.lockf(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB, count, first)
+    how = fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB
+    fcntl.lockf(file.fileno(), how, count, first)
 
 
 def tidy(folder: str | os.PathLike[str], first: int, last: int) -> None:
@@ -134,26 +143,30 @@ def tidy(folder: str | os.PathLike[str], first: int, last: int) -> None:
         number = file.name.split("-")[1]
         if number.isdecimal() and first <= int(number) < last:
             file.unlink(missing_ok=True)
-    for file in Path(folder).glob(".sweep-*.json"):
-        file.unlink(missing_ok=True)
+    for pattern in (".sweep-*.json", ".summary-*.json"):
+        for file in Path(folder).glob(pattern):
+            file.unlink(missing_ok=True)
 
 
-def head_of(file: Path) -> dict[str, Any] | None:
-    """Return the head of a piece, None where the file is missing or damaged."""
+def head_of(file: Path, manifest: Manifest, piece: int) -> dict[str, Any] | None:
+    """Return the head of a piece, None where its file is missing, damaged or of another sweep."""
     import polars
     from polars.exceptions import PolarsError
 
+    if not file.exists():
+        return None
     try:
-        return json.loads(polars.read_parquet_metadata(file)[KEY])
+        head = json.loads(polars.read_parquet_metadata(file)[KEY])
     except (OSError, PolarsError, KeyError, ValueError):
         return None
+    return head if (head["sweep"], head["piece"]) == (manifest.digest, piece) else None
 
 
 def done_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> Done | None:
     """Return what became of a piece that is there already, None if it is not or is damaged."""
     file = piece_file(folder, piece)
-    head = head_of(file) if file.exists() else None
-    if head is None or head["sweep"] != manifest.digest or head["piece"] != piece:
+    head = head_of(file, manifest, piece)
+    if head is None:
         return None
     start, stop = manifest.between(piece)
     return Done(piece, stop - start, sum(head["codes"][FAILED:]), file.stat().st_size)

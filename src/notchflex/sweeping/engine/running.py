@@ -34,12 +34,11 @@ def in_threads(
     """Work on pieces in threads of this process; each piece keeps to one of them."""
     cores = cores or number_of_cores()
     work = partial(make_piece, worker, folder)
-    with threadpool_limits(1):
-        if cores == 1:
-            yield from map(work, pieces)
-            return
-        with closing(on_cores(work, pieces, cores)) as found:
-            yield from found
+    if cores == 1:
+        yield from map(work, pieces)
+        return
+    with closing(on_cores(work, pieces, cores)) as found:
+        yield from found
 
 
 @contextlib.contextmanager
