@@ -84,14 +84,15 @@ def test_a_real_scheduler_with_two_workers(many, tmp_path, start):
 
 
 def test_workers_of_this_machine_and_a_killed_client(many, tmp_path, start):
-    """The first client is killed with its two workers at work; four workers do what is left."""
+    """The first client is stopped and killed; four workers do what is left."""
     folder = tmp_path / "swept"
     file = tmp_path / "plan.toml"
     file.write_text(tomlkit.dumps(TABLE | MANY), encoding="utf-8")
-    client = start("notchflex", "sweep", str(file), "-o", str(folder), "--workers", "2")
+    client = start("notchflex", "sweep", str(file), "-o", str(folder))
     while len(list((folder / "pieces").glob("piece-*"))) < 20:
         assert client.poll() is None
         time.sleep(0.05)
+    os.kill(client.pid, signal.SIGSTOP)
     with pytest.raises(nf.InputError) as caught:  # two clients at once
         nf.sweep(plan(**MANY), folder)
     assert caught.value.code.name == "CONFLICT"
