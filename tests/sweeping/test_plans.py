@@ -90,7 +90,16 @@ BAD = {
     "reversed": (TEXT.replace("lower = 1.36", "lower = 1.5"), "INVALID_SPECIFICATION"),
     "no points": (TEXT.replace("points = 10000", "points = 0"), "INVALID_SPECIFICATION"),
     "huge": (TEXT.replace("points = 10000", "points = 10" + "0" * 20), "INVALID_SPECIFICATION"),
-    "huge grid": (TEXT.replace("points = 10000", "points = " + "9" * 15), "INVALID_SPECIFICATION"),
+    "huge grid": (
+        TEXT.replace("10000", "9" * 11).replace(
+            "0.2]", "0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1]"
+        ),
+        "INVALID_SPECIFICATION",
+    ),
+    "many files": (
+        TEXT.replace("# piece = 65536", "piece = 16").replace("= 10000", "= 100000000"),
+        "INVALID_SPECIFICATION",
+    ),
     "no sampling": (TEXT.replace("[sampling]", "[sample]"), "INVALID_SPECIFICATION"),
     "empty list": (TEXT.replace("[0.0, 0.1, 0.2]", "[]"), "INVALID_SPECIFICATION"),
     "equal values": (TEXT.replace("[0.0, 0.1, 0.2]", "[0.1, 0.1]"), "INVALID_SPECIFICATION"),

@@ -281,6 +281,7 @@ def test_places_that_cannot_be_used(tmp_path, refused):
     refused("FILE_DAMAGED", "damaged manifest", plan(), tmp_path / "other")
     refused("OUT_OF_RANGE", "part 8 of 7", plan(), tmp_path / "new", part=(8, 7))
     refused("OUT_OF_RANGE", "no worker", plan(), tmp_path / "new", workers=0)
+    refused("BAD_SYNTAX", "no address", plan(), tmp_path / "new", scheduler="nonsense")
     refused("WRONG_TYPE", "no plan", 3, tmp_path / "new")
     assert not (tmp_path / "new").exists()
     for place in ("full", "nowhere", "other"):

@@ -140,7 +140,7 @@ def model_of(plan: SweepPlan, robot: Robot) -> SweepModel:
         raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
     return SweepModel(
         base, (), paths, tuple(criteria.values()), None, plan.refinement, 1,
-        between=between, sample=_sample(plan),
+        between=between, sample=Points(plan).sample(SAMPLE),
     )  # fmt: skip
 
 
@@ -158,16 +158,6 @@ def _middle(robot: Robot, between: Mapping[str, tuple[float, float]]) -> Robot:
         message = f"in the middle of all variables there must be a valid robot: {problem}"
         invalid = problem.code is ErrorCode.INVALID_ROBOT
         raise type(problem)(message if invalid else str(problem), problem.code) from None
-
-
-def _sample(plan: SweepPlan) -> dict[str, Float[np.ndarray, " k"]]:
-    """Return some rows from all over the sweep."""
-    points, count = Points(plan), min(plan.rows, SAMPLE)
-    blocks = min(16, count)
-    each = count // blocks
-    starts = [plan.rows * block // blocks for block in range(blocks)]
-    parts = [points.rows(start, start + each) for start in starts]
-    return {name: np.concatenate([one[name] for one in parts]) for name in parts[0]}
 
 
 def _check(kept: KeptQuantity, loads: list[str]) -> None:

@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.stats import qmc
 
 from notchflex.errors import InputError
@@ -18,6 +18,9 @@ _MOST_LATIN = 20_000_000
 
 _BITS_30 = 2**30
 """SciPy's Sobol sequence has so many points, or 2^64 if it is asked for them beforehand."""
+
+_FORWARD = 2**31
+"""SciPy counts the steps forward with 32 bits."""
 
 
 def axis_values(variable: SweepVariable) -> Float[np.ndarray, " k"]:
@@ -83,13 +86,31 @@ class Points:
             stop: The row behind the last one.
         """
         places = np.arange(start, stop)
+        levels = self._levels(places) if self.plan.sampled else None
+        return self._numbers(places // self._each, levels)
+
+    def sample(self, count: int) -> dict[str, Float[np.ndarray, " k"]]:
+        """Return the numbers of some rows: the first points, at places all over the grid.
+
+        Args:
+            count: So many rows, or fewer if there are fewer.
+        """
+        count = min(count, self.plan.rows)
+        places = np.random.default_rng(0).integers(0, self.plan.rows // self._each, count)
+        if not self.plan.sampled:
+            return self._numbers(places, None)
+        points = np.arange(count) % self._each
+        return self._numbers(places, self._levels(np.arange(min(count, self._each)))[points])
+
+    def _numbers(
+        self, rest: Int[np.ndarray, " k"], levels: Float[np.ndarray, "k d"] | None
+    ) -> dict[str, Float[np.ndarray, " k"]]:
+        """Return numbers by name at places of the grid and sampled levels."""
         found: dict[str, np.ndarray] = {}
-        rest = places // self._each
         for variable, values in zip(self.plan.grid[::-1], self._axes[::-1], strict=True):
             found[variable.value] = values[rest % len(values)]
             rest = rest // len(values)
-        if self.plan.sampled:
-            levels = self._levels(places)
+        if levels is not None:
             for number, variable in enumerate(self.plan.sampled):
                 found[variable.value] = _at_level(variable, levels[:, number])
         return {one.value: found[one.value] for one in self.plan.variable}
@@ -115,8 +136,8 @@ class Points:
             bits = 30 if sampling.points <= _BITS_30 else 64
             random = np.random.default_rng(sampling.seed)
             engine = qmc.Sobol(len(self.plan.sampled), scramble=True, bits=bits, rng=random)  # pyright: ignore
-        if start > engine.num_generated:
-            engine.fast_forward(start - engine.num_generated)
+        while start > engine.num_generated:
+            engine.fast_forward(min(start - engine.num_generated, _FORWARD))
         self._sobol = engine
         return _drawn(engine, stop - start)
 

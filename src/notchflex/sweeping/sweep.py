@@ -23,7 +23,13 @@ from notchflex.sweeping.engine.folder import (
 )
 from notchflex.sweeping.engine.manifest import Manifest
 from notchflex.sweeping.engine.piece import Done, Worker
-from notchflex.sweeping.engine.running import in_threads, local_cluster, on_cluster, scheduler_at
+from notchflex.sweeping.engine.running import (
+    check_address,
+    in_threads,
+    local_cluster,
+    on_cluster,
+    scheduler_at,
+)
 from notchflex.sweeping.model import model_of
 from notchflex.sweeping.plan import SweepPlan, read_plan
 from notchflex.sweeping.plan.reading import plan_from_table
@@ -81,6 +87,10 @@ def sweep(
         raise InputError.CONFLICT("workers and a scheduler exclude each other; give one of them.")
     if workers is not None and not 1 <= check_integer(workers, "workers") <= 1024:
         raise InputError.OUT_OF_RANGE(f"workers must be 1 to 1024; got {workers}")
+    if workers is not None or scheduler is not None:
+        need("distributed", "cluster", "workers")
+    if scheduler is not None:
+        check_address(scheduler)
     first, count = check_part(part)
     chosen, robot = plan_and_robot(plan)
     inputs = [plan] if isinstance(plan, str | os.PathLike) else []

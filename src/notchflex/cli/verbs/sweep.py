@@ -102,7 +102,7 @@ def sweep(
     A sweep that was stopped goes on where it was: give the same call again. What the files hold
     does not depend on who works on them. Prints counts and quantiles of every kept quantity.
     """
-    is_folder = Path(plan).is_dir() if "\0" not in plan else False
+    is_folder = bool(plan.strip()) and "\0" not in plan and Path(plan).is_dir()
     if is_folder:
         return _look(plan, output, plot, json, quiet)
     if plot is not None:

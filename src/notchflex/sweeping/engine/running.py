@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections import Counter
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import closing
@@ -24,8 +25,10 @@ _AHEAD = 2
 _TRIES = 20
 """A piece whose worker is lost so many times is given up."""
 
-_WAIT = 60
-"""Seconds to wait for a scheduler and its first worker."""
+_ADDRESS = re.compile(r"(\w+://)?[^\s/]+:\d{1,5}")
+
+_CONNECT, _WAIT = 20, 60
+"""Seconds to wait for a scheduler, and for its first worker."""
 
 
 def in_threads(
@@ -64,6 +67,18 @@ def local_cluster(workers: int) -> Generator[Any]:
         yield client
 
 
+def check_address(address: str) -> None:
+    """Raise if a text is no address of a scheduler.
+
+    Raises:
+        InputError: It is not written as HOST:PORT.
+    """
+    if not _ADDRESS.fullmatch(address):
+        raise InputError.BAD_SYNTAX(
+            f"{address!r} is no address of a scheduler; write it like tcp://10.0.0.1:8786."
+        )
+
+
 @contextlib.contextmanager
 def scheduler_at(address: str) -> Generator[Any]:
     """Connect to a scheduler of dask.
@@ -78,7 +93,7 @@ def scheduler_at(address: str) -> Generator[Any]:
     import distributed
 
     try:
-        client = distributed.Client(address, timeout=_WAIT, set_as_default=False)
+        client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
         client.wait_for_workers(1, timeout=_WAIT)
     except (OSError, ValueError, TypeError) as problem:
         words = " ".join(str(problem).split())[:200]

@@ -10,8 +10,11 @@ from notchflex.robot.part import Float, Int, ProblemError, part
 
 _REFUSE = InputError.INVALID_SPECIFICATION
 _MOST_VALUES = 10_000_000
-MOST_ROWS = 10**15
-"""Rows of a sweep at most: 25 years at 1e6 rows a second."""
+MOST_ROWS = 10**12
+"""Rows of a sweep at most: a month of 32 cores, and four million files."""
+_MOST_PIECES = 4_000_000
+_MOST_POINTS = 10**11
+"""Points at most: the way to the last one of a Sobol sequence takes minutes."""
 
 
 @part(kw_only=True, refuse=_REFUSE)
@@ -86,7 +89,7 @@ class Sampling:
     method: Annotated[
         Literal["sobol", "latin-hypercube"], Field(description='"sobol" or "latin-hypercube"')
     ] = "sobol"
-    points: Annotated[Int, Field(ge=1, le=MOST_ROWS, description="number of points")]
+    points: Annotated[Int, Field(ge=1, le=_MOST_POINTS, description="number of points")]
     seed: Annotated[Int, Field(ge=0, le=2**63 - 1, description="seed of the points")] = 0
 
 
@@ -229,5 +232,8 @@ class SweepPlan:
         if twice:
             raise ProblemError([("variable", f"has `{twice[0]}` twice; vary it once.")])
         if self.rows > MOST_ROWS:
-            raise ProblemError([("variable", f"makes {self.rows:.3g} rows; give at most 1e15.")])
+            raise ProblemError([("variable", f"makes {self.rows:.3g} rows; give at most 1e12.")])
+        if self.piece is not None and self.rows / self.piece > _MOST_PIECES:
+            text = f"is {self.piece}, which makes {self.rows / self.piece:.3g} files; give "
+            raise ProblemError([("piece", f"{text}{-(-self.rows // _MOST_PIECES)} or more.")])
         return self
