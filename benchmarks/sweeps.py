@@ -77,9 +77,10 @@ def throughput(rows: int, workers: int, clock: Any) -> None:
     base = bare(min(rows, 4 * CHUNK), workers, clock) / min(rows, 4 * CHUNK)
     print(f"bare batch on {workers} cores: {1e6 * base:.3f} µs a row")
     print(
-        "rows  time [s]  from piece to piece [µs a row]  part of the bare throughput  MiB a worker"
+        "rows  time [s]  more for each further row [µs]  part of the bare throughput  MiB a worker"
     )
     sizes = [CHUNK * 10**power for power in range(4) if CHUNK * 10**power < rows]
+    before: tuple[int, float] | None = None
     for size in [*sizes, rows]:
         with tempfile.TemporaryDirectory() as folder:
             marks: list[tuple[int, float]] = []
@@ -92,6 +93,9 @@ def throughput(rows: int, workers: int, clock: Any) -> None:
             )
             taken = clock() - begun
             per_row = taken / size
+            if before is not None:  # without the start of processes, which takes the same time
+                per_row = (taken - before[1]) / (size - before[0])
+            before = size, taken
             if len(marks) > 2 * workers and clock is time.monotonic:
                 # Between the first pieces and the last: without the start of processes.
                 (first, then), (last, now) = marks[workers - 1], marks[-1]
