@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import re
+import sys
 from collections import Counter
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import closing
-from functools import partial
+from functools import lru_cache, partial
 from itertools import islice
 from typing import Any
 
@@ -18,6 +20,11 @@ from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.solver.programs.threads import number_of_cores, on_cores
 from notchflex.sweeping.engine.piece import Done, Worker, make_piece, worker_of
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+"""Numbers of the options in <malloc.h>."""
+_KEPT = 2**25
+"""glibc takes no larger one."""
 
 _AHEAD = 2
 """So many pieces wait for each worker of dask, so that none is idle."""
@@ -92,10 +99,14 @@ def scheduler_at(address: str) -> Generator[Any]:
     need("distributed", "cluster", "--scheduler")
     import distributed
 
+    client = None
     try:
         client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
         client.wait_for_workers(1, timeout=_WAIT)
     except (OSError, ValueError, TypeError) as problem:
+        if client is not None:
+            with contextlib.suppress(Exception):
+                client.close(timeout=5)
         words = " ".join(str(problem).split())[:200]
         raise InputError.NO_CONNECTION(
             f"no scheduler with workers answers at {address}: {words}. Start one with `dask "
@@ -164,5 +175,21 @@ def _work(text: str, folder: str, piece: int) -> Done:
         raise InputError.FILE_NOT_FOUND(
             f"a worker sees no folder {folder}; give a folder that all workers share."
         )
+    _keep_memory()
     with threadpool_limits(1):
         return make_piece(worker_of(text), folder, piece)
+
+
+@lru_cache(maxsize=1)
+def _keep_memory() -> None:
+    """Let the C library keep the memory that arrays gave back, for the next ones.
+
+    dask sets MALLOC_TRIM_THRESHOLD_ for its workers, so that all memory is given back to the system
+    at once: a batch then spends as much time on new pages as on solving.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(_TRIM_THRESHOLD, _KEPT)
+        mallopt(_MMAP_THRESHOLD, _KEPT)
