@@ -250,7 +250,7 @@ def test_without_rows_only_extremes_and_failures_are_kept(whole, tmp_path):
         (
             "OUT_OF_RANGE",
             "latin hypercube",
-            {"sampling": {"method": "latin-hypercube", "points": 10**9}},
+            {"sampling": {"method": "latin-hypercube", "points": 10**9}, "piece": 4096},
         ),
         (
             "UNKNOWN_NAME",
