@@ -24,6 +24,7 @@ ORDER = (
     "fit",
     "comparison",
     "tolerancing",
+    "sweeping",
     "designing",
     "control",
     "sensing",

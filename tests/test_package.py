@@ -42,6 +42,7 @@ NAMES = [
     "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
     "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
     "read_tolerance_spec",
+    "Sweep", "SweepPlan", "read_plan", "read_sweep", "sweep",
     "design", "Design", "DesignSpec", "design_front", "DesignFront",
 ]
 # fmt: on

@@ -194,6 +194,16 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "Sweep",
+            "SweepPlan",
+            "read_plan",
+            "read_sweep",
+            "sweep",
+        ),
+        "notchflex.sweeping",
+    ),
+    **dict.fromkeys(
+        (
             "DeckOptions",
             "Exported",
             "PatternOptions",

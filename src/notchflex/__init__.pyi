@@ -111,6 +111,11 @@ from notchflex.sensing import SensedForce as SensedForce
 from notchflex.sensing import SensorNoise as SensorNoise
 from notchflex.sensing import sense as sense
 from notchflex.solver.newton import Settings as Settings
+from notchflex.sweeping import Sweep as Sweep
+from notchflex.sweeping import SweepPlan as SweepPlan
+from notchflex.sweeping import read_plan as read_plan
+from notchflex.sweeping import read_sweep as read_sweep
+from notchflex.sweeping import sweep as sweep
 from notchflex.tolerancing import AcceptanceLimit as AcceptanceLimit
 from notchflex.tolerancing import ToleranceAnalysis as ToleranceAnalysis
 from notchflex.tolerancing import ToleranceSpec as ToleranceSpec

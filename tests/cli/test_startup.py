@@ -29,6 +29,7 @@ ROOT_VERBS = (
     "compare",
     "calibrate",
     "measure",
+    "sweep",
     "friction-rig",
     "sense",
     "workspace",

@@ -299,3 +299,18 @@ def test_learning(margin):
     margin.within("tension", seen[:, 0] * settings.largest - settings.change, 1e-12, "N")
     tip = nf.tip_from_angles(settings.model, np.array(angle))[0]
     margin.within("tip", seen[:, 1:4] * settings.length - tip, 1e-6, "mm")
+
+
+def test_sweep_of_designs():
+    """The best wrist has the same angle and strain as by itself; its neighbours are no better."""
+    names, printed = ran(18)
+    best, rows = names["best"], names["rows"]
+    wrist = nf.load_robot("pacheco2021-a")
+    for one in (best, rows.row(-1, named=True)):
+        values = {name: one[name] for name in ("notch.depth", "notch.height")}
+        state = nf.solve(wrist.with_values(values), nf.Load(tension=1.0))
+        assert np.degrees(state.total_angle) == pytest.approx(one["total_angle_deg"], rel=2e-5)
+        assert state.peak_strain[0] == pytest.approx(one["peak_strain_1"], rel=2e-5)
+    assert rows["total_angle_deg"].is_between(55.0, 65.0).all()
+    assert len(rows) == names["found"].counts["accepted"]
+    assert f"{len(rows)} of 4096" in printed

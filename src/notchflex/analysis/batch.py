@@ -128,6 +128,28 @@ def simulate_batch(
     return Batch(_simulate(every, joined, len(paths), *common))
 
 
+def simulate_varied(
+    chains: VariedChains, *, outputs: Sequence[str], settings: Settings | None = None
+) -> Batch:
+    """Follow one path of loads with varied robots, in the calling thread.
+
+    Args:
+        chains: Chains of the robots under the path.
+        outputs: As for `solve_batch`.
+        settings: As for `solve_batch`.
+
+    Returns:
+        Arrays by name, rows and then steps as leading axes.
+    """
+    rows = _varied_rows(chains, len(chains.numbers), check_outputs(outputs))
+    numbers = np.array((settings or DEFAULT).numbers)
+    arrays: dict[str, np.ndarray] = {}
+    for index in rows.pieces(1):
+        for name, values in rows.run(index, numbers).items():
+            _store(arrays, name, rows.rows[index], values, len(rows.rows))
+    return Batch(arrays)
+
+
 def _robots(robots: Any) -> Sequence[Robot]:
     if isinstance(robots, VariedRobots):
         return robots
@@ -259,6 +281,13 @@ class _VariedRows(_BatchRows):
         return self.varied.rows(index)
 
 
+def _varied_rows(varied: VariedChains, count: int, outputs: tuple[str, ...]) -> _VariedRows:
+    layouts = (varied.structure, varied.command, outputs)
+    flexures = np.array([varied.ready.chain.flexures])
+    nothing = np.zeros((0, 0))
+    return _VariedRows(np.arange(count), nothing, nothing, flexures, layouts, varied)
+
+
 def _unpad(name: str, values: np.ndarray, flexures: Int[np.ndarray, " rows"]) -> np.ndarray:
     """Values by flexure or body, empty where a robot has none, rows and steps as leading axes."""
     along = REGISTERED[name].per[:1]
@@ -287,10 +316,7 @@ def _tables(
     if isinstance(robots, VariedRobots) and paths == 1:
         varied = varied_chains(robots, joined, refinement)
         if varied is not None:
-            layouts = (varied.structure, varied.command, outputs)
-            flexures = np.array([varied.ready.chain.flexures])
-            nothing = np.zeros((0, 0))
-            return [_VariedRows(np.arange(count), nothing, nothing, flexures, layouts, varied)]
+            return [_varied_rows(varied, count, outputs)]
     # The modes that any of the loads asks for, so that rows share a program.
     every = [prepare_for(robot, joined, None, refinement) for robot in robots]
     flexures = max(ready.chain.flexures for ready in every)

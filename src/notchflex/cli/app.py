@@ -107,6 +107,13 @@ VERBS = {
         "    notchflex tolerance pacheco2021-a limits.toml --draws 10000 --plot tolerances.png \\\n"
         "        --csv robots.csv --json -",
     ),
+    "sweep": (
+        "Solve many robots that differ by a few numbers, and keep the results as files.",
+        "notchflex new plan --sweep\n"
+        "    notchflex sweep plan.toml --dry-run\n"
+        "    notchflex sweep plan.toml -o swept\n"
+        "    notchflex sweep swept --plot notch.depth,total_angle_deg -o swept.png",
+    ),
     "design": (
         "Choose dimensions so that a robot does what is asked.",
         "notchflex new wish --design\n"

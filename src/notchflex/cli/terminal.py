@@ -9,6 +9,7 @@ import shutil
 import sys
 import unicodedata
 from collections.abc import Callable, Generator, Iterable, Sequence
+from datetime import timedelta
 from functools import partial
 from typing import TYPE_CHECKING, TextIO
 
@@ -199,6 +200,39 @@ def bars(first: str = "searching") -> Generator[Callable[[str, int, int], None] 
             if stage not in stages:
                 stages[stage] = progress.add_task(stage, total=total)
             progress.update(stages[stage], completed=done, total=total)
+
+        yield show
+
+
+@contextlib.contextmanager
+def rate(text: str) -> Generator[Callable[[int, int, int, int], None] | None]:
+    """Show rows done, their rate, the remaining time and how many have no result.
+
+    On a terminal only. Yields a function that takes rows done, rows in all, rows without a result,
+    and rows that were done before; None where nobody watches.
+    """
+    if not _is_watched():
+        yield None
+        return
+    from time import monotonic
+
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[told]}"),
+    )
+    start = monotonic()
+    with Progress(*columns, console=messages(), transient=True) as progress:
+        task = progress.add_task(text, total=None, told="")
+
+        def show(done: int, total: int, unsolved: int, before: int) -> None:
+            each = (monotonic() - start) / max(done - before, 1)
+            left = str(timedelta(seconds=round(each * (total - done))))
+            told = f"{1.0 / max(each, 1e-9):.3g} rows/s, {left} left, {unsolved} unsolved"
+            progress.update(task, completed=done, total=total, told=told)
 
         yield show
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import overload
 
 import numpy as np
@@ -119,9 +120,15 @@ class VariedRobots(Sequence[Robot]):
         Rules tie a number to its limits, to the tube, a tendon or another number of the same notch,
         each of them monotonic: if all corners of the ranges are valid, so is all between them.
         """
-        if not self.values or self._corners_are_valid():
+        if not self.values:
             return np.ones(len(self), bool)
-        return np.array([self._is_valid(row) for row in self.table])
+        if np.isfinite(self.table).all():
+            boxes = (self.box, (self.table.min(axis=0), self.table.max(axis=0)))
+            for low, high in boxes:
+                key = tuple(self._cliques()), tuple(low.tolist()), tuple(high.tolist())
+                if _corners_are_valid(self.robot, self.names, *key):
+                    return np.ones(len(self), bool)
+        return np.array([_is_valid(self.robot, self.names, row) for row in self.table])
 
     def cliques(self) -> Iterator[list[int]]:
         """Yield places of numbers that belong together: of one notch, and of none in particular."""
@@ -129,25 +136,35 @@ class VariedRobots(Sequence[Robot]):
         for notch in dict.fromkeys(one for one in of if one is not None) or {None: None}:
             yield [place for place in places if of[place] in (None, notch)]
 
-    def _corners_are_valid(self) -> bool:
-        table = self.table
-        if not np.isfinite(table).all():
-            return False
-        middle = 0.5 * (table.min(axis=0) + table.max(axis=0))
-        for clique in self.cliques():
-            if 2 ** len(clique) > _MOST_CORNERS:
-                return False
-            ends = [(table[:, place].min(), table[:, place].max()) for place in clique]
-            for corner in itertools.product(*ends):
-                numbers = middle.copy()
-                numbers[clique] = corner
-                if not self._is_valid(numbers):
-                    return False
-        return True
+    def _cliques(self) -> Iterator[tuple[int, ...]]:
+        return map(tuple, self.cliques())
 
-    def _is_valid(self, numbers: Float[np.ndarray, " d"]) -> bool:
-        try:
-            self.at(dict(zip(self.values, numbers, strict=True)))
-        except InputError:
+
+@lru_cache(maxsize=16)
+def _corners_are_valid(
+    robot: Robot,
+    names: tuple[str, ...],
+    cliques: tuple[tuple[int, ...], ...],
+    low: tuple[float, ...],
+    high: tuple[float, ...],
+) -> bool:
+    """Tell whether all corners of ranges make a valid robot; False for too many corners."""
+    ends = np.array([low, high])
+    middle = 0.5 * (ends[0] + ends[1])
+    for clique in cliques:
+        if 2 ** len(clique) > _MOST_CORNERS:
             return False
-        return True
+        for corner in itertools.product(*ends[:, list(clique)].T):
+            numbers = middle.copy()
+            numbers[list(clique)] = corner
+            if not _is_valid(robot, names, numbers):
+                return False
+    return True
+
+
+def _is_valid(robot: Robot, names: tuple[str, ...], numbers: Float[np.ndarray, " d"]) -> bool:
+    try:
+        robot.with_values(dict(zip(names, numbers.tolist(), strict=True)))
+    except InputError:
+        return False
+    return True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float
@@ -12,10 +13,34 @@ from notchflex._quantity import REGISTERED, Quantity
 from notchflex.errors import InputError
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities.registry import holds
-from notchflex.tolerancing.spec import AXES, INDICES, AcceptanceLimit, ToleranceSpec
+from notchflex.tolerancing.spec import AXES, INDICES, ToleranceSpec
 
-_FIRST = {"body": 0}
+FIRST = {"body": 0}
 """The number of the first entry along an axis, where it is not 1."""
+
+
+class Limited(Protocol):
+    """What names entries of a quantity, such as an `AcceptanceLimit`; None for all of them."""
+
+    @property
+    def quantity(self) -> str:
+        """Name of the quantity."""
+        ...
+
+    @property
+    def step(self) -> int | None:
+        """Step of the load, from 1; None for the last."""
+        ...
+
+    @property
+    def lower(self) -> float | None:
+        """Smallest value that is accepted."""
+        ...
+
+    @property
+    def upper(self) -> float | None:
+        """Largest value that is accepted."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -58,13 +83,21 @@ def criteria_of(spec: ToleranceSpec, paths: Mapping[str, EquilibriumPath]) -> li
     found: list[Criterion] = []
     for limit in spec.limits:
         load = spec.load_of(limit)
-        found += _criteria(limit, load, paths[load], len(paths) > 1)
+        found += entries_of(limit, load, paths[load], len(paths) > 1)
     return found
 
 
-def _criteria(
-    limit: AcceptanceLimit, load: str, path: EquilibriumPath, named: bool
+def entries_of(
+    limit: Limited, load: str, path: EquilibriumPath, named: bool
 ) -> Iterator[Criterion]:
+    """Yield the numbers of a result that a limit is about.
+
+    Args:
+        limit: The limit.
+        load: Name of the load.
+        path: The robot of the drawing under it.
+        named: Whether their names say which load it is.
+    """
     quantity, steps = REGISTERED[limit.quantity], len(path)
     step = steps if limit.step is None else limit.step
     if step > steps:
@@ -93,14 +126,14 @@ def _criteria(
         yield Criterion(words, quantity, load, step - 1, index, lower, upper)
 
 
-def _places(limit: AcceptanceLimit, axis: str, size: int) -> Sequence[int]:
+def _places(limit: Limited, axis: str, size: int) -> Sequence[int]:
     """Return the places along an axis that a limit is about."""
     number = getattr(limit, axis) if axis in INDICES else None
-    if axis == "axis":
-        return [AXES.index(number)]
     if number is None:
         return range(size)
-    first = _FIRST.get(axis, 1)
+    if axis == "axis":
+        return [AXES.index(number)]
+    first = FIRST.get(axis, 1)
     if not first <= number < first + size:
         raise InputError.OUT_OF_RANGE(
             f"the limit of {limit.quantity} names {axis} {number}; "
@@ -111,7 +144,7 @@ def _places(limit: AcceptanceLimit, axis: str, size: int) -> Sequence[int]:
 
 def _entry(name: str, per: tuple[str, ...], index: tuple[int, ...]) -> str:
     words = [
-        AXES[place] if axis == "axis" else str(place + _FIRST.get(axis, 1))
+        AXES[place] if axis == "axis" else str(place + FIRST.get(axis, 1))
         for axis, place in zip(per, index, strict=True)
     ]
     return f"{name}[{','.join(words)}]" if words else name

@@ -22,11 +22,12 @@ from notchflex.tolerancing.spec import LIMIT_KEYS, AcceptanceLimit, ToleranceSpe
 
 _TABLES = ("load", "accept", "tolerance", "yield")
 _VECTORS = ("tip_force", "tip_moment", "tip_point", "gravity")
-_LOAD_KEYS = (
+LOAD_KEYS = (
     *("tension", "stroke", "base_rotation"),
     *_VECTORS,
     *("tip_mass", "body_force", "following"),
 )
+"""Keys of a load in a file."""
 
 
 def read_tolerance_spec(file: str | os.PathLike[str], robot: Robot) -> ToleranceSpec:
@@ -71,7 +72,7 @@ def spec_of(table: Mapping[str, Any], robot: Robot) -> ToleranceSpec:
     wanted = yields.get("wanted")
     return ToleranceSpec(
         list(_limits(table)),
-        {name: _load(_table(loads, name, "load."), name, robot) for name in loads},
+        {name: read_load(_table(loads, name, "load."), name, robot) for name in loads},
         cast("Mapping[str, Any] | None", table.get("tolerance")),
         None if wanted is None else check_number(wanted, "yield.wanted"),
     )
@@ -117,10 +118,16 @@ def _limits(table: Mapping[str, Any]) -> Iterator[AcceptanceLimit]:
         yield replace(limit, **ends)
 
 
-def _load(table: dict[str, Any], name: str, robot: Robot) -> LoadPath:
-    """Make a load; its keys are the options of `notchflex simulate`."""
+def read_load(table: Mapping[str, Any], name: str, robot: Robot) -> LoadPath:
+    """Make a load of the table of a file, whose keys are the options of `notchflex simulate`.
+
+    Args:
+        table: As read from TOML.
+        name: Name of the load, for messages.
+        robot: The robot that it is for.
+    """
     where = f"load.{name}"
-    _known(table, _LOAD_KEYS, where)
+    _known(table, LOAD_KEYS, where)
     commands = {
         key: [_command(key, where, one) for one in _several(table.get(key))]
         for key in ("tension", "stroke")

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.batch import simulate_batch
+from notchflex.analysis.outputs import Batch
 from notchflex.analysis.uncertainty.draws import Source, sources_of, values_at
 from notchflex.loads import LoadPath
 from notchflex.results.path import EquilibriumPath
@@ -130,10 +131,7 @@ class Study:
             own = [index for index, one in enumerate(self.criteria) if one.load == name]
             outputs = tuple(dict.fromkeys(self.criteria[index].quantity.name for index in own))
             part = _part_of(progress, number, len(self.loads))
-            found = simulate_batch(
-                robots, load, outputs=(*outputs, "converged"), settings=self.settings,
-                refinement=self.refinement, cores=self.cores, progress=part,
-            )  # fmt: skip
+            found = self.follow(robots, name, load, (*outputs, "converged"), part)
             good, turn = found["converged"], self.paths[name].base_to_world
             turned = {
                 name: found[name] if turn is None else REGISTERED[name].turned(found[name], turn)
@@ -149,6 +147,29 @@ class Study:
             codes[rows[failed]] = FAILED
         codes[(codes == ACCEPTED) & ~self.within(values).all(axis=1)] = REJECTED
         return Outcomes(values, codes)
+
+    def follow(
+        self,
+        robots: VariedRobots,
+        name: str,
+        load: LoadPath,
+        outputs: tuple[str, ...],
+        part: Callable[[int, int], None] | None,
+    ) -> Batch:
+        """Follow a load with all robots.
+
+        Args:
+            robots: The robots, all of them valid.
+            name: Name of the load.
+            load: The load.
+            outputs: Names of the quantities.
+            part: Called with the robots done and all of them.
+        """
+        del name
+        return simulate_batch(
+            robots, load, outputs=outputs, settings=self.settings,
+            refinement=self.refinement, cores=self.cores, progress=part,
+        )  # fmt: skip
 
     def within(self, values: Float[np.ndarray, "robots k"]) -> Bool[np.ndarray, "robots k"]:
         """Return which numbers lie within their limits; NaN does not."""

@@ -93,13 +93,17 @@ class VariedChains:
         return chains, commands.reshape(len(chains), self.steps, self.command.size)
 
 
-def varied_chains(robots: VariedRobots, load: LoadPath, refinement: int) -> VariedChains | None:
+def varied_chains(
+    robots: VariedRobots, load: LoadPath, refinement: int, *, known: bool = True
+) -> VariedChains | None:
     """Find polynomials for the chains of varied robots under one path of loads.
 
     Args:
         robots: The robots, all of them valid.
         load: The loads of every robot.
         refinement: More strain modes, as for `simulate`.
+        known: Whether polynomials of earlier calls may serve; if not, the chains depend on the
+            arguments alone.
 
     Returns:
         The chains; None where each robot must be assembled by itself.
@@ -109,13 +113,13 @@ def varied_chains(robots: VariedRobots, load: LoadPath, refinement: int) -> Vari
     commands = make_commands(load, robots.robot, ready.chain)
     form = _Form(ready.chain_layout, ready.command_layout(commands), len(load))
     key = np.concatenate([form.command.pack(commands, leading=1).ravel(), [refinement]]).tobytes()
-    known = _known(robots.robot, robots.names, form.chain, key)
-    polynomial = next((one for one in known if one.covers(table)), None)
+    earlier = _known(robots.robot, robots.names, form.chain, key) if known else []
+    polynomial = next((one for one in earlier if one.covers(table)), None)
     if polynomial is None:
         polynomial = _fitted(robots, load, refinement, form)
         if polynomial is None:
             return None
-        known.append(polynomial)
+        earlier.append(polynomial)
     nodes = polynomial.nodes[:, : form.chain.size]
     structure = StaticStructure.of(form.chain, [ready.chain], nodes)
     return VariedChains(table, ready, polynomial, structure, form.command, form.steps)

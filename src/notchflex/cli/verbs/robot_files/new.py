@@ -40,6 +40,7 @@ TEMPLATES = {
     "--tolerance": Template(
         "tolerancing/template.toml", "file of tolerances", "notchflex tolerance ROBOT {}"
     ),
+    "--sweep": Template("sweeping/plan/template.toml", "plan file", "notchflex sweep {} -o FOLDER"),
 }
 
 _SECTIONS = ("notch", "tendon", "material", "friction")
@@ -135,6 +136,9 @@ def new(
         bool,
         flag("Write a commented file of tolerances for `notchflex tolerance`; asks nothing."),
     ] = False,
+    sweep: Annotated[
+        bool, flag("Write a commented plan file for `notchflex sweep` instead; asks nothing.")
+    ] = False,
 ) -> None:
     """Ask for the calliper readings of a wrist and write a commented robot file.
 
@@ -149,14 +153,18 @@ def new(
             f"{path} is already there; choose another name, or remove it first."
         )
     check_output(str(path), "NAME")
-    if design or tolerance:
-        option = "--design" if design else "--tolerance"
-        if set_ or answers != Answers() or (design and tolerance):
+    chosen = [
+        option
+        for option, asked in (("--design", design), ("--tolerance", tolerance), ("--sweep", sweep))
+        if asked
+    ]
+    if chosen:
+        template = TEMPLATES[chosen[0]]
+        if set_ or answers != Answers() or len(chosen) > 1:
             raise InputError.CONFLICT(
-                f"{option} takes no other options: edit the {TEMPLATES[option].kind} that it "
-                "writes."
+                f"{chosen[0]} takes no other options: edit the {template.kind} that it writes."
             )
-        _write_template(TEMPLATES[option], path)
+        _write_template(template, path)
         return
     settings = dict(map(_setting, set_ or ()))
     options = {f"--{key.replace('_', '-')}": answer for key, answer in vars(answers).items()}

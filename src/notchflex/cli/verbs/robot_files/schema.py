@@ -6,13 +6,24 @@ import json
 from typing import Annotated
 
 from notchflex.cli.arguments.conversion import flag
+from notchflex.errors import InputError
 from notchflex.results.files.streams import write_document
 from notchflex.robot import json_schema
 
 
-def schema(*, design: Annotated[bool, flag("The schema of design files instead.")] = False) -> None:
-    """Print the JSON Schema of robot files, or of design files."""
-    if design:
+def schema(
+    *,
+    design: Annotated[bool, flag("The schema of design files instead.")] = False,
+    sweep: Annotated[bool, flag("The schema of plan files of sweeps instead.")] = False,
+) -> None:
+    """Print the JSON Schema of robot files, of design files or of plan files."""
+    if design and sweep:
+        raise InputError.CONFLICT("--design and --sweep exclude each other; give one of them.")
+    if sweep:
+        from notchflex.sweeping.plan.schema import plan_schema
+
+        document = plan_schema()
+    elif design:
         from notchflex.designing.specification.schema import design_schema
 
         document = design_schema()

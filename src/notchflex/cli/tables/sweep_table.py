@@ -1,0 +1,76 @@
+"""Tables of `notchflex sweep`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from notchflex.cli import terminal
+
+if TYPE_CHECKING:
+    from notchflex.sweeping import Sweep
+    from notchflex.sweeping.estimate import Estimate
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words: seconds, minutes, hours or days.
+
+    Example:
+        >>> duration(90.0), duration(7200.0)
+        ('1.5 min', '2.0 h')
+    """
+    for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= size:
+            return f"{seconds / size:.1f} {unit}"
+    return f"{seconds:.1f} s"
+
+
+def size_in_words(size: float) -> str:
+    """Return a number of bytes in words.
+
+    Example:
+        >>> size_in_words(2.5e9)
+        '2.5 GB'
+    """
+    for scale, unit in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
+        if size >= scale:
+            return f"{size / scale:.3g} {unit}"
+    return f"{size:.0f} bytes"
+
+
+def print_estimate(expected: Estimate) -> None:
+    """Print what a sweep will take."""
+    with_workers = f"{expected.workers} core{'s' * (expected.workers != 1)}"
+    rows = [
+        ("rows", f"{expected.rows}"),
+        ("pieces", f"{expected.pieces} of {expected.piece_rows} rows"),
+        ("time", f"about {duration(expected.seconds)} on {with_workers}"),
+        ("one row", f"{1e6 * expected.row_seconds:.3g} µs on one core"),
+        (
+            "files",
+            f"about {size_in_words(expected.bytes)}; {size_in_words(expected.free)} are free",
+        ),
+        ("without a result", f"{expected.unsolved} of {expected.solved} rows that were solved"),
+    ]
+    if expected.one_by_one:
+        rows.append(("slow", "robots are assembled one by one: some of the ranges make no robot"))
+    terminal.output().print(terminal.table(("", ""), rows, gap=2))
+
+
+def print_sweep(found: Sweep) -> None:
+    """Print counts, and quantiles of every kept quantity."""
+    console = terminal.output(terminal.width())
+    counts = ", ".join(f"{count} {code}" for code, count in found.counts.items() if count)
+    state = "" if found.finished else f" of {found.manifest.rows}, {len(found.pieces)} of "
+    state += "" if found.finished else f"{found.manifest.pieces} pieces"
+    console.print(f"{found.plan.name}: {found.rows} rows{state}; {counts or 'none'}")
+    if not found.rows:
+        return
+    parts = sorted({0.0, 1.0, *found.plan.output.quantiles})
+    shown = parts if len(parts) <= 9 else [0.0, 0.025, 0.25, 0.5, 0.75, 0.975, 1.0]
+    names = {0.0: ">smallest", 1.0: ">largest", 0.5: ">median"}
+    heads = ["quantity", *(names.get(part, f">{100 * part:g} %") for part in shown)]
+    rows = [
+        (name, *(f"{value:.5g}" for value in found.quantiles(name, shown)))
+        for name in found.columns
+    ]
+    console.print(terminal.table(heads, rows, gap=2))

@@ -1,0 +1,105 @@
+"""The picture of a sweep: one column over another, with what lies between its quantiles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from notchflex.errors import InputError
+from notchflex.plotting.output import Picture
+from notchflex.plotting.sheet import BESIDE, Area, Curve, Mark, Panel, dots, grid
+from notchflex.plotting.style import BLUE, ORANGE, VERMILLION
+from notchflex.robot.error_messages import nearest
+from notchflex.robot.value_names import described_at
+
+if TYPE_CHECKING:
+    from notchflex.sweeping import Sweep
+
+MOST_POINTS = 2000
+"""Rows that are drawn; of more, an even selection."""
+
+_BINS = 24
+_LEAST = 20
+"""A bin with fewer rows has no quantiles."""
+
+
+def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
+    """Describe one column of a sweep over another.
+
+    Rows as points, rejected ones in another colour; where there are many, the median and the band
+    that holds 95 % of them, along x. Rows without a result lie on the axis of x.
+
+    Args:
+        found: The sweep.
+        x: A variable or a kept quantity.
+        y: Another one.
+
+    Raises:
+        InputError: There is no such column, or no row.
+    """
+    import polars
+
+    frame = found.lazy()
+    columns = [one for one in frame.collect_schema().names() if one != "code"]
+    for name in (x, y):
+        if name not in columns:
+            raise InputError.UNKNOWN_NAME(
+                f'the sweep has no column "{name}"{nearest(name, columns)}; there are '
+                f"{', '.join(columns)}."
+            )
+    if found.rows > MOST_POINTS and found.plan.output.rows:
+        # Every k-th row would be a regular part of a grid or of a Sobol sequence.
+        scattered = polars.col("row") % 2**31 * 2_654_435_761 % 2**32
+        frame = frame.filter(scattered < 2**32 * MOST_POINTS // found.rows)
+    table = frame.select("row", "code", polars.col(x).alias("x"), polars.col(y).alias("y"))
+    table = table.collect()
+    code = table["code"].cast(str).to_numpy()
+    both = table.select("x", "y").cast(polars.Float64).to_numpy()
+    good = np.isfinite(both).all(axis=1)
+    if not np.isfinite(both[:, 0]).any():
+        raise InputError.NO_DATA(f"no row has a number of {x}.")
+    items: list[Mark] = []
+    for name, colour in (("accepted", BLUE), ("rejected", ORANGE)):
+        chosen = good & (code == name)
+        if chosen.any():
+            items.append(dots(both[chosen], colour, 1.6, name=name, group=name))
+    if good.sum() >= _LEAST * _BINS:
+        items += _band(both[good])
+    lost = ~good & np.isfinite(both[:, 0])
+    if lost.any():
+        floor = both[good, 1].min() if good.any() else 0.0
+        places = np.column_stack([both[lost, 0], np.full(lost.sum(), floor)])
+        items.append(dots(places, VERMILLION, 4.0, name="no result", group="lost", marker="X"))
+    panel = Panel(items, _label(found, x), _label(found, y), legend=BESIDE)
+    title = f"{found.plan.name}: {found.rows} rows"
+    return Picture(title, 6.4, 4.8, grid([panel], 1))
+
+
+def _band(both: np.ndarray) -> list[Mark]:
+    """Return the median and the band of 95 % along x, from bins of equally many rows."""
+    order = np.argsort(both[:, 0], kind="stable")
+    parts = [one for one in np.array_split(both[order], _BINS) if np.ptp(one[:, 0]) >= 0.0]
+    middle = np.array([np.median(one[:, 0]) for one in parts])
+    keep = np.concatenate([[True], np.diff(middle) > 0.0])
+    low, half, high = (
+        np.array([np.quantile(one[:, 1], part) for one in parts])[keep]
+        for part in (0.025, 0.5, 0.975)
+    )
+    middle = middle[keep]
+    if len(middle) < 3:
+        return []
+    ring = np.concatenate([np.column_stack([middle, low]), np.column_stack([middle, high])[::-1]])
+    return [
+        Area([ring], BLUE, BLUE, opacity=0.15, name="95 % of rows", group="band", layer=3),
+        Curve(np.column_stack([middle, half]), "black", name="median", group="median", layer=4),
+    ]
+
+
+def _label(found: Sweep, name: str) -> str:
+    """Return the label of an axis, with the unit of a variable."""
+    variables: list[Any] = [one.value for one in found.plan.variable]
+    if name not in variables:
+        return name
+    unit = described_at(found.robot, name).unit
+    return f"{name} [{unit}]" if unit else name

@@ -1,0 +1,7 @@
+"""Sweeps: many robots under the same loads, in pieces that are kept as files and gone on with."""
+
+from notchflex.sweeping.plan import SweepPlan, read_plan
+from notchflex.sweeping.result import Sweep, read_sweep
+from notchflex.sweeping.sweep import sweep
+
+__all__ = ["Sweep", "SweepPlan", "read_plan", "read_sweep", "sweep"]

@@ -1,0 +1,1 @@
+"""The engine of sweeps: manifest, folder, pieces, and who works on them."""

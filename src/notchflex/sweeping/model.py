@@ -1,0 +1,209 @@
+"""The rows of a sweep: numbers of robots in, kept quantities and codes out.
+
+What a row gives depends on the plan alone: not on the process, on the rows before, or on cores.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex._quantity import REGISTERED
+from notchflex.analysis.batch import Batch, simulate_batch, simulate_varied
+from notchflex.analysis.solve import simulate
+from notchflex.analysis.varied.varied_chains import VariedChains, varied_chains
+from notchflex.errors import ErrorCode, InputError
+from notchflex.loads import LoadPath
+from notchflex.robot import Robot
+from notchflex.robot.error_messages import nearest
+from notchflex.robot.value_names import number_at
+from notchflex.robot.varied import VariedRobots
+from notchflex.sweeping.plan.parts import KeptQuantity, SweepPlan
+from notchflex.sweeping.points import Points, limits_of
+from notchflex.tolerancing.criteria import AXES, FIRST, Criterion, entries_of
+from notchflex.tolerancing.reading import read_load
+from notchflex.tolerancing.spec import INDICES, LIMITED
+from notchflex.tolerancing.study import CODES, Outcomes, Study
+
+SAMPLE = 4096
+"""Rows that polynomials of chains are made and checked with, from all over the sweep."""
+
+
+_EACH = 1024
+"""Robots that are assembled each by itself are so many at a time: a chain takes much memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class SweepModel(Study):
+    """A study whose robots lie between limits, with polynomials that depend on the plan alone.
+
+    Attributes:
+        between: The limits, by name.
+        sample: Numbers of some rows from all over the sweep.
+    """
+
+    between: Mapping[str, tuple[float, float]] = dataclasses.field(
+        default_factory=dict[str, tuple[float, float]]
+    )
+    sample: Mapping[str, Float[np.ndarray, " k"]] = dataclasses.field(
+        default_factory=dict[str, np.ndarray]
+    )
+
+    @cached_property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Between what the numbers lie, by name."""
+        return dict(self.between)
+
+    @cached_property
+    def chains(self) -> dict[str, VariedChains | None]:
+        """Chains of varied robots under every load; None where each is assembled by itself."""
+        robots = VariedRobots(self.exact, self.sample, self.ranges)
+        if not robots.valid().all():
+            return dict.fromkeys(self.loads)
+        return {
+            name: varied_chains(robots, load, self.refinement, known=False)
+            for name, load in self.loads.items()
+        }
+
+    @property
+    def one_by_one(self) -> bool:
+        """Whether robots are assembled one by one, under any load."""
+        return None in self.chains.values()
+
+    @cached_property
+    def columns(self) -> dict[str, Criterion]:
+        """The kept numbers by the names of their columns."""
+        named = len(self.paths) > 1
+        return {column_name(one, named): one for one in self.criteria}
+
+    def follow(
+        self, robots: VariedRobots, name: str, load: LoadPath, outputs: tuple[str, ...], part: Any
+    ) -> Batch:
+        """Follow a load with all robots, in the calling thread."""
+        del part
+        chains = self.chains[name]
+        options: dict[str, Any] = {"outputs": outputs, "settings": self.settings}
+        if chains is not None and chains.polynomial.covers(robots.table):
+            return simulate_varied(dataclasses.replace(chains, numbers=robots.table), **options)
+        parts = [
+            simulate_batch(
+                list(robots[start : start + _EACH]),
+                load, refinement=self.refinement, cores=1, **options,
+            )
+            for start in range(0, len(robots), _EACH)
+        ]  # fmt: skip
+        return Batch({key: np.concatenate([one[key] for one in parts]) for key in parts[0]})
+
+    def at(self, numbers: Mapping[str, Float[np.ndarray, " k"]]) -> Outcomes:
+        """Solve robots: kept numbers in the units of files, NaN where there is no result."""
+        count = len(next(iter(numbers.values())))
+        found = self.solved(numbers, count)
+        scale = np.array([one.quantity.scale for one in self.criteria])
+        return Outcomes(found.values * scale, found.codes)
+
+
+def model_of(plan: SweepPlan, robot: Robot) -> SweepModel:
+    """Make the model of a plan.
+
+    Args:
+        plan: The plan.
+        robot: The robot that is varied.
+
+    Raises:
+        InputError: The robot has no such number, load, quantity or entry.
+    """
+    between = {one.value: limits_of(one) for one in plan.variable}
+    base = _middle(robot.replace(tolerance=None), between)
+    for name in between:
+        number_at(base, name)
+    loads = {name: read_load(table, name, base) for name, table in plan.load.items()}
+    for one in plan.keep:
+        _check(one, list(loads))
+    paths = {name: simulate(base, load, refinement=plan.refinement) for name, load in loads.items()}
+    criteria: dict[str, Criterion] = {}
+    for one in plan.keep:
+        load = one.load or next(iter(loads))
+        for entry in entries_of(one, load, paths[load], len(loads) > 1):
+            if entry.name in criteria:
+                raise InputError.CONFLICT(f"`keep` has {entry.name} twice; keep it once.")
+            scale = entry.quantity.scale
+            criteria[entry.name] = dataclasses.replace(
+                entry, lower=entry.lower / scale, upper=entry.upper / scale
+            )
+    if not criteria:
+        raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
+    return SweepModel(
+        base, (), paths, tuple(criteria.values()), None, plan.refinement, 1,
+        between=between, sample=Points(plan).sample(SAMPLE),
+    )  # fmt: skip
+
+
+def _middle(robot: Robot, between: Mapping[str, tuple[float, float]]) -> Robot:
+    """Return the robot in the middle of the ranges.
+
+    Raises:
+        InputError: It has no such number, or the numbers make no valid robot.
+    """
+    try:
+        return robot.with_values(
+            {name: 0.5 * (low + high) for name, (low, high) in between.items()}
+        )
+    except InputError as problem:
+        message = f"in the middle of all variables there must be a valid robot: {problem}"
+        invalid = problem.code is ErrorCode.INVALID_ROBOT
+        raise type(problem)(message if invalid else str(problem), problem.code) from None
+
+
+def _check(kept: KeptQuantity, loads: list[str]) -> None:
+    """Check the names of a kept quantity."""
+    if kept.quantity not in LIMITED:
+        raise InputError.UNKNOWN_NAME(
+            f'`keep` names the quantity "{kept.quantity}"{nearest(kept.quantity, LIMITED)}; '
+            f"allowed: {', '.join(LIMITED)}."
+        )
+    per, what = REGISTERED[kept.quantity].per, f"`keep` of {kept.quantity}"
+    for key in INDICES:
+        if getattr(kept, key) is not None and key not in per:
+            has = f"one value per {' and '.join(per)}" if per else "a single value"
+            raise InputError.CONFLICT(f"{what} names one {key}, but there is {has}.")
+    allowed = f"allowed: {', '.join(loads)}"
+    if kept.load is None and len(loads) > 1:
+        raise InputError.MISSING_VALUE(f"{what} must name one of the loads; {allowed}.")
+    if kept.load is not None and kept.load not in loads:
+        near = nearest(kept.load, loads)
+        raise InputError.UNKNOWN_NAME(f'{what} names the load "{kept.load}"{near}; {allowed}.')
+
+
+def column_name(one: Criterion, named: bool) -> str:
+    """Return the name of a column, such as `notch_angle_3_deg_at_pulled_step_2`.
+
+    Args:
+        one: The kept number.
+        named: Whether there are several loads.
+    """
+    places = [
+        AXES[place] if axis == "axis" else str(place + FIRST.get(axis, 1))
+        for axis, place in zip(one.quantity.per, one.index, strict=True)
+    ]
+    unit = one.quantity.unit.replace(" ", "")
+    step = [f"step_{one.step + 1}"] if "step " in one.name else []
+    return "_".join(
+        part
+        for part in [
+            one.quantity.name,
+            *places,
+            unit,
+            *([f"at_{one.load}"] if named else []),
+            *step,
+        ]
+        if part
+    )
+
+
+__all__ = ["CODES", "SweepModel", "column_name", "model_of"]

@@ -1,0 +1,164 @@
+"""The points of a sweep: the numbers of any rows, worked out from the plan and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.stats import qmc
+
+from notchflex.errors import InputError
+from notchflex.sweeping.plan.parts import Sampling, SweepPlan, SweepVariable
+
+_MOST_LATIN = 20_000_000
+"""A Latin hypercube is made whole: so many numbers fit into memory beside all else."""
+
+_BITS_30 = 2**30
+"""SciPy's Sobol sequence has so many points, or 2^64 if it is asked for them beforehand."""
+
+_FORWARD = 2**31
+"""SciPy counts the steps forward with 32 bits."""
+
+
+def axis_values(variable: SweepVariable) -> Float[np.ndarray, " k"]:
+    """Return the values of a variable of the grid.
+
+    Args:
+        variable: A variable with `values` or `count`.
+    """
+    if variable.values is not None:
+        return np.array(variable.values)
+    make = np.geomspace if variable.spacing == "log" else np.linspace
+    return make(variable.lower, variable.upper, variable.count)  # pyright: ignore
+
+
+def limits_of(variable: SweepVariable) -> tuple[float, float]:
+    """Return the least and the greatest value of a variable."""
+    if variable.values is not None:
+        return min(variable.values), max(variable.values)
+    assert variable.lower is not None
+    assert variable.upper is not None
+    return variable.lower, variable.upper
+
+
+@dataclass(eq=False)
+class Points:
+    """Numbers of rows by name; the sampled points change fastest, then the last axis of the grid.
+
+    It keeps the place in the sequence that it reached, so that rows in order are quick; it belongs
+    to one thread.
+
+    Args:
+        plan: The plan.
+    """
+
+    plan: SweepPlan
+    _sobol: Any = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        """Check what does not fit into memory."""
+        sampling = self.plan.sampling
+        if sampling is not None and sampling.method == "latin-hypercube":
+            numbers = sampling.points * len(self.plan.sampled)
+            if numbers > _MOST_LATIN:
+                raise InputError.OUT_OF_RANGE(
+                    f"a Latin hypercube is made whole, and {sampling.points} points of "
+                    f"{len(self.plan.sampled)} variables are more than {_MOST_LATIN} numbers; take "
+                    'fewer points, or method = "sobol".'
+                )
+
+    @cached_property
+    def _axes(self) -> list[Float[np.ndarray, " k"]]:
+        return [axis_values(one) for one in self.plan.grid]
+
+    @property
+    def _each(self) -> int:
+        return 1 if self.plan.sampling is None else self.plan.sampling.points
+
+    def rows(self, start: int, stop: int) -> dict[str, Float[np.ndarray, " k"]]:
+        """Return the numbers of rows by name, in the order of the plan.
+
+        Args:
+            start: First row, from 0.
+            stop: The row behind the last one.
+        """
+        places = np.arange(start, stop)
+        levels = self._levels(places) if self.plan.sampled else None
+        return self._numbers(places // self._each, levels)
+
+    def sample(self, count: int) -> dict[str, Float[np.ndarray, " k"]]:
+        """Return the numbers of some rows: the first points, at places all over the grid.
+
+        Args:
+            count: So many rows, or fewer if there are fewer.
+        """
+        count = min(count, self.plan.rows)
+        places = np.random.default_rng(0).integers(0, self.plan.rows // self._each, count)
+        if not self.plan.sampled:
+            return self._numbers(places, None)
+        points = np.arange(count) % self._each
+        return self._numbers(places, self._levels(np.arange(min(count, self._each)))[points])
+
+    def _numbers(
+        self, rest: Int[np.ndarray, " k"], levels: Float[np.ndarray, "k d"] | None
+    ) -> dict[str, Float[np.ndarray, " k"]]:
+        """Return numbers by name at places of the grid and sampled levels."""
+        found: dict[str, np.ndarray] = {}
+        for variable, values in zip(self.plan.grid[::-1], self._axes[::-1], strict=True):
+            found[variable.value] = values[rest % len(values)]
+            rest = rest // len(values)
+        if levels is not None:
+            for number, variable in enumerate(self.plan.sampled):
+                found[variable.value] = _at_level(variable, levels[:, number])
+        return {one.value: found[one.value] for one in self.plan.variable}
+
+    def _levels(self, places: np.ndarray) -> Float[np.ndarray, "k d"]:
+        """Return the sampled levels between 0 and 1 of rows in a line."""
+        sampling, dimension = self.plan.sampling, len(self.plan.sampled)
+        assert sampling is not None
+        points = places % self._each
+        if sampling.method == "latin-hypercube":
+            return _latin(sampling, dimension)[points]
+        if self._each <= len(places):  # all points, more than once
+            return self._between(0, self._each)[points]
+        turns = np.flatnonzero(np.diff(points) < 0) + 1  # where the sequence begins anew
+        parts = np.split(points, turns)
+        return np.concatenate([self._between(int(one[0]), int(one[-1]) + 1) for one in parts])
+
+    def _between(self, start: int, stop: int) -> Float[np.ndarray, "k d"]:
+        """Return points of the Sobol sequence; going on is quick, going back starts anew."""
+        sampling, engine = self.plan.sampling, self._sobol
+        assert sampling is not None
+        if engine is None or engine.num_generated > start:
+            bits = 30 if sampling.points <= _BITS_30 else 64
+            random = np.random.default_rng(sampling.seed)
+            engine = qmc.Sobol(len(self.plan.sampled), scramble=True, bits=bits, rng=random)  # pyright: ignore
+        while start > engine.num_generated:
+            engine.fast_forward(min(start - engine.num_generated, _FORWARD))
+        self._sobol = engine
+        return _drawn(engine, stop - start)
+
+
+def _drawn(engine: qmc.Sobol, count: int) -> Float[np.ndarray, "k d"]:
+    """Draw points; SciPy warns where the first draw of a sequence is no power of two."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return engine.random(count)
+
+
+@lru_cache(maxsize=1)
+def _latin(sampling: Sampling, dimension: int) -> Float[np.ndarray, "k d"]:
+    engine = qmc.LatinHypercube(dimension, rng=np.random.default_rng(sampling.seed))  # pyright: ignore
+    return engine.random(sampling.points)
+
+
+def _at_level(variable: SweepVariable, level: Float[np.ndarray, " k"]) -> np.ndarray:
+    low, high = limits_of(variable)
+    if variable.spacing == "log":
+        return np.clip(low * (high / low) ** level, low, high)
+    return np.clip(low + (high - low) * level, low, high)
