@@ -2,7 +2,7 @@
 
 Assembling a chain in Python takes a hundred times as long as solving it. The arrays of a chain are
 smooth functions of the numbers of the robot file; so they are assembled exactly at some nodes and
-by a polynomial between them, whose error is measured (`TOLERANCE`). What is solved is exact again.
+by a polynomial between them, whose error is measured (`TOLERANCES`). What is solved is exact again.
 Where no polynomial is good enough, every robot is assembled by itself.
 """
 
@@ -27,15 +27,15 @@ from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.static_structure import StaticStructure
 
-TOLERANCE = 1e-5
-"""Largest error of an entry, in parts of its own size or, if larger, 1 % of that of its array."""
+TOLERANCES = (1e-5, 1e-9)
+"""Largest errors of an entry, in parts of its own size or, if larger, 1 % of that of its array.
 
-_AIM = 1e-6
-"""Terms of a polynomial that are smaller are left out, of the same parts."""
+The second is met where a batch is large enough to pay for it.
+"""
 
 _FLOOR = 1e-2
 _CHECKS = 8
-_MOST_NODES = 2000
+_MOST_NODES = 4000
 
 
 class _Form(NamedTuple):
@@ -171,9 +171,8 @@ def _fitted(
             list(robots.cliques()),
             lambda sizes: _scale(sizes, form),
             form.parts,
-            tolerance=TOLERANCE,
-            aim=_AIM,
-            most=min(_MOST_NODES, len(table) // 3),
+            tolerances=TOLERANCES,
+            most=min(_MOST_NODES, len(table) // 2),
             checks=table[rows],
         )
     except _AnotherFormError:
