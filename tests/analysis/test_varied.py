@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.analysis.uncertainty.assumed import tolerances_of
+from notchflex.analysis.uncertainty.draws import sources_of, values_at
 from notchflex.analysis.varied import varied_chains as varied
-from notchflex.analysis.varied.sparse_polynomial import fit_polynomial, leja_points
+from notchflex.analysis.varied.sparse_polynomial import Wanted, fit_polynomial, leja_points
 from notchflex.robot.varied import VariedRobots
 from refusals import refused
 
@@ -81,6 +83,25 @@ def test_rows_of_notches_with_elastic_ends_are_those_of_the_robots():
         np.testing.assert_allclose(found[name][rows], exact[name], rtol=0.0, atol=1e-9 * size)
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["pacheco2021-a-true", "pacheco2021-b-true"])
+def test_assumed_tolerances_of_wrists_with_elastic_ends_need_no_robot_for_each_row(name):
+    """Up to a quarter of the wall: a thousand robots were assembled one by one."""
+    robot, load = nf.load_robot(name), nf.pull(0.5, 0.9, steps=2)
+    exact_robot, assumed = robot.replace(tolerance=None), tolerances_of(robot)[0]
+    sources = sources_of(exact_robot, assumed)
+    levels = np.random.default_rng(1).uniform(1e-6, 1.0 - 1e-6, (2600, len(sources)))
+    robots = VariedRobots(exact_robot, values_at(sources, levels))
+    assert varied.varied_chains(robots, load, 0) is not None
+    outputs = ("total_angle", "tip_position", "peak_strain")
+    found = nf.simulate_batch(robots, load, outputs=outputs)
+    rows = [0, 7, 800, 1500, 2599]
+    exact = nf.simulate_batch([robots[row] for row in rows], load, outputs=outputs)
+    for name in outputs:
+        size = np.abs(exact[name]).max()
+        np.testing.assert_allclose(found[name][rows], exact[name], rtol=0.0, atol=1e-5 * size)
+
+
 def test_few_robots_are_made_one_by_one():
     robots = some(WRIST, {"notch.depth": (1.4, 0.01)}, 8)
     load = nf.Load(tension=1.0)
@@ -116,7 +137,7 @@ def test_a_polynomial_finds_what_a_polynomial_is():
     made = fit_polynomial(
         exact, np.array([0.5, 1.0, -1.0]), np.array([1.0, 2.0, 3.0]), [[0, 1, 2]],
         lambda sizes: np.maximum(sizes, 1e-6), [np.array([0]), np.array([1]), np.array([2])],
-        tolerances=(1e-9,), most=500, checks=np.array([[0.7, 1.3, 2.0]]),
+        wanted=[Wanted(1e-9, 500)], checks=np.array([[0.7, 1.3, 2.0]]),
     )  # fmt: skip
     assert made is not None
     assert made.entries.tolist() == [0, 1]

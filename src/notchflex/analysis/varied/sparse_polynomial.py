@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 _DEGREE = 40
 _CUT = 1e-3  # smaller coefficients are left out, in parts of the error that is allowed
 _AIM = 0.3  # smaller terms are left out at first, likewise
-_ROUNDS = 4  # of parts that are not yet right
+_ROUNDS = 6  # of parts that are not yet right
 VectorOf = Callable[[Float[np.ndarray, " d"]], Float[np.ndarray, " m"]]
 
 
@@ -97,6 +97,18 @@ class _Block(NamedTuple):
     coefficients: Float[np.ndarray, "u t"]
 
 
+class Wanted(NamedTuple):
+    """How exact a polynomial should be, and what that may cost.
+
+    Attributes:
+        tolerance: Largest error in parts of the scale.
+        most: How many exact vectors may be evaluated for it, in all.
+    """
+
+    tolerance: float
+    most: int
+
+
 class SparsePolynomial(NamedTuple):
     """A polynomial from several numbers to some entries of a vector; the others are constant.
 
@@ -139,8 +151,7 @@ def fit_polynomial(
     scale_of: VectorOf,
     parts: Sequence[Int[np.ndarray, ...]],
     *,
-    tolerances: Sequence[float],
-    most: int,
+    wanted: Sequence[Wanted],
     checks: Float[np.ndarray, "k d"],
 ) -> SparsePolynomial | None:
     """Find a polynomial that is right to a tolerance.
@@ -153,9 +164,8 @@ def fit_polynomial(
         scale_of: From the largest size of every entry to what errors are measured in.
         parts: Places of entries that answer the numbers alike; of each it is found by itself which
             products of powers it needs.
-        tolerances: Errors that are allowed, in parts of the scale, the largest first: the last
-            for which so many exact vectors are enough is chosen. The last may be missed.
-        most: How many exact vectors may be evaluated.
+        wanted: Errors that are allowed, the largest first, which must be met. A smaller one is met
+            as far as it may cost.
         checks: Numbers at which the error is measured.
 
     Returns:
@@ -174,7 +184,7 @@ def fit_polynomial(
 
     cliques = list(cliques)
 
-    def indices_for(aims: Float[np.ndarray, " parts"]) -> list[tuple[int, ...]] | None:
+    def indices_for(aims: Float[np.ndarray, " parts"], most: int) -> list[tuple[int, ...]] | None:
         """Find the products of powers that matter; None if they are too many."""
         changes: list[np.ndarray] = []
         for variable in range(count):
@@ -186,10 +196,10 @@ def fit_polynomial(
 
     exact = np.stack([vector_of(one) for one in checks])
     good: SparsePolynomial | None = None
-    for tolerance in tolerances:
-        aims, last = np.full(len(parts), _AIM * tolerance), np.full(len(parts), np.inf)
+    for tolerance, most in wanted:
+        aims = np.full(len(parts), _AIM * tolerance)
         for _ in range(_ROUNDS):
-            indices = indices_for(aims)
+            indices = indices_for(aims, most)
             if indices is None:
                 return good
             terms = _Terms.of(indices)
@@ -200,12 +210,12 @@ def fit_polynomial(
             made = _solved(middle, half, terms, values, nodes, _CUT * tolerance * scale)
             error = _errors(made, exact, checks, scale)
             of_parts = np.array([np.max(error[part], initial=0.0) for part in parts])
-            if of_parts.max() <= tolerances[0]:
+            if of_parts.max() <= wanted[0].tolerance:
                 good = made
             wrong = of_parts > tolerance
-            if not wrong.any() or (of_parts[wrong] > 0.5 * last[wrong]).all():
+            if not wrong.any():
                 break
-            last, aims = of_parts, np.where(wrong, 0.1 * aims, aims)
+            aims = np.where(wrong, 0.1 * aims, aims)
     return good
 
 
@@ -305,4 +315,4 @@ def _errors(
     return np.max(np.abs(found - exact) / scale, axis=0)
 
 
-__all__ = ["SparsePolynomial", "fit_polynomial", "leja_points"]
+__all__ = ["SparsePolynomial", "Wanted", "fit_polynomial", "leja_points"]
