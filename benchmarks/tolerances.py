@@ -1,6 +1,6 @@
 """Tolerances of a wrist: gradients against draws, time of the draws, coverage of the interval.
 
-Prints a table; about half a minute on two cores. `python benchmarks/tolerances.py`
+Prints a table; about two minutes on two cores. `python benchmarks/tolerances.py`
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SHOP = {
     "material.elastic_modulus": "5 %",
     "friction.coefficient": {"plus": "20 %", "minus": "20 %"},
 }
-REPETITIONS, EACH = 400, 64
+REPETITIONS, EACH = 1600, 64
 
 
 def study_of(tolerances: dict, *limits: nf.AcceptanceLimit) -> Study:

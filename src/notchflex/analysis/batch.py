@@ -8,7 +8,7 @@ is bounded whatever the batch. Where JAX has a GPU they run there, whole pieces 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,8 +77,8 @@ def solve_batch(
         >>> batch["total_angle"].shape
         (100,)
     """
-    every = _robots(robots)
-    path = load_path(loads, _most_tendons(every))
+    every = _Robots.of(robots)
+    path = load_path(loads, every.most_tendons)
     arrays = _simulate(every, path, len(path), outputs, settings, refinement, cores, progress)
     return Batch({name: array[:, 0] for name, array in arrays.items()})
 
@@ -117,8 +117,8 @@ def simulate_batch(
         >>> simulate_batch(load_robot("pacheco2021-a"), paths)["total_angle"].shape
         (2, 8)
     """
-    every = _robots(robots)
-    tendons = _most_tendons(every)
+    every = _Robots.of(robots)
+    tendons = every.most_tendons
     message = "simulate_batch needs a notchflex.LoadPath, or some in order"
     paths = [load_path(one, tendons) for one in one_or_several(loads, LoadPath, message)]
     if not paths or len({len(path) for path in paths}) > 1:
@@ -150,24 +150,47 @@ def simulate_varied(
     return Batch(arrays)
 
 
-def _robots(robots: Any) -> Sequence[Robot]:
-    if isinstance(robots, VariedRobots):
-        return robots
-    message = "a batch needs a notchflex.Robot, or some of them"
-    every = one_or_several(robots, Robot, message)
-    if not every or not all(isinstance(robot, Robot) for robot in every):
-        raise InputError.WRONG_TYPE(f"{message}; got {short_repr(robots)}")
-    return every
+@dataclass(frozen=True)
+class _Robots:
+    """The robots of a batch.
 
+    Attributes:
+        every: One for all rows, or one per row.
+        varied: The same where they are one robot with other numbers, which need not be made.
+    """
 
-def _most_tendons(robots: Sequence[Robot]) -> int:
-    if isinstance(robots, VariedRobots):  # which share them
-        return robots.robot.number_of_tendons
-    return max(robot.number_of_tendons for robot in robots)
+    every: Sequence[Robot]
+    varied: VariedRobots | None = None
+
+    @classmethod
+    def of(cls, robots: Any) -> _Robots:
+        """Take what a caller gives for the robots of a batch."""
+        if isinstance(robots, VariedRobots):
+            return cls(robots, robots)
+        message = "a batch needs a notchflex.Robot, or some of them"
+        every = one_or_several(robots, Robot, message)
+        if not every or not all(isinstance(robot, Robot) for robot in every):
+            raise InputError.WRONG_TYPE(f"{message}; got {short_repr(robots)}")
+        return cls(every)
+
+    @property
+    def most_tendons(self) -> int:
+        """Number of tendons of the robot that has most."""
+        unlike = self.every if self.varied is None else [self.varied.robot]
+        return max(robot.number_of_tendons for robot in unlike)
+
+    @property
+    def threads(self) -> AbstractContextManager[Any]:
+        """What limits threads while rows are solved.
+
+        Every core has a piece of its own: a product of matrices, by which varied robots are found,
+        is not to take the others too.
+        """
+        return nullcontext() if self.varied is None else threadpool_limits(1)
 
 
 def _simulate(
-    robots: Sequence[Robot],
+    robots: _Robots,
     joined: LoadPath,
     paths: int,
     outputs: Sequence[str],
@@ -181,11 +204,12 @@ def _simulate(
     threads = number_of_cores() if cores is None else check_integer(cores, "cores")
     if threads < 1:
         raise InputError.OUT_OF_RANGE(f"cores must be 1 or more, or None for all; got {threads}")
-    count = max(len(robots), paths)
-    if len(robots) not in (1, count) or paths not in (1, count):
+    given = len(robots.every)
+    count = max(given, paths)
+    if given not in (1, count) or paths not in (1, count):
         raise InputError.WRONG_SHAPE(
             "a batch needs as many robots as loads, or one of either; "
-            f"got {len(robots)} robots and {paths} loads"
+            f"got {given} robots and {paths} loads"
         )
     numbers = np.array((settings or DEFAULT).numbers)
     arrays: dict[str, np.ndarray] = {}
@@ -195,10 +219,8 @@ def _simulate(
         for table in _tables(robots, joined, paths, count, asked, refinement)
         for index in table.pieces(threads)
     ]
-    # Every core has a piece of its own: a product of matrices is not to take the others too.
-    one_each = threadpool_limits(1) if isinstance(robots, VariedRobots) else nullcontext()
     solving = on_cores(lambda one: one[0].run(one[1], numbers), work, threads)
-    with one_each, closing(solving) as pieces:
+    with robots.threads, closing(solving) as pieces:
         for (table, index), piece in zip(work, pieces, strict=True):
             rows = table.rows[index]
             for name, values in piece.items():
@@ -304,7 +326,7 @@ def _empty(values: np.ndarray) -> float:
 
 
 def _tables(
-    robots: Sequence[Robot],
+    robots: _Robots,
     joined: LoadPath,
     paths: int,
     count: int,
@@ -313,18 +335,18 @@ def _tables(
 ) -> Sequence[_BatchRows]:
     """The rows of a batch by the layout of their robots, shorter ones padded to the longest."""
     steps = len(joined) // paths
-    if isinstance(robots, VariedRobots) and paths == 1:
-        varied = varied_chains(robots, joined, refinement)
+    if robots.varied is not None and paths == 1:
+        varied = varied_chains(robots.varied, joined, refinement)
         if varied is not None:
             return [_varied_rows(varied, count, outputs)]
     # The modes that any of the loads asks for, so that rows share a program.
-    every = [prepare_for(robot, joined, None, refinement) for robot in robots]
+    every = [prepare_for(robot, joined, None, refinement) for robot in robots.every]
     flexures = max(ready.chain.flexures for ready in every)
     edges = max(ready.chain.contacts.shape[1] for ready in every)
     by_stroke = not np.isnan(joined.stroke).all()
     groups: dict[Any, list[tuple[int, PreparedChain, np.ndarray]]] = {}
-    for row, (robot, unpadded) in enumerate(zip(robots, every, strict=True)):
-        part = joined if len(robots) == 1 or paths == 1 else joined.part(row * steps, steps)
+    for row, (robot, unpadded) in enumerate(zip(robots.every, every, strict=True)):
+        part = joined if len(robots.every) == 1 or paths == 1 else joined.part(row * steps, steps)
         commands = pad_commands(make_commands(part, robot, unpadded.chain), flexures, by_stroke)
         ready = pad_prepared(unpadded, flexures, edges)
         layout = ready.command_layout(commands)
@@ -333,7 +355,7 @@ def _tables(
     tables = []
     for (chain_layout, layout), entries in groups.items():
         numbers, prepared, commands = zip(*entries, strict=True)
-        rows = np.arange(count) if len(robots) == 1 else np.array(numbers)
+        rows = np.arange(count) if len(robots.every) == 1 else np.array(numbers)
         vectors = np.stack([ready.vector for ready in prepared])
         structure = StaticStructure.of(chain_layout, [ready.chain for ready in prepared], vectors)
         counts = np.array([every[number].chain.flexures for number in numbers])

@@ -16,7 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-_DEGREE = 16
+_DEGREE = 40
+_CUT = 1e-3  # smaller coefficients are left out, in parts of the error that is allowed
+_AIM = 0.3  # smaller terms are left out at first, likewise
+_ROUNDS = 6  # of parts that are not yet right
 VectorOf = Callable[[Float[np.ndarray, " d"]], Float[np.ndarray, " m"]]
 
 
@@ -82,6 +85,30 @@ def _span(leja: np.ndarray, degree: int) -> float:
     return float(above / below)
 
 
+class _Block(NamedTuple):
+    """Entries that depend on the same numbers.
+
+    Attributes:
+        terms: Places of the terms that any of them has.
+        coefficients: Of these terms for every entry, (entries, terms).
+    """
+
+    terms: Int[np.ndarray, " t"]
+    coefficients: Float[np.ndarray, "u t"]
+
+
+class Wanted(NamedTuple):
+    """How exact a polynomial should be, and what that may cost.
+
+    Attributes:
+        tolerance: Largest error in parts of the scale.
+        most: How many exact vectors may be evaluated for it, in all.
+    """
+
+    tolerance: float
+    most: int
+
+
 class SparsePolynomial(NamedTuple):
     """A polynomial from several numbers to some entries of a vector; the others are constant.
 
@@ -89,9 +116,9 @@ class SparsePolynomial(NamedTuple):
         middle: Middle of the range of every number.
         half: Half its range.
         terms: The products of powers.
-        coefficients: Of every term for every entry that varies, unlike ones only, (u, terms).
+        blocks: Of unlike entries that depend on the same numbers.
         entries: Places of the entries that vary in the vector.
-        which: Which of the unlike rows each of them has.
+        which: Which of the unlike entries, block after block, each of them is.
         base: The vector in the middle.
         nodes: Exact vectors at all points that were evaluated, (points, m).
     """
@@ -99,7 +126,7 @@ class SparsePolynomial(NamedTuple):
     middle: Float[np.ndarray, " d"]
     half: Float[np.ndarray, " d"]
     terms: _Terms
-    coefficients: Float[np.ndarray, "u terms"]
+    blocks: Sequence[_Block]
     entries: Int[np.ndarray, " v"]
     which: Int[np.ndarray, " v"]
     base: Float[np.ndarray, " m"]
@@ -112,7 +139,8 @@ class SparsePolynomial(NamedTuple):
     def varied(self, numbers: Float[np.ndarray, "rows d"]) -> Float[np.ndarray, "v rows"]:
         """Return the entries that vary, at rows of numbers."""
         terms = self.terms.at((numbers - self.middle) / self.half)
-        return (self.coefficients @ terms)[self.which]
+        found = [one.coefficients @ terms[one.terms] for one in self.blocks]
+        return np.concatenate([np.zeros((0, len(numbers))), *found])[self.which]
 
 
 def fit_polynomial(
@@ -123,9 +151,7 @@ def fit_polynomial(
     scale_of: VectorOf,
     parts: Sequence[Int[np.ndarray, ...]],
     *,
-    tolerance: float,
-    aim: float,
-    most: int,
+    wanted: Sequence[Wanted],
     checks: Float[np.ndarray, "k d"],
 ) -> SparsePolynomial | None:
     """Find a polynomial that is right to a tolerance.
@@ -138,13 +164,12 @@ def fit_polynomial(
         scale_of: From the largest size of every entry to what errors are measured in.
         parts: Places of entries that answer the numbers alike; of each it is found by itself which
             products of powers it needs.
-        tolerance: Largest error in parts of the scale.
-        aim: Terms that are smaller are left out at first, in parts of the scale.
-        most: How many exact vectors may be evaluated.
+        wanted: Errors that are allowed, the largest first, which must be met. A smaller one is met
+            as far as it may cost.
         checks: Numbers at which the error is measured.
 
     Returns:
-        The polynomial; None where it is not right within so many evaluations.
+        The polynomial; None where not even the first is met by so many evaluations.
     """
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     known: dict[tuple[int, ...], np.ndarray] = {}
@@ -156,25 +181,42 @@ def fit_polynomial(
 
     count = len(middle)
     scale = scale_of(np.abs(at((0,) * count)))
-    changes: list[np.ndarray] = []
-    for variable in range(count):
-        found = _changes(at, variable, count, scale, parts, aim)
-        if found is None or len(known) > most:
-            return None
-        changes.append(found)
-    for share in (1.0, 0.1, 0.01):
-        wanted = share * aim
-        indices = _indices(changes, cliques, wanted, most)
-        if indices is None:
-            return None
-        terms = _Terms.of(indices)
-        for index in sorted(indices):  # the last variables first: what is left stays the same
-            at(index)
-        values = np.stack([at(tuple(index)) for index in terms.powers.tolist()])
-        made = _solved(middle, half, terms, values, np.stack(list(known.values())))
-        if _error(made, vector_of, checks, scale) <= tolerance:
-            return made
-    return None
+
+    cliques = list(cliques)
+
+    def indices_for(aims: Float[np.ndarray, " parts"], most: int) -> list[tuple[int, ...]] | None:
+        """Find the products of powers that matter; None if they are too many."""
+        changes: list[np.ndarray] = []
+        for variable in range(count):
+            found = _changes(at, variable, count, scale, parts, aims)
+            if found is None or len(known) > most:
+                return None
+            changes.append(found)
+        return _indices(changes, cliques, aims, most)
+
+    exact = np.stack([vector_of(one) for one in checks])
+    good: SparsePolynomial | None = None
+    for tolerance, most in wanted:
+        aims = np.full(len(parts), _AIM * tolerance)
+        for _ in range(_ROUNDS):
+            indices = indices_for(aims, most)
+            if indices is None:
+                return good
+            terms = _Terms.of(indices)
+            for index in sorted(indices):  # the last variables first: what is left stays the same
+                at(index)
+            values = np.stack([at(tuple(index)) for index in terms.powers.tolist()])
+            nodes = np.stack(list(known.values()))
+            made = _solved(middle, half, terms, values, nodes, _CUT * tolerance * scale)
+            error = _errors(made, exact, checks, scale)
+            of_parts = np.array([np.max(error[part], initial=0.0) for part in parts])
+            if of_parts.max() <= wanted[0].tolerance:
+                good = made
+            wrong = of_parts > tolerance
+            if not wrong.any():
+                break
+            aims = np.where(wrong, 0.1 * aims, aims)
+    return good
 
 
 def _changes(
@@ -183,7 +225,7 @@ def _changes(
     count: int,
     scale: np.ndarray,
     parts: Sequence[np.ndarray],
-    aim: float,
+    aims: Float[np.ndarray, " parts"],
 ) -> Float[np.ndarray, "parts degrees"] | None:
     """How much each further point along a variable changes each part, in parts of the scale."""
     points = leja_points()
@@ -199,7 +241,7 @@ def _changes(
             change = np.abs(value - before) / scale
             sizes.append(np.array([np.max(change[part], initial=0.0) for part in parts]))
         values.append(value)
-        if degree > 1 and max(sizes[-1].max(), sizes[-2].max()) < 0.1 * aim:
+        if degree > 1 and (np.maximum(sizes[-1], sizes[-2]) < 0.1 * aims).all():
             kept = np.stack([np.ones(len(parts)), *sizes[:-2]], axis=-1)
             # None smaller than a later one, so that no term comes without those that divide it.
             return np.minimum(np.maximum.accumulate(kept[:, ::-1], axis=1)[:, ::-1], 1.0)
@@ -209,7 +251,7 @@ def _changes(
 def _indices(
     changes: Sequence[Float[np.ndarray, "parts degrees"]],
     cliques: Iterable[Sequence[int]],
-    wanted: float,
+    aims: Float[np.ndarray, " parts"],
     most: int,
 ) -> list[tuple[int, ...]] | None:
     """Products of powers that matter, none without those that divide it; None if too many."""
@@ -223,7 +265,7 @@ def _indices(
                     ((*powers[:variable], degree, *powers[variable + 1 :]), size * float(own))
                     for powers, size in partial
                     for degree, own in enumerate(further, start=1)
-                    if size * own >= wanted
+                    if size * own >= aims[part]
                 ]
                 if len(partial) > most:
                     return None
@@ -237,25 +279,40 @@ def _solved(
     terms: _Terms,
     values: Float[np.ndarray, "terms m"],
     nodes: Float[np.ndarray, "points m"],
+    least: Float[np.ndarray, " m"],
 ) -> SparsePolynomial:
     base = values[0]
     entries = np.flatnonzero((nodes != base).any(axis=0))
-    columns, which = np.unique(values[:, entries], axis=1, return_inverse=True)
+    columns, first, which = np.unique(
+        values[:, entries], axis=1, return_index=True, return_inverse=True
+    )
     basis = terms.at(leja_points()[terms.powers])
     coefficients = np.linalg.solve(basis.T, columns).T
-    return SparsePolynomial(
-        middle, half, terms, np.ascontiguousarray(coefficients), entries, which.ravel(), base, nodes
-    )
+    coefficients[np.abs(coefficients) < least[entries[first], None]] = 0.0
+    # Which numbers each of the unlike entries depends on.
+    of_variables = (coefficients != 0.0) @ (terms.powers > 0) > 0
+    _, block_of = np.unique(of_variables, axis=0, return_inverse=True)
+    block_of = block_of.ravel()
+    order = np.argsort(block_of, kind="stable")
+    place = np.argsort(order)
+    blocks: list[_Block] = []
+    for block in range(block_of.max(initial=-1) + 1):
+        own = coefficients[block_of == block]
+        used = np.flatnonzero((own != 0.0).any(axis=0))
+        blocks.append(_Block(used, np.ascontiguousarray(own[:, used])))
+    return SparsePolynomial(middle, half, terms, blocks, entries, place[which.ravel()], base, nodes)
 
 
-def _error(
-    made: SparsePolynomial, vector_of: VectorOf, checks: Float[np.ndarray, "k d"], scale: np.ndarray
-) -> float:
-    """Largest error at points that are no nodes, in parts of the scale."""
+def _errors(
+    made: SparsePolynomial,
+    exact: Float[np.ndarray, "k m"],
+    checks: Float[np.ndarray, "k d"],
+    scale: np.ndarray,
+) -> Float[np.ndarray, " m"]:
+    """Largest error of each entry at points that are no nodes, in parts of the scale."""
     found = np.tile(made.base, (len(checks), 1))
     found[:, made.entries] = made.varied(checks).T
-    exact = np.stack([vector_of(one) for one in checks])
-    return float(np.max(np.abs(found - exact) / scale, initial=0.0))
+    return np.max(np.abs(found - exact) / scale, axis=0)
 
 
-__all__ = ["SparsePolynomial", "fit_polynomial", "leja_points"]
+__all__ = ["SparsePolynomial", "Wanted", "fit_polynomial", "leja_points"]

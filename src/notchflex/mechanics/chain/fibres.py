@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import singledispatch
+from functools import lru_cache, singledispatch
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from notchflex.mechanics.section.fibres import (
     Points,
     fitted,
     rectangle_fibres,
+    reduced,
     sector_fibres,
     segment_fibres,
 )
@@ -37,7 +38,12 @@ def section_fibres(notch: Any, tube: Tube) -> Points | None:
 
 @section_fibres.register
 def _(notch: ArcNotch, tube: Tube) -> Points | None:
-    return _OF_CUT[notch.cut](tube.outer_radius, tube.inner_radius, notch.section_depth(tube))
+    return _of_cut(notch.cut, tube.outer_radius, tube.inner_radius, notch.section_depth(tube))
+
+
+@lru_cache(maxsize=1024)  # the same for all sites and heights
+def _of_cut(cut: str, outer: float, inner: float, depth: float) -> Points:
+    return reduced(_OF_CUT[cut](outer, inner, depth))
 
 
 def with_fibres(rod: Rod, notch: Any, tube: Tube) -> Rod:
@@ -45,7 +51,7 @@ def with_fibres(rod: Rod, notch: Any, tube: Tube) -> Rod:
     points, section = section_fibres(notch, tube), rod.section
     numbers = section.edge_near, section.edge_spine, section.area, section.second_moment_weak
     every = [
-        fitted(points or rectangle_fibres(near, spine), area, second_moment)
+        fitted(points or reduced(rectangle_fibres(near, spine)), area, second_moment)
         for near, spine, area, second_moment in np.stack(numbers, axis=-1)
     ]
     arm, area = (constant(np.stack(part)) for part in zip(*every, strict=True))

@@ -28,7 +28,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     legendre_modes,
     shifted,
 )
-from notchflex.mechanics.flexure.quadrature import RodQuadrature
+from notchflex.mechanics.flexure.quadrature import rod_quadrature
 from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import NotchEnds
@@ -64,7 +64,7 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
     # Smooth all along: one piece, with a node in its middle. With six nodes a notch that bends by a
     # radian in its plane is right to 1e-15; the turns of one that also bends sideways and twists
     # need ten for 3e-8.
-    points = RodQuadrature((0.0, notch.height), (7 + 4 * refinement,), (10 + 3 * refinement,))
+    points = rod_quadrature((0.0, notch.height), (7 + 4 * refinement,), (10 + 3 * refinement,))
     bending, twist = 2 + refinement, 1 + refinement
     centre = float(section.shear_centre)
     modes = legendre_modes(

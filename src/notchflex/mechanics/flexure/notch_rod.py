@@ -92,10 +92,11 @@ def legendre_modes(
     """
     length = quadrature.ends[-1]
     modes = np.zeros((len(quadrature.every), 6, bending + sideways + twist))
+    most = max(bending, sideways, twist)
+    polynomials = legvander(2.0 * quadrature.every / length - 1.0, most - 1)
     first = 0
     for component, count in ((1, bending), (0, sideways), (2, twist)):
-        polynomials = legvander(2.0 * quadrature.every / length - 1.0, count - 1)
-        modes[:, component, first : first + count] = polynomials
+        modes[:, component, first : first + count] = polynomials[:, :count]
         first += count
     # Twist about the shear centre shears the neutral axis, which lies off it, sideways.
     modes[:, 4, bending + sideways :] = shear_centre * modes[:, 2, bending + sideways :]

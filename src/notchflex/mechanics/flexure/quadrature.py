@@ -69,6 +69,14 @@ def gauss_nodes(
     return np.concatenate(places), np.concatenate(weights)
 
 
+@lru_cache(maxsize=64)
+def rod_quadrature(
+    ends: tuple[float, ...], nodes: tuple[int, ...], poses: tuple[int, ...]
+) -> RodQuadrature:
+    """Return the places along a rod, the same object for notches that are alike but for sites."""
+    return RodQuadrature(ends, nodes, poses)
+
+
 def up_to(count: int, parts: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k nodes"]:
     """Integrals from 0 to parts of (0, 1) of the polynomials through Gauss's nodes there."""
     powers = np.arange(1, count + 1)

@@ -19,7 +19,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     build_rod,
     shifted,
 )
-from notchflex.mechanics.flexure.quadrature import RodQuadrature
+from notchflex.mechanics.flexure.quadrature import rod_quadrature
 from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.roots import rooted_strip_rod, round_strip, strip_validity
@@ -80,9 +80,9 @@ def u_link_rod(
     ends = (0.0, 0.5 * curved, link.length - 0.5 * curved, link.length)
     counts = (nodes[0], nodes[1], nodes[0])
     # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
-    places = RodQuadrature(ends, counts, tuple(count - 1 for count in counts))
+    places = rod_quadrature(ends, counts, tuple(count - 1 for count in counts))
     place = places.every
-    course = link.course(np.array([*place, 0.0, link.length]))
+    course = link.course_at((*place.tolist(), 0.0, link.length))
     section = _section(link, tube, Course(*(values[:-2] for values in course)), poisson_ratio)
     # A slot cut from the side away from the bend leaves the wall on the bend's side, where the
     # link then begins; over the slot that follows stands its mirror image.

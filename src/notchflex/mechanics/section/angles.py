@@ -9,6 +9,10 @@ below one radian and as it stands above.
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from math import factorial
+from types import ModuleType
+from typing import Any
+
+import numpy as np
 
 from notchflex._jax import array_module, jax
 
@@ -47,17 +51,24 @@ def cancelling_sum(terms: Sequence[Term]) -> Callable[[jax.Array], jax.Array]:
     coefficients = [float(series[first + 2 * k]) for k in range(_TERMS)]
 
     def evaluate(angle: jax.Array) -> jax.Array:
+        if isinstance(angle, np.ndarray) and angle.ndim == 0:  # of one notch: no arrays needed
+            number: Any = float(angle)
+            return np.asarray(near(number) if number < _SERIES_BELOW else far(np, number))  # pyright: ignore[reportReturnType]
         xp = array_module(angle)
-        square = angle * angle
-        small = xp.full_like(angle, coefficients[-1])
+        return xp.where(angle < _SERIES_BELOW, near(angle), far(xp, angle))
+
+    def near(angle: Any) -> Any:
+        square, total = angle * angle, coefficients[-1]
         for coefficient in reversed(coefficients[:-1]):
-            small = small * square + coefficient
-        small = small * angle**first
-        plain = xp.zeros_like(angle)
+            total = total * square + coefficient
+        return total * angle**first
+
+    def far(xp: ModuleType, angle: Any) -> Any:
+        total = 0.0
         for factor, power, kind, multiple in terms:
             wave = xp.sin(multiple * angle) if kind == "sin" else xp.cos(multiple * angle)
-            plain = plain + float(factor) * angle**power * wave
-        return xp.where(angle < _SERIES_BELOW, small, plain)
+            total = total + float(factor) * angle**power * wave
+        return total
 
     return evaluate
 

@@ -71,9 +71,14 @@ def _between(first: float, last: float, count: int) -> tuple[np.ndarray, np.ndar
     return 0.5 * (first + last) + 0.5 * (last - first) * points, 0.5 * (last - first) * weights
 
 
+def reduced(points: Points) -> Points:
+    """Few fibres that stand for many."""
+    return gauss_rule(*points, FIBRES)
+
+
 def fitted(points: Points, area: float, second_moment: float) -> Points:
     """Fibres about their centroid, of a given area (mm^2) and second moment (mm^4)."""
-    arm, areas = gauss_rule(*points, FIBRES)
+    arm, areas = points
     areas = areas * (area / np.sum(areas))
     arm = arm - areas @ arm / area
     return arm * np.sqrt(second_moment / (areas @ arm**2)), areas

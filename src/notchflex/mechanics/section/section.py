@@ -1,12 +1,13 @@
 """The cross-section that a cut leaves of a tube, as the numbers a rod needs."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from jax.typing import ArrayLike
 
-from notchflex._jax import array_module, jax
+from notchflex._jax import array_module, constant, jax
 
 
 class Section(NamedTuple):
@@ -58,7 +59,14 @@ def plain_or_compiled(
     """
     compiled = jax.jit(properties)
 
+    @lru_cache(maxsize=1024)  # the notches of a tube, and their sites, ask for the same section
+    def of_numbers(outer: float, inner: float, depth: float) -> Section:
+        found = properties(constant(outer), constant(inner), constant(depth))
+        return Section(*(_fixed(value) for value in found))
+
     def section(outer: ArrayLike, inner: ArrayLike, depth: ArrayLike) -> Section:
+        if isinstance(outer, float) and isinstance(inner, float) and isinstance(depth, float):
+            return of_numbers(float(outer), float(inner), float(depth))
         xp = array_module(outer, inner, depth)
         chosen = properties if xp is np else compiled
         return chosen(
@@ -66,3 +74,10 @@ def plain_or_compiled(
         )
 
     return section
+
+
+def _fixed(value: jax.Array) -> jax.Array:
+    """Return a number as an array that nobody can change: it is kept for others."""
+    array = np.array(value)
+    array.setflags(write=False)
+    return array  # pyright: ignore[reportReturnType]
