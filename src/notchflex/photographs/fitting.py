@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from notchflex.photographs.camera import NUMBERS
 from notchflex.photographs.contrast import Contrast
 from notchflex.photographs.edges import Edges, find_edges
-from notchflex.photographs.outline import NUMBERS, Numbers, Outline, OutlineModel
+from notchflex.photographs.outline import Numbers, Outline, OutlineModel
 
 ROBUST = (0.35, 2.0)
 """Least and largest residual beyond which an edge counts less, px."""

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from notchflex.analysis import tip_from_angles
 from notchflex.errors import InputError
+from notchflex.photographs.camera import NUMBERS
 from notchflex.photographs.chain_table import ChainTable, Numbers, chain_table
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import covariance
 from notchflex.photographs.judging import doubt
 from notchflex.photographs.loads import loads_of
-from notchflex.photographs.locating import NEAR, Located, locate
+from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
-from notchflex.photographs.outline import NUMBERS
+from notchflex.photographs.missing import NEAR
 from notchflex.photographs.reading import read_photograph
 from notchflex.robot import Robot
 

@@ -198,11 +198,15 @@ def _smoothed(points: Numbers, half: int) -> Numbers:
 
 
 def with_tilts(numbers: Numbers, size: float) -> list[Numbers]:
-    """Return a start with the camera tilted to either side, and rolled to either."""
-    made: list[Numbers] = []
-    for tilt, roll in itertools.product((size, -size), (1.0, -1.0)):
-        one = numbers.copy()
-        turn = math.pi if math.cos(one[4]) < 0.0 else 0.0
-        one[4], one[5] = turn + roll * abs(one[4] - turn), tilt
-        made.append(one)
+    """Return a start with the robot tilted toward the camera, and away from it."""
+    made = [numbers.copy(), numbers.copy()]
+    made[0][5], made[1][5] = size, -size
+    return made
+
+
+def reversed_view(numbers: Numbers) -> Numbers:
+    """Return the view that looks alike from far away: rolled and tilted the other way."""
+    made = numbers.copy()
+    turn = math.pi if math.cos(made[4]) < 0.0 else 0.0
+    made[4], made[5] = 2.0 * turn - made[4], -made[5]
     return made
