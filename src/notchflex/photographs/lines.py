@@ -32,19 +32,19 @@ class Lines(NamedTuple):
     Attributes:
         which: Number of the line of each point, (N,).
         place: Place of each point on its line, -1 to 1, (N,).
-        count: Number of lines.
+        number: Number of lines.
     """
 
     which: NDArray[np.int_]
     place: Numbers
-    count: int
+    number: int
 
     def columns(self) -> Numbers:
         """Return what one px of each shift, of each turn and of the common shift adds, (N, m)."""
-        made = np.zeros((len(self.which), 2 * self.count + 1))
+        made = np.zeros((len(self.which), 2 * self.number + 1))
         row = np.arange(len(self.which))
         made[row, self.which] = 1.0
-        made[row, self.count + self.which] = self.place
+        made[row, self.number + self.which] = self.place
         made[:, -1] = 1.0
         return made
 
@@ -56,17 +56,17 @@ class Lines(NamedTuple):
             robust: Distance from the line beyond which an edge counts less, px.
 
         Returns:
-            Shift and turn, px, (count, 2), NaN for lines of few edges; offsets less these, (N,).
+            Shift and turn, px, (number, 2), NaN for lines of few edges; offsets less these, (N,).
         """
         seen = np.isfinite(offset)
         value, place = np.where(seen, offset, 0.0), self.place
 
         def total(one: Numbers) -> Numbers:
-            return np.bincount(self.which, one, self.count).astype(float)
+            return np.bincount(self.which, one, self.number).astype(float)
 
         enough = total(seen.astype(float)) >= _LEAST_POINTS
-        shift, turn = np.zeros(self.count), np.zeros(self.count)
-        starts = [value[seen & (self.which == one)] for one in range(self.count)]
+        shift, turn = np.zeros(self.number), np.zeros(self.number)
+        starts = [value[seen & (self.which == one)] for one in range(self.number)]
         shift[:] = [np.median(one) if len(one) else 0.0 for one in starts]
         left = value - shift[self.which]
         for _ in range(_ROUNDS):
@@ -86,7 +86,7 @@ class Lines(NamedTuple):
         """Return the spreads of all columns, px, (m,).
 
         Args:
-            errors: Shifts and turns of the lines, (count, 2).
+            errors: Shifts and turns of the lines, (number, 2).
             fitted: How many unknowns were fitted to the lines, which makes their errors look
                 small; None in first rounds, whose errors say little about the lines.
         """

@@ -85,7 +85,9 @@ def _fine(
         for numbers in coarse
     ]
     limit = min(cost(fit, model) for fit in quick) + _WORSE
-    near = [fit.numbers for fit in quick if cost(fit, model) < limit]
+    near = [fit.numbers for fit in quick if cost(fit, model) < limit or not missing(model, fit)]
+    if all(missing(model, fit) for fit in quick):
+        near = [fit.numbers for fit in quick]
     return [
         refine(model, contrast, start, _LAST_REACHES, middle, NEAR)
         for numbers in near

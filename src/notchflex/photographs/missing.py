@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from notchflex.photographs.fitting import Fit
-from notchflex.photographs.outline import FACE, SIDE, OutlineModel
+from notchflex.photographs.outline import FACE, SIDE, SPINE, OutlineModel
 
 NEAR = 2.0
 """Distance from the outline within which an edge counts as its own, px."""
 
-_LEAST_SCORE, _LEAST_SIDE, _LEAST_BASE, _LEAST_TIP, _LEAST_FACES = 0.7, 0.5, 0.35, 0.5, 0.35
+_LEAST_SCORE, _LEAST_SIDE, _LEAST_BASE, _LEAST_TIP = 0.7, 0.5, 0.35, 0.5
+_LEAST_FACES, _LEAST_SPINES = 0.35, 0.5
 
 
 def missing(model: OutlineModel, fit: Fit) -> str:
@@ -39,6 +40,11 @@ def missing(model: OutlineModel, fit: Fit) -> str:
         part = face & beside & looked
         if part.sum() > 6 and share(part) < _LEAST_FACES:
             return f"the faces of notch {notch} are not seen where the robot file has them"
+    # A robot laid out on its wrong side fits rings, but its spines lie where there is nothing.
+    notch = np.clip(model.ring - 1, 0, n - 1)
+    back = (model.kind == SPINE) & (model.which * model.table.side[notch] < 0.0)
+    if share(back) < _LEAST_SPINES:
+        return "the spines beside the notches are not seen where the robot file has them"
     if fit.score < _LEAST_SCORE:
         return f"only {100 * fit.score:.0f} % of the outline is found in the photograph"
     return ""
