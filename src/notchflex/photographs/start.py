@@ -22,6 +22,7 @@ COARSE = 360
 _CLOSINGS = (2, 4, 7, 11, 16)
 _BIN = 2.0
 _BREAK = 5  # bins: shorter breaks, by highlights, do not end a stretch
+_SHORTEST = 0.6  # of the length of the robot: its centre line is cut short on the inside of a bend
 _MOST_PARTS = 4
 _LEAST_WIDTH = 3.0
 _SLIPS = (0.0, -0.4, -0.8, 0.4)
@@ -130,7 +131,7 @@ def _stretches(table: ChainTable, centre: Numbers, width: Numbers) -> Iterator[R
         fits = binary_closing(fits, np.ones(_BREAK), border_value=0) | fits
         changes = np.flatnonzero(np.diff(np.concatenate([[0], fits.astype(int), [0]])))
         for begin, end in zip(changes[::2], changes[1::2], strict=True):
-            if (end - begin) * _BIN < 0.75 * wanted * ratio:
+            if (end - begin) * _BIN < _SHORTEST * wanted * ratio:
                 continue
             own = float(np.percentile(width[begin:end], 55))
             if not 0.94 < own / wanted < 1.07:
