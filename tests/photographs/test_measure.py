@@ -9,10 +9,10 @@ import pytest
 
 import notchflex as nf
 from notchflex.cli.app import run
-from notchflex.photographs.chain_table import chain_table
+from notchflex.photographs.chain.chain_table import chain_table
+from notchflex.photographs.chain.outline import OutlineModel
 from notchflex.photographs.lines import lines_of
 from notchflex.photographs.measure import measure_picture
-from notchflex.photographs.outline import OutlineModel
 from notchflex.photographs.overlay import overlay_names
 from notchflex.photographs.reading import read_photograph
 from photographs.renderer import Scene, render

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.camera import NUMBERS
+from notchflex.photographs.chain.camera import NUMBERS
+from notchflex.photographs.chain.outline import Numbers, Outline, OutlineModel
 from notchflex.photographs.contrast import Contrast
 from notchflex.photographs.edges import Edges, find_edges
 from notchflex.photographs.lines import Lines, lines_of
-from notchflex.photographs.outline import Numbers, Outline, OutlineModel
 
 _PRIOR_ROLL, _PRIOR_TILT = math.radians(10.0), math.radians(8.0)
 _PRIOR_KERF, _PRIOR_CUT = 0.01, 0.006  # of the outer diameter: how well notches are made

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from notchflex.photographs.camera import NUMBERS
-from notchflex.photographs.chain_table import Numbers
+from notchflex.photographs.chain.camera import NUMBERS
+from notchflex.photographs.chain.chain_table import Numbers
 from notchflex.photographs.locating import Located
 from notchflex.photographs.missing import missing
 

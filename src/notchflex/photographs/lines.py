@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.chain_table import Numbers
-from notchflex.photographs.outline import OutlineModel
+from notchflex.photographs.chain.chain_table import Numbers
+from notchflex.photographs.chain.outline import OutlineModel
 
 FIRST_SPREAD = (0.3, 0.08)
 """Spreads of the shift and of the turn of a line before they are known, px."""

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from notchflex.photographs.camera import NUMBERS
-from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.camera import NUMBERS
+from notchflex.photographs.chain.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.outline import OutlineModel
 from notchflex.photographs.contrast import Contrast
 from notchflex.photographs.fitting import Fit, cost, covariance, misfit, refine
 from notchflex.photographs.missing import NEAR, missing
-from notchflex.photographs.outline import OutlineModel
 from notchflex.photographs.start import COARSE, reversed_view, starts, with_tilts
 
 _COARSE_WIDTH = 40.0  # of the tube in the first fits, px

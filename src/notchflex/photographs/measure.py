@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from notchflex.analysis import tip_from_angles
 from notchflex.errors import InputError
-from notchflex.photographs.camera import NUMBERS
-from notchflex.photographs.chain_table import ChainTable, Numbers, chain_table
+from notchflex.photographs.chain.camera import NUMBERS
+from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import covariance
 from notchflex.photographs.judging import doubt

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from notchflex.photographs.chain.outline import FACE, SIDE, SPINE, OutlineModel
 from notchflex.photographs.fitting import Fit
-from notchflex.photographs.outline import FACE, SIDE, SPINE, OutlineModel
 
 NEAR = 2.0
 """Distance from the outline within which an edge counts as its own, px."""

@@ -13,7 +13,7 @@ from scipy.ndimage import binary_closing
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 from notchflex.photographs.contrast import Contrast
 
 COARSE = 360

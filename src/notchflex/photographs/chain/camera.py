@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.chain_table import Numbers
+from notchflex.photographs.chain.chain_table import Numbers
 
 VIEW = ("x", "y", "direction", "log_scale", "roll", "tilt", "perspective", "kerf", "cut")
 """Numbers of a view, before the angles: place of the start of the first notch from the middle of

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.camera import Frame, View
-from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.camera import Frame, View
+from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 
 SIDE, FACE, SPINE = 0, 1, 2
 """Kinds of outline: the sides of a ring, its ends, the two edges of a spine."""
