@@ -9,7 +9,9 @@ import pytest
 
 import notchflex as nf
 from notchflex.cli.app import run
-from notchflex.photographs.chain_table import chain_table
+from notchflex.photographs.chain.chain_table import chain_table
+from notchflex.photographs.chain.outline import OutlineModel
+from notchflex.photographs.lines import lines_of
 from notchflex.photographs.measure import measure_picture
 from notchflex.photographs.overlay import overlay_names
 from notchflex.photographs.reading import read_photograph
@@ -166,3 +168,51 @@ def test_loads_come_from_a_table_or_from_names(tmp_path, photograph):
 
 def test_overlays_have_names_of_their_own():
     assert overlay_names(["a/x.jpg", "b/x.jpg", "y.png"]) == ["x-1.png", "x-2.png", "y.png"]
+
+
+def test_turned_and_printing_colours(tmp_path):
+    """A photograph turned by its EXIF is upright; CMYK is read as the colours it stands for."""
+    image = pytest.importorskip("PIL.Image")
+    picture = np.zeros((80, 100, 3), np.uint8)
+    picture[:, 50:] = 255
+    tags = image.Exif()
+    tags[0x0112] = 6  # turn by a quarter
+    image.fromarray(picture).save(tmp_path / "turned.jpg", exif=tags)
+    read = read_photograph(tmp_path / "turned.jpg")
+    assert read.shape == (100, 80, 3)
+    assert read[70:].min() > 200
+    assert read[:40].max() < 50
+    image.fromarray(picture).convert("CMYK").save(tmp_path / "printing.jpg")
+    read = read_photograph(tmp_path / "printing.jpg")
+    assert read.shape == (80, 100, 3)
+    assert read[:, 60:].mean() > read[:, :40].mean() + 100
+
+
+def test_a_picture_of_something_else_is_refused():
+    """Blobs of every size on a gradient, as in a picture of fur."""
+    table = chain_table(ROBOT)
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        picture = np.zeros((300, 400, 3), np.float32)
+        for octave in range(2, 8):
+            cells = random.normal(size=(2**octave, 2**octave, 3)).astype(np.float32)
+            picture += cv2.resize(cells, (400, 300), interpolation=cv2.INTER_CUBIC) * 0.7**octave
+        scaled = 128 + 50 * picture / picture.std()
+        found = measure_picture(np.clip(scaled, 0, 255).astype(np.uint8), table, "cat")
+        assert found.reason
+
+
+def test_a_line_far_off_counts_less():
+    """Shift and turn of every line are found; a line that is shifted far has a larger spread."""
+    model = OutlineModel(chain_table(ROBOT))
+    lines = lines_of(model)
+    random = np.random.default_rng(0)
+    shift, turn = 0.3 + 0.05 * random.normal(size=(2, lines.number))
+    shift[2] += 1.5
+    offset = shift[lines.which] + turn[lines.which] * lines.place
+    offset += 0.05 * random.normal(size=offset.shape)
+    errors, left = lines.errors(offset, 0.2)
+    np.testing.assert_allclose(errors, np.stack([shift, turn], axis=1), atol=0.15)
+    assert np.nanstd(left) < 0.06
+    spreads = lines.spreads(errors, 0)
+    assert spreads[2] > 4.0 * np.median(spreads[: lines.number])

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex.photographs.chain.outline import Numbers, Outline
 from notchflex.photographs.contrast import Contrast
-from notchflex.photographs.outline import Numbers, Outline
 
 STEP = 0.5
 """Distance of samples along a normal, px."""

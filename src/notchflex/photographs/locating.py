@@ -7,21 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.camera import NUMBERS
+from notchflex.photographs.chain.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.outline import OutlineModel
 from notchflex.photographs.contrast import Contrast
 from notchflex.photographs.fitting import Fit, cost, covariance, misfit, refine
-from notchflex.photographs.outline import NUMBERS, OutlineModel
-from notchflex.photographs.start import COARSE, starts, with_tilts
-
-NEAR = 2.0
-"""Distance from the outline within which an edge counts as its own, px."""
+from notchflex.photographs.missing import NEAR, missing
+from notchflex.photographs.start import COARSE, reversed_view, starts, with_tilts
 
 _COARSE_WIDTH = 40.0  # of the tube in the first fits, px
 _FINE_WIDTH = 100.0  # of the tube in the last fits, px: edges of sharp photographs are then sharp
 _COARSE_REACHES = [14.0, 14, 12, 12, 10, 10, 8, 8, 6, 6, 5, 4, 4]
 _FINE_REACHES = [8.0, 8, 6, 6, 5, 5, 4, 4]
-_LAST_REACHES = [5.0, 4.0, 4.0]
+_LAST_REACHES = [5.0, 5.0] + 10 * [4.0]
 _KEPT = 4
+_WORSE = 0.1  # by how much the cost of a fit may be higher than the best and be looked into
 _TILT = 0.06
 _EDGE_NOISE = 0.08  # px: no edge is known better
 _SAME = math.radians(1.5)
@@ -33,7 +33,6 @@ class Located(NamedTuple):
     Attributes:
         fit: The best.
         model: The outline that was fitted.
-        cost: How badly it lies.
         rival: By how much more other fits whose angles differ miss the edges (`misfit`), with the
             largest difference, rad.
         factor: By how much the photograph was made smaller for it.
@@ -41,7 +40,6 @@ class Located(NamedTuple):
 
     fit: Fit
     model: OutlineModel
-    cost: float
     rival: tuple[tuple[float, float], ...]
     factor: float
 
@@ -58,20 +56,43 @@ def locate(table: ChainTable, contrast: Contrast) -> Located | None:
     fine = min(1.0, _FINE_WIDTH / wide)
     contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
     model = OutlineModel(table, base=1.2 * table.outer)
-    fits: list[tuple[float, Fit]] = []
-    for numbers in coarse:
-        for start in with_tilts(_scaled(numbers, fine), _TILT)[::2]:
-            quick = refine(model, contrast, start, _FINE_REACHES, middle, NEAR, quick=True)
-            fit = refine(model, contrast, quick.numbers, _LAST_REACHES, middle, NEAR)
-            fits.append((cost(fit, model), fit))
-    best_cost, best = min(fits, key=lambda one: one[0])
-    noise = max(_EDGE_NOISE, covariance(best, model)[1])
-    least = misfit(best, model, noise)
+    fits = _fine(model, contrast, middle, [_scaled(numbers, fine) for numbers in coarse])
+    whole = [fit for fit in fits if not missing(model, fit)] or fits
+    first = min(whole, key=lambda fit: cost(fit, model))
+    noise = max(_EDGE_NOISE, covariance(first, model)[1])
+    misfits = [misfit(fit, model, noise) for fit in whole]
+    least = min(misfits)
+    best = whole[misfits.index(least)]
     rivals = [
-        (misfit(other, model, noise) - least, _differ(best.numbers, other.numbers))
-        for _, other in fits
+        (one - least, _differ(best.numbers, fit.numbers))
+        for one, fit in zip(misfits, whole, strict=True)
     ]
-    return Located(best, model, best_cost, tuple(one for one in rivals if one[1] > _SAME), fine)
+    return Located(best, model, tuple(one for one in rivals if one[1] > _SAME), fine)
+
+
+def _fine(
+    model: OutlineModel, contrast: Contrast, middle: Numbers, coarse: list[Numbers]
+) -> list[Fit]:
+    """Fit in full from the best of some starts, each tilted to and away from the camera."""
+    quick = [
+        min(
+            (
+                refine(model, contrast, start, _FINE_REACHES, middle, NEAR, quick=True)
+                for start in with_tilts(numbers, _TILT)
+            ),
+            key=lambda fit: cost(fit, model),
+        )
+        for numbers in coarse
+    ]
+    limit = min(cost(fit, model) for fit in quick) + _WORSE
+    near = [fit.numbers for fit in quick if cost(fit, model) < limit or not missing(model, fit)]
+    if all(missing(model, fit) for fit in quick):
+        near = [fit.numbers for fit in quick]
+    return [
+        refine(model, contrast, start, _LAST_REACHES, middle, NEAR)
+        for numbers in near
+        for start in (numbers, reversed_view(numbers))
+    ]
 
 
 def _coarse(table: ChainTable, contrast: Contrast, factor: float, middle: Numbers) -> list[Numbers]:

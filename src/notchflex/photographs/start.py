@@ -13,7 +13,7 @@ from scipy.ndimage import binary_closing
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 from notchflex.photographs.contrast import Contrast
 
 COARSE = 360
@@ -22,6 +22,7 @@ COARSE = 360
 _CLOSINGS = (2, 4, 7, 11, 16)
 _BIN = 2.0
 _BREAK = 5  # bins: shorter breaks, by highlights, do not end a stretch
+_SHORTEST = 0.6  # of the length of the robot: its centre line is cut short on the inside of a bend
 _MOST_PARTS = 4
 _LEAST_WIDTH = 3.0
 _SLIPS = (0.0, -0.4, -0.8, 0.4)
@@ -130,7 +131,7 @@ def _stretches(table: ChainTable, centre: Numbers, width: Numbers) -> Iterator[R
         fits = binary_closing(fits, np.ones(_BREAK), border_value=0) | fits
         changes = np.flatnonzero(np.diff(np.concatenate([[0], fits.astype(int), [0]])))
         for begin, end in zip(changes[::2], changes[1::2], strict=True):
-            if (end - begin) * _BIN < 0.75 * wanted * ratio:
+            if (end - begin) * _BIN < _SHORTEST * wanted * ratio:
                 continue
             own = float(np.percentile(width[begin:end], 55))
             if not 0.94 < own / wanted < 1.07:
@@ -198,11 +199,15 @@ def _smoothed(points: Numbers, half: int) -> Numbers:
 
 
 def with_tilts(numbers: Numbers, size: float) -> list[Numbers]:
-    """Return a start with the camera tilted to either side, and rolled to either."""
-    made: list[Numbers] = []
-    for tilt, roll in itertools.product((size, -size), (1.0, -1.0)):
-        one = numbers.copy()
-        turn = math.pi if math.cos(one[4]) < 0.0 else 0.0
-        one[4], one[5] = turn + roll * abs(one[4] - turn), tilt
-        made.append(one)
+    """Return a start with the robot tilted toward the camera, and away from it."""
+    made = [numbers.copy(), numbers.copy()]
+    made[0][5], made[1][5] = size, -size
+    return made
+
+
+def reversed_view(numbers: Numbers) -> Numbers:
+    """Return the view that looks alike from far away: rolled and tilted the other way."""
+    made = numbers.copy()
+    turn = math.pi if math.cos(made[4]) < 0.0 else 0.0
+    made[4], made[5] = 2.0 * turn - made[4], -made[5]
     return made

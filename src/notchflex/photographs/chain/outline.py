@@ -13,17 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.camera import Frame, View
+from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 
 SIDE, FACE, SPINE = 0, 1, 2
 """Kinds of outline: the sides of a ring, its ends, the two edges of a spine."""
-
-VIEW = ("x", "y", "direction", "log_scale", "roll", "tilt", "perspective", "kerf", "cut")
-"""Numbers of a view, before the angles: place of the start of the first notch from the middle of
-the photograph (px), direction of the base (rad), logarithm of the scale (px/mm), roll about the
-tube axis and tilt out of the photograph (rad), inverse distance of the camera (1/mm), and what the
-notches are higher and deeper than in the robot file (mm)."""
-NUMBERS = len(VIEW)
 
 _SPINE_END = 0.2
 """Part of a spine at either end that is not used: fillets and the corners of rings."""
@@ -100,7 +94,7 @@ class OutlineModel:
         Args:
             numbers: Numbers of `VIEW` and angles (rad), (b, NUMBERS + n).
         """
-        view = _View(np.atleast_2d(numbers))
+        view = View(np.atleast_2d(numbers))
         start, turned = self.table.poses(view.angles)
         point = np.zeros((len(view.angles), len(self.kind), 3))
         tangent = np.zeros_like(point)
@@ -116,7 +110,7 @@ class OutlineModel:
         normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / length
         return Outline(seen, *self._oriented(seen[0], normal, view))
 
-    def _oriented(self, seen: Numbers, normal: Numbers, view: _View) -> tuple[Numbers, ...]:
+    def _oriented(self, seen: Numbers, normal: Numbers, view: View) -> tuple[Numbers, ...]:
         """Turn normals outward; find the room outside and the breadth inside of each point."""
         inward = seen[self.across] - seen
         breadth = np.abs((inward * normal).sum(axis=1))
@@ -157,27 +151,27 @@ class OutlineModel:
         return index
 
     def _sides(
-        self, view: _View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
+        self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
     ) -> tuple[Numbers, Numbers]:
         ring = self.ring[part]
         half = 0.5 * view.kerf
         first = np.where(ring > 0, half, -self.base)
         length = np.append(self.base, self.table.uncut)[ring]
         last = np.where(ring == 0, 0.0, length) - np.where(ring < self.table.notches, half, 0.0)
-        frame = _Frame(view, start, turned, ring)
+        frame = Frame(view, start, turned, ring)
         centre = frame.at(first + (last - first) * self.place[part])
         lateral, _ = frame.lateral(centre)
         across = self.table.outer * self.which[part]
         return centre + across[:, None] * lateral, frame.axis
 
     def _faces(
-        self, view: _View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
+        self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
     ) -> tuple[Numbers, Numbers]:
         ring, which = self.ring[part], self.which[part]
         n, half = self.table.notches, 0.5 * view.kerf
         far = np.where(ring < n, np.append(0.0, self.table.uncut)[ring] - half, 0.0)
         far = np.where(ring == n, self.table.uncut[-1], far)
-        frame = _Frame(view, start, turned, ring)
+        frame = Frame(view, start, turned, ring)
         centre = frame.at(np.where(which > 0, far, half))
         lateral, toward = frame.lateral(centre)
         notch = np.clip(np.where(which > 0, ring, ring - 1), 0, n - 1)
@@ -197,7 +191,7 @@ class OutlineModel:
         return point, tangent
 
     def _spines(
-        self, view: _View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
+        self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
     ) -> tuple[Numbers, Numbers]:
         notch, which, place = self.ring[part] - 1, self.which[part], self.place[part]
         before, after = start[:, notch].copy(), start[:, notch + 1]
@@ -212,7 +206,7 @@ class OutlineModel:
         reach = (length * place * np.sinc(0.5 * at / np.pi))[..., None]
         heading = angle0 + 0.5 * at
         here = before + reach * np.stack([np.sin(heading), np.cos(heading)], axis=-1)
-        frame = _Frame.of(view, here, angle0 + at)
+        frame = Frame.of(view, here, angle0 + at)
         centre = frame.origin
         lateral, _ = frame.lateral(centre)
         side = self.table.side[notch]
@@ -221,7 +215,7 @@ class OutlineModel:
         return centre + across[..., None] * lateral, frame.axis
 
     def _spine_edge(
-        self, view: _View, lateral: Numbers, frame: _Frame, notch: NDArray[np.int_]
+        self, view: View, lateral: Numbers, frame: Frame, notch: NDArray[np.int_]
     ) -> Numbers:
         """Return where the inner edge of a spine is seen, along `lateral` from the axis, mm."""
         t = self.table
@@ -236,90 +230,6 @@ class OutlineModel:
             sin = np.sqrt(1.0 - cos**2)
             high = np.maximum(high, radius * (-cos * x + sin * y))
         return side * high
-
-
-class _View:
-    """The numbers of b views."""
-
-    def __init__(self, numbers: Numbers) -> None:
-        one = dict(zip(VIEW, numbers.T, strict=False))
-        self.angles = numbers[:, NUMBERS:]
-        self.scale = np.exp(one["log_scale"])
-        self.place = numbers[:, :2]
-        self.perspective = one["perspective"]
-        self.kerf, self.cut = one["kerf"][:, None], one["cut"][:, None]
-        rotation = _rotation(one["direction"], one["roll"], one["tilt"])
-        self.x, self.y, self.z = rotation[..., 0], rotation[..., 1], rotation[..., 2]
-
-    def seen(self, point: Numbers) -> Numbers:
-        """Project points of camera axes, mm from the start of the first notch, (b, N, 3)."""
-        scale, near = self.scale[:, None, None], self.perspective[:, None, None]
-        return (self.place[:, None] + scale * point[..., :2]) / (1.0 + near * point[..., 2:])
-
-    def ray(self, point: Numbers) -> Numbers:
-        """Return unit vectors from the camera to points, (b, N, 3)."""
-        near = self.perspective[:, None]
-        ray = np.empty_like(point)
-        ray[..., :2] = near[..., None] * (
-            point[..., :2] + (self.place / self.scale[:, None])[:, None]
-        )
-        ray[..., 2] = 1.0 + near * point[..., 2]
-        return ray / np.linalg.norm(ray, axis=-1, keepdims=True)
-
-
-class _Frame:
-    """Frames of points on bodies, in camera axes."""
-
-    def __init__(
-        self, view: _View, start: Numbers, turned: Numbers, ring: NDArray[np.int_]
-    ) -> None:
-        self._set(view, start[:, ring], turned[:, ring])
-
-    @classmethod
-    def of(cls, view: _View, start: Numbers, turned: Numbers) -> _Frame:
-        """Return frames at points of the plane (x, z), (b, N, 2), turned by angles, (b, N)."""
-        made = cls.__new__(cls)
-        made._set(view, start, turned)
-        return made
-
-    def _set(self, view: _View, start: Numbers, turned: Numbers) -> None:
-        x, z = view.x[:, None], view.z[:, None]
-        cos, sin = np.cos(turned)[..., None], np.sin(turned)[..., None]
-        self.view = view
-        self.origin = start[..., :1] * x + start[..., 1:] * z
-        self.axis = cos * z + sin * x
-        self.x = cos * x - sin * z
-
-    def at(self, along: Numbers) -> Numbers:
-        """Return points on the tube axis, at lengths from the start of the body, mm."""
-        return self.origin + along[..., None] * self.axis
-
-    def lateral(self, centre: Numbers) -> tuple[Numbers, Numbers]:
-        """Return unit vectors across the axis: across the line of sight too, and toward the eye."""
-        ray = self.view.ray(centre)
-        across = np.cross(self.axis, ray)
-        across /= np.linalg.norm(across, axis=-1, keepdims=True)
-        across *= np.where((across * self.x).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-        toward = -(ray - (ray * self.axis).sum(axis=-1, keepdims=True) * self.axis)
-        return across, toward / np.linalg.norm(toward, axis=-1, keepdims=True)
-
-
-def _rotation(direction: Numbers, roll: Numbers, tilt: Numbers) -> Numbers:
-    """Return the axes of the base in camera axes (right, down, forward), as columns, (b, 3, 3)."""
-    zero, one = np.zeros_like(roll), np.ones_like(roll)
-    cos, sin = np.cos(roll), np.sin(roll)
-    rolled = _matrix([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
-    # z of the base to the right, x down, y forward
-    laid = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    cos, sin = np.cos(tilt), np.sin(tilt)
-    tilted = _matrix([[cos, zero, -sin], [zero, one, zero], [sin, zero, cos]])
-    cos, sin = np.cos(direction), np.sin(direction)
-    turned = _matrix([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
-    return turned @ tilted @ laid @ rolled
-
-
-def _matrix(rows: list[list[Numbers]]) -> Numbers:
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _block(

@@ -1,0 +1,97 @@
+"""The camera: a pinhole whose principal point is the middle of the photograph."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.photographs.chain.chain_table import Numbers
+
+VIEW = ("x", "y", "direction", "log_scale", "roll", "tilt", "perspective", "kerf", "cut")
+"""Numbers of a view, before the angles: place of the start of the first notch from the middle of
+the photograph (px), direction of the base (rad), logarithm of the scale (px/mm), roll about the
+tube axis and tilt out of the photograph (rad), inverse distance of the camera (1/mm), and what the
+notches are higher and deeper than in the robot file (mm)."""
+NUMBERS = len(VIEW)
+
+
+class View:
+    """The numbers of b views."""
+
+    def __init__(self, numbers: Numbers) -> None:
+        one = dict(zip(VIEW, numbers.T, strict=False))
+        self.angles = numbers[:, NUMBERS:]
+        self.scale = np.exp(one["log_scale"])
+        self.place = numbers[:, :2]
+        self.perspective = one["perspective"]
+        self.kerf, self.cut = one["kerf"][:, None], one["cut"][:, None]
+        rotation = _rotation(one["direction"], one["roll"], one["tilt"])
+        self.x, self.y, self.z = rotation[..., 0], rotation[..., 1], rotation[..., 2]
+
+    def seen(self, point: Numbers) -> Numbers:
+        """Project points of camera axes, mm from the start of the first notch, (b, N, 3)."""
+        scale, near = self.scale[:, None, None], self.perspective[:, None, None]
+        return (self.place[:, None] + scale * point[..., :2]) / (1.0 + near * point[..., 2:])
+
+    def ray(self, point: Numbers) -> Numbers:
+        """Return unit vectors from the camera to points, (b, N, 3)."""
+        near = self.perspective[:, None]
+        ray = np.empty_like(point)
+        ray[..., :2] = near[..., None] * (
+            point[..., :2] + (self.place / self.scale[:, None])[:, None]
+        )
+        ray[..., 2] = 1.0 + near * point[..., 2]
+        return ray / np.linalg.norm(ray, axis=-1, keepdims=True)
+
+
+class Frame:
+    """Frames of points on bodies, in camera axes."""
+
+    def __init__(self, view: View, start: Numbers, turned: Numbers, ring: NDArray[np.int_]) -> None:
+        self._set(view, start[:, ring], turned[:, ring])
+
+    @classmethod
+    def of(cls, view: View, start: Numbers, turned: Numbers) -> Frame:
+        """Return frames at points of the plane (x, z), (b, N, 2), turned by angles, (b, N)."""
+        made = cls.__new__(cls)
+        made._set(view, start, turned)
+        return made
+
+    def _set(self, view: View, start: Numbers, turned: Numbers) -> None:
+        x, z = view.x[:, None], view.z[:, None]
+        cos, sin = np.cos(turned)[..., None], np.sin(turned)[..., None]
+        self.view = view
+        self.origin = start[..., :1] * x + start[..., 1:] * z
+        self.axis = cos * z + sin * x
+        self.x = cos * x - sin * z
+
+    def at(self, along: Numbers) -> Numbers:
+        """Return points on the tube axis, at lengths from the start of the body, mm."""
+        return self.origin + along[..., None] * self.axis
+
+    def lateral(self, centre: Numbers) -> tuple[Numbers, Numbers]:
+        """Return unit vectors across the axis: across the line of sight too, and toward the eye."""
+        ray = self.view.ray(centre)
+        across = np.cross(self.axis, ray)
+        across /= np.linalg.norm(across, axis=-1, keepdims=True)
+        across *= np.where((across * self.x).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+        toward = -(ray - (ray * self.axis).sum(axis=-1, keepdims=True) * self.axis)
+        return across, toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+
+
+def _rotation(direction: Numbers, roll: Numbers, tilt: Numbers) -> Numbers:
+    """Return the axes of the base in camera axes (right, down, forward), as columns, (b, 3, 3)."""
+    zero, one = np.zeros_like(roll), np.ones_like(roll)
+    cos, sin = np.cos(roll), np.sin(roll)
+    rolled = _matrix([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
+    # z of the base to the right, x down, y forward
+    laid = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    cos, sin = np.cos(tilt), np.sin(tilt)
+    tilted = _matrix([[cos, zero, -sin], [zero, one, zero], [sin, zero, cos]])
+    cos, sin = np.cos(direction), np.sin(direction)
+    turned = _matrix([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
+    return turned @ tilted @ laid @ rolled
+
+
+def _matrix(rows: list[list[Numbers]]) -> Numbers:
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -1,0 +1,112 @@
+"""Errors that all edges of one line share: blur, highlights and paper lines shift or turn it.
+
+Every side of a ring, end of a ring and edge of a spine is one line. Its edges have errors of their
+own, and share a shift and a turn, which are unknowns with a spread. All lines share one shift
+outward, which blur and shading cause. The spread is that of most lines; a line that lies farther
+off has a spread of its own size and counts less.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.photographs.chain.chain_table import Numbers
+from notchflex.photographs.chain.outline import OutlineModel
+
+FIRST_SPREAD = (0.3, 0.08)
+"""Spreads of the shift and of the turn of a line before they are known, px."""
+
+_LEAST_SPREAD, _MOST_SPREAD = (0.06, 0.04), 2.0  # px
+_ALL_SHIFT = 0.7  # px
+_LEAST_POINTS = 5
+_ROBUST = 2.5  # spreads: lines farther off count less
+_ROUNDS = 4
+
+
+class Lines(NamedTuple):
+    """Lines of an outline with N points.
+
+    Attributes:
+        which: Number of the line of each point, (N,).
+        place: Place of each point on its line, -1 to 1, (N,).
+        number: Number of lines.
+    """
+
+    which: NDArray[np.int_]
+    place: Numbers
+    number: int
+
+    def columns(self) -> Numbers:
+        """Return what one px of each shift, of each turn and of the common shift adds, (N, m)."""
+        made = np.zeros((len(self.which), 2 * self.number + 1))
+        row = np.arange(len(self.which))
+        made[row, self.which] = 1.0
+        made[row, self.number + self.which] = self.place
+        made[:, -1] = 1.0
+        return made
+
+    def errors(self, offset: Numbers, robust: float) -> tuple[Numbers, Numbers]:
+        """Fit a shift and a turn to each line, by reweighted least squares.
+
+        Args:
+            offset: Distance of each edge from the outline, px, (N,); NaN if there is none.
+            robust: Distance from the line beyond which an edge counts less, px.
+
+        Returns:
+            Shift and turn, px, (number, 2), NaN for lines of few edges; offsets less these, (N,).
+        """
+        seen = np.isfinite(offset)
+        value, place = np.where(seen, offset, 0.0), self.place
+
+        def total(one: Numbers) -> Numbers:
+            return np.bincount(self.which, one, self.number).astype(float)
+
+        enough = total(seen.astype(float)) >= _LEAST_POINTS
+        shift, turn = np.zeros(self.number), np.zeros(self.number)
+        starts = [value[seen & (self.which == one)] for one in range(self.number)]
+        shift[:] = [np.median(one) if len(one) else 0.0 for one in starts]
+        left = value - shift[self.which]
+        for _ in range(_ROUNDS):
+            weight = seen / (1.0 + (left / robust) ** 2)
+            w, wx = total(weight), total(weight * place)
+            wxx = total(weight * place**2) + 1e-9
+            wy, wxy = total(weight * value), total(weight * place * value)
+            determinant = np.maximum(w * wxx - wx**2, 1e-12)
+            shift = np.where(enough, (wxx * wy - wx * wxy) / determinant, shift)
+            turn = np.where(enough, (w * wxy - wx * wy) / determinant, 0.0)
+            left = value - shift[self.which] - turn[self.which] * place
+        both = np.stack([shift, turn], axis=1)
+        both[~enough] = np.nan
+        return both, np.where(seen, left, np.nan)
+
+    def spreads(self, errors: Numbers, fitted: int | None) -> Numbers:
+        """Return the spreads of all columns, px, (m,).
+
+        Args:
+            errors: Shifts and turns of the lines, (number, 2).
+            fitted: How many unknowns were fitted to the lines, which makes their errors look
+                small; None in first rounds, whose errors say little about the lines.
+        """
+        known = errors[np.isfinite(errors[:, 0])]
+        own = errors - np.array([np.median(known[:, 0]) if len(known) else 0.0, 0.0])
+        typical = np.array(FIRST_SPREAD)
+        if fitted is not None:
+            freedom = max(0.25, 1.0 - fitted / max(1, 2 * len(known)))
+            typical = 1.4826 * np.nanmedian(np.abs(own), axis=0) / np.sqrt(freedom)
+            typical = np.clip(np.nan_to_num(typical, nan=_MOST_SPREAD), _LEAST_SPREAD, _MOST_SPREAD)
+        far = np.nan_to_num(np.abs(own), nan=_MOST_SPREAD)
+        spread = np.hypot(typical, far / _ROBUST)
+        return np.concatenate([spread[:, 0], spread[:, 1], [_ALL_SHIFT]])
+
+
+def lines_of(model: OutlineModel) -> Lines:
+    """Return the lines of an outline."""
+    name = model.kind * 10000 + model.ring * 2 + (model.which > 0)
+    names, which = np.unique(name, return_inverse=True)
+    low = np.array([model.place[which == one].min() for one in range(len(names))])
+    high = np.array([model.place[which == one].max() for one in range(len(names))])
+    place = 2.0 * (model.place - low[which]) / (high - low)[which] - 1.0
+    return Lines(which, place, len(names))

@@ -1,0 +1,50 @@
+"""Whether every part of a robot is seen in a photograph where a fit has it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from notchflex.photographs.chain.outline import FACE, SIDE, SPINE, OutlineModel
+from notchflex.photographs.fitting import Fit
+
+NEAR = 2.0
+"""Distance from the outline within which an edge counts as its own, px."""
+
+_LEAST_SCORE, _LEAST_SIDE, _LEAST_BASE, _LEAST_TIP = 0.7, 0.5, 0.35, 0.5
+_LEAST_FACES, _LEAST_SPINES = 0.35, 0.5
+
+
+def missing(model: OutlineModel, fit: Fit) -> str:
+    """Return which part of the outline is not seen; "" if enough of every part is."""
+    n = model.table.notches
+    good = np.abs(fit.residual) < NEAR
+    looked = fit.edges.looked
+
+    def share(part: np.ndarray) -> float:
+        return float(good[part].mean()) if part.any() else 0.0
+
+    side, face = model.kind == SIDE, model.kind == FACE
+    for ring in range(n + 1):
+        for which in (-1.0, 1.0):
+            part = side & (model.ring == ring) & (model.which == which)
+            if share(part) < (_LEAST_SIDE if ring else _LEAST_BASE):
+                where = f"the tube behind notch {ring}" if ring else "the tube before notch 1"
+                return f"a side of {where} is not seen clearly"
+    tip = face & (model.ring == n) & (model.which > 0)
+    if share(tip) < _LEAST_TIP:
+        return "the tip is not seen clearly where the robot file has it"
+    for notch in range(1, n + 1):
+        beside = ((model.ring == notch - 1) & (model.which > 0)) | (
+            (model.ring == notch) & (model.which < 0)
+        )
+        part = face & beside & looked
+        if part.sum() > 6 and share(part) < _LEAST_FACES:
+            return f"the faces of notch {notch} are not seen where the robot file has them"
+    # A robot laid out on its wrong side fits rings, but its spines lie where there is nothing.
+    notch = np.clip(model.ring - 1, 0, n - 1)
+    back = (model.kind == SPINE) & (model.which * model.table.side[notch] < 0.0)
+    if share(back) < _LEAST_SPINES:
+        return "the spines beside the notches are not seen where the robot file has them"
+    if fit.score < _LEAST_SCORE:
+        return f"only {100 * fit.score:.0f} % of the outline is found in the photograph"
+    return ""
