@@ -76,7 +76,7 @@ _MORE_ITERATIONS = 4
 # their log ratio one after the other (heights of the notch), each from the shape before; last none.
 # Many contacts on tendons that hardly stretch stick or slide in combinations that are not found
 # one contact at a time. Shapes on the way need to be no better than this residual.
-_CREEP, _LESS_CREEP, _LEAST_CREEP, _CREEPING_RESIDUAL = 1e-1, 1e-2, 1e-8, 1e-8
+_CREEP, _LESS_CREEP, _LEAST_CREEP, _CREEPING_RESIDUAL = 1e-1, 1e-1, 1e-8, 1e-8
 
 
 class _Search(NamedTuple):
@@ -220,9 +220,7 @@ def solve_load_step(
             predicts = jnp.where(waits, predicts, other)
         last_point = result.solved.point
         moving = choose(given_up, last_point, choose(new.converged, new.point, state.moving))
-        return _Search(
-            result, part, state.tries + 1, viscosity, creep, eased, moving, predicts
-        )
+        return _Search(result, part, state.tries + 1, viscosity, creep, eased, moving, predicts)
 
     start = LoadStepResult(
         solved=last,
