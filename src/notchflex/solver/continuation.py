@@ -203,7 +203,8 @@ def solve_load_step(
             part_before=jnp.where(solved, state.result.reached, result.part_before),
         )
         eased = creeps & new.converged
-        begins = still & ~eases & ~new.converged
+        moves = jnp.any(state.moving.unknowns.modes != state.result.solved.point.unknowns.modes)
+        begins = still & ~creeps & ~moves & ~new.converged
         less = jnp.where(state.creep < _LEAST_CREEP, 0.0, _LESS_CREEP * state.creep)
         creep = jnp.where(begins, _CREEP, jnp.where(eased, less, 0.0))
         shorter = jnp.where(still & ~begins & ~eased, 0.5 * part, part)
