@@ -67,7 +67,7 @@ _EXTERNAL_COMPLETE = 0.5
 # A notch that softens as it closes has limit points, where a constant tension snaps it to another
 # shape. Substeps that fail below this part of the load step are followed with a viscosity, between
 # these parts of the stiffness at rest, until the notches stand still.
-_SNAPS_BELOW, _VISCOSITY, _LEAST_VISCOSITY, _MOST_VISCOSITY = 0.05, 0.1, 0.02, 30.0
+_SNAPS_BELOW, _VISCOSITY, _LEAST_VISCOSITY, _MOST_VISCOSITY = 0.3, 0.1, 1e-4, 30.0
 # A contact at its bound is put this much beyond it, so that it slides on.
 _SLIDES_ON = 1.0 + 1e-12
 # How many times more iterations a load with snaps may take.
@@ -207,7 +207,9 @@ def solve_load_step(
         begins = still & ~creeps & ~moves & ~new.converged
         less = jnp.where(state.creep < _LEAST_CREEP, 0.0, _LESS_CREEP * state.creep)
         creep = jnp.where(begins, _CREEP, jnp.where(eased, less, 0.0))
-        shorter = jnp.where(still & ~begins & ~eased, 0.5 * part, part)
+        # A snap on its way goes on under the same load.
+        halves = (still & ~begins & ~moves) | (eases & ~new.converged)
+        shorter = jnp.where(halves, 0.5 * part, part)
         part = jnp.where(solved, 2.0 * part, shorter)
         given_up = eases & ~new.converged
         predicts = state.predicts
