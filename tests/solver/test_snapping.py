@@ -59,11 +59,13 @@ def jumps(path: nf.EquilibriumPath, step: int, steps: int = 400) -> np.ndarray:
         [nf.Load(tension=one) for one in way.tolist()],
         from_state=path.state_at(step - 1),
     )
-    change = np.abs(np.diff(np.degrees(fine.notch_angle), axis=0)).max(axis=0)
-    return change > 1.5
+    change = np.abs(np.diff(np.degrees(fine.notch_angle), axis=0))
+    # As one snaps, the friction on it changes, and so do the others a little.
+    most = change.max(axis=1, keepdims=True)
+    return ((change > 0.5) & (change > 0.5 * most)).any(axis=0)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.18, 0.3])
+@pytest.mark.parametrize("friction", [0.05, 0.18, 0.3])
 def test_snaps_are_the_jumps_that_finer_steps_leave(friction):
     path = nf.simulate(wrist(friction), nf.pull(0.0, 3.0, steps=25).release())
     change = np.abs(np.diff(np.degrees(path.notch_angle), axis=0))
