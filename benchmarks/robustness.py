@@ -10,8 +10,9 @@ balance when it is added up outside the solver (judge.py).
 With `--drawn` the shapes are those of a drawing: elastic ends, fibres, memory of the material.
 
 Draw i of a seed is the same whatever the count; `--first I --count 1` runs it alone if the shape
-is left to its number, and `--first I` goes on where a run was stopped. Exit code 1: something silent or wrong. The first robot of a shape compiles
-its program, which is no part of the times; putting a robot's arrays together is, in the first step.
+is left to its number, and `--first I` goes on where a run was stopped. Exit code 1: something
+silent or wrong. The first robot of a shape compiles its program, which is no part of the times;
+putting a robot's arrays together is, in the first step.
 """
 
 from __future__ import annotations

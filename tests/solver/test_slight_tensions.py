@@ -29,12 +29,18 @@ def follow(robot: nf.Robot, tension: np.ndarray) -> nf.EquilibriumPath:
 @pytest.mark.parametrize("slight", SLIGHT)
 def test_every_load_of_two_axes_is_solved(slight):
     robot = nf.load_robot("two-axis-wrist").with_value("friction.coefficient", 0.2)
+    compared = 0
     for seed in (0, 5, 8, 16, 19, 34, 45):
         path = follow(robot, wander(robot, seed, slight))
         assert path.converged.all(), (seed, path.reason)
         if slight <= 3e-17:
             slack = follow(robot, wander(robot, seed, 0.0))
-            np.testing.assert_allclose(path.notch_angle, slack.notch_angle, rtol=0.0, atol=1e-9)
+            # A load taken in parts is another path for the friction than the same load at once.
+            alike = np.cumprod(path.run.parts == slack.run.parts) > 0
+            difference = (path.notch_angle - slack.notch_angle)[alike]
+            compared += int(alike.sum())
+            assert np.abs(difference).max(initial=0.0) < 1e-9
+    assert compared > 100 or slight > 3e-17
 
 
 @pytest.mark.parametrize("name", ["pacheco2021-a", "pacheco2021-a-true", "liu2022", "gao2017"])
