@@ -10,8 +10,9 @@ balance when it is added up outside the solver (judge.py).
 With `--drawn` the shapes are those of a drawing: elastic ends, fibres, memory of the material.
 
 Draw i of a seed is the same whatever the count; `--first I --count 1` runs it alone if the shape
-is left to its number. Exit code 1: something silent or wrong. The first robot of a shape compiles
-its program, which is no part of the times; putting a robot's arrays together is, in the first step.
+is left to its number, and `--first I` goes on where a run was stopped. Exit code 1: something
+silent or wrong. The first robot of a shape compiles its program, which is no part of the times;
+putting a robot's arrays together is, in the first step.
 """
 
 from __future__ import annotations
@@ -155,9 +156,10 @@ def told(outcomes: list[Outcome], names: dict[int, str]) -> None:
         what = [*one.silent, *one.wrong, *([one.reason] if one.reason else [])]
         if what:
             kind = "silent" if one.silent else "wrong" if one.wrong else "unsolved"
-            print(f"{kind}: draw {one.number} ({names[one.number]}) step {one.step}: {what[0]}")
+            place = f"draw {one.number} ({names[one.number]}) step {one.step}"
+            print(f"{kind}: {place}: {what[0]}", flush=True)
             for more in what[1:]:
-                print(f"    {more}")
+                print(f"    {more}", flush=True)
 
 
 def main() -> int:
@@ -182,13 +184,14 @@ def main() -> int:
         if name not in compiled:
             compiled[name] = warm(one)
         names[one.number] = name
-        outcomes[name] += follow(one)
+        found = list(follow(one))
+        outcomes[name] += found
+        told(found, names)  # at once: a run that is stopped loses nothing
         print(f"\r{one.number + 1} of {last}  {name:24}", end="", file=sys.stderr)
     print(file=sys.stderr)
     every = sorted((one for some in outcomes.values() for one in some), key=lambda o: o.number)
     rows = [row(name, some) for name, some in outcomes.items() if some]
     rows.append(row("all", every))
-    told(every, names)
     print(f"\nseed {given.seed}, draws {given.first} to {last - 1}")
     show(rows)
     if given.json:

@@ -119,6 +119,7 @@ def fake_path(steps: int = 7, *, robot: Any = None, failed: int = 0) -> FakePath
         "stable": np.ones(count, bool),
         "smallest_eigenvalue": np.full(count, 7.0),
         "determinant_sign": np.ones(count),
+        "snap": np.zeros((count, n), int),
     }
     return FakePath(robot, columns)
 

@@ -1,5 +1,7 @@
 """When notches close: a tension at which the solver fails costs a trial, not the answer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -113,3 +115,42 @@ def test_slots_that_never_close_and_those_that_do():
     assert found.status[0] == "never"
     assert found.status[1] == "closes"
     assert (np.isfinite(found.tension) == (found.status == "closes")).all()
+
+
+def test_kinks_and_jumps_of_any_size_are_found():
+    """A slope that differs beyond the root by a factor of three cost 100 trials, and the root."""
+    random = np.random.default_rng(2)
+    roots = random.uniform(0.1, 50.0, 500)
+    below, above = 10.0 ** random.uniform(-4.0, 4.0, (2, 500))
+    jump = np.where(random.random(500) < 0.2, random.uniform(0.01, 2.0, 500), 0.0)
+
+    def overlap(tension):
+        rise = tension - roots
+        return np.where(rise > 0.0, above * rise + jump, below * rise)
+
+    tension, status = closing_tensions(overlap, np.ones(500))
+    assert set(status) == {"closes"}
+    assert tension == pytest.approx(roots, rel=1e-10)
+
+
+WRIST = nf.load_robot("pacheco2021-a")
+
+
+@pytest.mark.parametrize(
+    ("depth", "radius", "tube"),
+    [(1.5, 0.3, WRIST.tube), (2.16, 1.1, nf.Tube(2.4, 2.2))],
+    ids=["lever", "thin wall"],
+)
+def test_every_notch_of_these_wrists_closes(depth, radius, tube):
+    """One tension each was not found, and shown as NaN."""
+    robot = WRIST.replace(
+        tube=tube,
+        notch=tuple(replace(notch, depth=depth) for notch in WRIST.notch),
+        tendon=(nf.Tendon(radius),),
+    )
+    found = nf.closing(robot)
+    assert list(found.status) == ["closes"] * 5
+    beside = found.tension[:, None] * (1.0 + np.array([-1e-9, 1e-9]))
+    path = nf.solve_each(robot, [nf.Load(tension=float(one)) for one in beside.ravel()])
+    closed = path.closed.reshape(5, 2, 5)
+    assert [closed[number, :, number].tolist() for number in range(5)] == [[False, True]] * 5

@@ -177,3 +177,34 @@ def test_derivatives_where_friction_holds_a_notch(margin) -> None:
     difference = (ends[0] - ends[1]) / (2.0 * step)
     found = np.asarray(slope["material.elastic_modulus"])
     margin.within("slope, per modulus", (found - difference) * value, 1e-6)
+
+
+def test_no_loop_gains_work_where_notches_flatten() -> None:
+    """Flattening and hysteresis together: back and forth over the same strokes costs work."""
+    notch = nf.ArcNotch("on-axis", depth=1.4, height=0.8, uncut_length=1.2, repeat=5, ends="shell")
+    robot = dataclasses.replace(
+        WRIST, notch=(notch,), material=nf.Nitinol(unloading_stress=150.0), friction=FREE
+    )
+    random, steps, begins = np.random.default_rng(5), [], []
+    last = 0.0
+    for _ in range(12):
+        low, high = np.sort(random.uniform(0.1, 2.2, 2))
+        begins.append(len(steps) + 12)
+        for first, then in ((last, low), (low, high), (high, low)):
+            steps += np.linspace(first, then, 13)[1:].tolist()
+        last = low
+    path = nf.simulate(robot, [nf.Load(stroke=one) for one in steps])
+    assert path.converged.all(), path.reason
+    work = path.tendon_work[:, 0]
+    not_stored = work - path.stored_energy - path.material_dissipation.sum(axis=-1)
+    loops = []
+    for begin in begins:
+        # The second time round the loop is closed: up to `high` and back to `low`.
+        there = slice(begin - 1, begin + 24)
+        again = [nf.Load(stroke=one) for one in steps[there][1:] * 2]
+        twice = nf.simulate(robot, again, from_state=path.state_at(begin - 1))
+        loops.append(twice.tendon_work[-1, 0] - twice.tendon_work[23, 0])
+        np.testing.assert_allclose(twice.notch_angle[-1], twice.notch_angle[23], atol=1e-8)
+    assert min(loops) >= -1e-9
+    assert max(loops) > 1e-3
+    assert not_stored[-1] > -1e-9

@@ -45,9 +45,46 @@ def test_it_closes_and_opens(cycle):
 
 def test_it_is_said(cycle):
     shut, opened = (text for text in path_warnings(cycle) if "snaps" in text)
-    assert shut.startswith("notch 1")
+    assert shut.startswith("notch 2, 3, 4 snaps shut, first at step 20 (2.375 N)")
     assert "snaps open" in opened
+    assert "passes a limit point" in shut
     assert "prescribe the stroke" in shut
+
+
+def jumps(path: nf.EquilibriumPath, step: int, steps: int = 400) -> np.ndarray:
+    """Notches whose angle still changes at once when a step is taken in so many."""
+    way = np.linspace(path.tension[step - 1], path.tension[step], steps + 1)
+    fine = nf.simulate(
+        path.robot,
+        [nf.Load(tension=one) for one in way.tolist()],
+        from_state=path.state_at(step - 1),
+    )
+    change = np.abs(np.diff(np.degrees(fine.notch_angle), axis=0))
+    # As one snaps, the friction on it changes, and so do the others a little.
+    most = change.max(axis=1, keepdims=True)
+    return ((change > 0.5) & (change > 0.5 * most)).any(axis=0)
+
+
+@pytest.mark.parametrize("friction", [0.05, 0.18, 0.3])
+def test_snaps_are_the_jumps_that_finer_steps_leave(friction):
+    path = nf.simulate(wrist(friction), nf.pull(0.0, 3.0, steps=25).release())
+    change = np.abs(np.diff(np.degrees(path.notch_angle), axis=0))
+    assert not (path.snap[1:][change < 1.0]).any()
+    for step in 1 + np.flatnonzero(change.max(axis=1) > 3.0):
+        np.testing.assert_array_equal(path.snap[step] != 0, jumps(path, step), str(step))
+    assert (path.snap[:25] >= 0).all()
+    assert (path.snap[25:] <= 0).all()
+    assert path.snap.any()
+
+
+def test_snaps_are_kept_in_files(cycle, tmp_path):
+    nf.save_path(cycle, tmp_path / "cycle.json")
+    np.testing.assert_array_equal(nf.read_path(tmp_path / "cycle.json").snap, cycle.snap)
+
+
+def test_no_snap_without_elastic_ends():
+    path = nf.simulate(nf.load_robot("pacheco2021-a"), nf.pull(0.0, 3.0, steps=5))
+    assert not path.snap.any()
 
 
 def test_no_work_is_gained(cycle):
@@ -61,6 +98,7 @@ def test_a_stroke_passes_the_limit_point(cycle):
     assert path.converged.all()
     # No angle is left out.
     assert np.degrees(np.diff(path.notch_angle, axis=0)).max() < 6.0
+    assert not path.snap.any()
     assert not [text for text in path_warnings(path) if "snaps" in text]
 
 

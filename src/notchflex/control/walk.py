@@ -31,8 +31,6 @@ _ASIDE = (1e-6, -1e-6, 0.3, -0.3)
 # Where a step moves nothing the next one is so many times longer; where it then moves something it
 # may increase the error so many times.
 _STRIDE, _ACROSS = 4.0, 30.0
-# Tensions below this part of what about closes a notch are none.
-_SLACK = 1e-10
 # An error whose slope by the drives is this part of what it could be is as small as it gets.
 _FLAT = 1e-6
 
@@ -213,10 +211,7 @@ class Walk:
     def _drive(self, moved: np.ndarray) -> np.ndarray:
         low, high = self._band
         drive = np.where(moved > 0.0, high, np.where(moved < 0.0, low, self._present)) + moved
-        drive = np.minimum(np.maximum(drive, self.problem.low), self.problem.high)
-        if self.problem.by_tension:  # rounding leaves tensions that are none, but not slack
-            drive[drive < _SLACK * self.problem.unit] = 0.0
-        return drive
+        return np.minimum(np.maximum(drive, self.problem.low), self.problem.high)
 
     def _scale(self, moved: np.ndarray) -> float:
         """Size of the drives, that of the first step at least."""

@@ -37,6 +37,7 @@ class Recorded:
         converged: Whether the load was reached.
         tried: Whether it was tried at all.
         reached: Part of the way from the load before that was reached.
+        snapped: Notches that snapped shut (1) or open (-1).
     """
 
     solved: SolverState
@@ -48,6 +49,7 @@ class Recorded:
     converged: Bool[np.ndarray, " s"]
     tried: Bool[np.ndarray, " s"]
     reached: Float[np.ndarray, " s"]
+    snapped: Float[np.ndarray, "s n"]
 
     def quantity(self, name: str) -> np.ndarray:
         """Return a quantity of each state by its name in the registry."""

@@ -12,9 +12,6 @@ from notchflex.mechanics.chain import unchecked_dimensions
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
-# A notch snaps where it passes more than this part of its opening in a step that changes the
-# tension by less than this part of itself.
-_FAR_OPEN, _LITTLE = 0.25, 0.3
 MOMENT_ERROR = 0.01
 """A larger part of the bending moment than this that the strain modes miss is warned of."""
 
@@ -35,26 +32,16 @@ def path_warnings(path: EquilibriumPath) -> list[str]:
 
 
 def _snaps(path: EquilibriumPath) -> Iterator[str]:
-    """Warn of notches that close or open at once, though the load changes little."""
-    if not any(notch.has_elastic_ends for notch in path.robot.notches) or len(path) < 2:
-        return
-    force, gap, tension = path.contact_force, path.gap, path.tension
-    solved = np.asarray(path.converged)[1:] & np.asarray(path.converged)[:-1]
-    change = np.abs(np.diff(tension, axis=0)).max(axis=1)
-    little = solved & (change < _LITTLE * np.abs(tension[1:]).max(axis=1))
-    closed, opening = force > 0.0, gap > _FAR_OPEN * gap.max(axis=0)
-    for what, jumped in (
-        ("snaps shut", opening[:-1] & closed[1:]),
-        ("snaps open", closed[:-1] & opening[1:]),
-    ):
-        steps, notches = np.nonzero(jumped & little[:, None])
+    """Warn of notches that pass a limit point under tension."""
+    for what, side in (("snaps shut", 1), ("snaps open", -1)):
+        steps, notches = np.nonzero(path.snap == side)
         if len(steps):
             names = ", ".join(str(notch + 1) for notch in dict.fromkeys(notches.tolist()))
             yield (
-                f"notch {names} {what}, first at step {steps[0] + 2} "
-                f"({_load(path, int(steps[0]) + 1)}): it softens as it closes, so that no shape "
-                "between is in equilibrium under this tension; prescribe the stroke to pass "
-                "through the shapes between."
+                f"notch {names} {what}, first at step {steps[0] + 1} "
+                f"({_load(path, int(steps[0]))}): it passes a limit point, where it softens as it "
+                "closes, so that no shape between is in equilibrium under this tension; prescribe "
+                "the stroke to pass through the shapes between."
             )
 
 

@@ -67,11 +67,16 @@ _EXTERNAL_COMPLETE = 0.5
 # A notch that softens as it closes has limit points, where a constant tension snaps it to another
 # shape. Substeps that fail below this part of the load step are followed with a viscosity, between
 # these parts of the stiffness at rest, until the notches stand still.
-_SNAPS_BELOW, _VISCOSITY, _LEAST_VISCOSITY, _MOST_VISCOSITY = 0.05, 0.1, 0.02, 30.0
+_SNAPS_BELOW, _VISCOSITY, _LEAST_VISCOSITY, _MOST_VISCOSITY = 0.3, 0.1, 1e-4, 30.0
 # A contact at its bound is put this much beyond it, so that it slides on.
 _SLIDES_ON = 1.0 + 1e-12
 # How many times more iterations a load with snaps may take.
 _MORE_ITERATIONS = 4
+# Where Newton's method fails, contacts that stick are first let creep, by these slips per change of
+# their log ratio one after the other (heights of the notch), each from the shape before; last none.
+# Many contacts on tendons that hardly stretch stick or slide in combinations that are not found
+# one contact at a time. Shapes on the way need to be no better than this residual.
+_CREEP, _LESS_CREEP, _LEAST_CREEP, _CREEPING_RESIDUAL = 1e-1, 1e-1, 1e-8, 1e-8
 
 
 class _Search(NamedTuple):
@@ -82,7 +87,9 @@ class _Search(NamedTuple):
         part: Length of the next substep, as a part of the load step.
         tries: Number of substeps tried.
         viscosity: Of the next substep; 0 outside a snap.
-        moving: Where it starts: the last solved state, or a shape on the way of a snap.
+        creep: How far contacts creep in it; 0 for contacts that stick.
+        eased: Whether it starts from a shape whose contacts crept.
+        moving: Where it starts: the last solved state, or a shape on the way to the next.
         predicts: Whether contacts are predicted in it, where strokes are commanded.
     """
 
@@ -90,22 +97,26 @@ class _Search(NamedTuple):
     part: Float[Array, ""]
     tries: Int[Array, ""]
     viscosity: Float[Array, ""]
+    creep: Float[Array, ""]
+    eased: Bool[Array, ""]
     moving: Iterate
     predicts: Bool[Array, ""]
 
 
 class _Retry(NamedTuple):
-    """How a substep is tried on a robot that can snap.
+    """How a substep is tried.
 
     Attributes:
-        viscosity: As a part of the stiffness at rest; 0 for none.
-        moving: The point that it drags on and where the search begins. History is that of the last
-            solved state all the same: on the way of a snap nothing is remembered.
+        viscosity: As a part of the stiffness at rest; 0 for none. None for robots that cannot snap.
+        creep: How far contacts creep.
+        moving: The point that a viscosity drags on and where the search begins. History is that of
+            the last solved state all the same: nothing on the way is remembered.
         predicts: Whether contacts are predicted where strokes are commanded; otherwise those that
             slid before slide on.
     """
 
-    viscosity: Float[Array, ""]
+    viscosity: Float[Array, ""] | None
+    creep: Float[Array, ""]
     moving: Iterate
     predicts: Bool[Array, ""]
 
@@ -140,8 +151,9 @@ def solve_load_step(
 ) -> LoadStepResult:
     """Follow a load from a solved state.
 
-    The whole step is tried first. Where Newton's method fails, the step is halved until it
-    succeeds, and doubled again after; only substeps that converged enter the friction history.
+    The whole step is tried first. Where Newton's method fails, it is tried with contacts that creep
+    less and less; where that fails too, the step is halved until it succeeds, and doubled again
+    after. Only substeps that converged with contacts that stick enter the friction history.
 
     Where all tendons are slack before, external loads come first, then all tensions together: half
     the load step each.
@@ -157,6 +169,8 @@ def solve_load_step(
     """
     external_first = _external_first(chain, last)
     can_snap = chain.rods.section.ends is not None
+    # Of a single tendon on notches that snap, it is rather a snap that makes a step fail.
+    may_creep = not can_snap or chain.tendons > 1
     most = settings.max_all_iterations * (_MORE_ITERATIONS if can_snap else 1)
 
     def proceed(state: _Search) -> Bool[Array, ""]:
@@ -170,12 +184,16 @@ def solve_load_step(
         stop = jnp.where(first, _EXTERNAL_COMPLETE, 1.0)
         aim = jnp.minimum(result.reached + part, stop)
         towards = interpolate_command(chain, command, last, aim)
-        retry = _Retry(viscosity, state.moving, state.predicts) if can_snap else None
+        eases = (state.creep > 0.0) | state.eased
+        retry = _Retry(
+            viscosity if can_snap else None, state.creep, state.moving, state.predicts & ~eases
+        )
         new = _solve_substep(chain, towards, result.solved, settings, aim, retry)
         memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound, new.material)
         at_aim = SolverState(new.point, memory, new.stroke, towards.applied)
         still = viscosity == 0.0
-        solved = new.converged & still
+        creeps = state.creep > 0.0
+        solved = new.converged & still & ~creeps
         result = LoadStepResult(
             solved=choose(solved, at_aim, result.solved),
             residual=new.residual,
@@ -186,18 +204,28 @@ def solve_load_step(
             between=choose(solved, result.solved, result.between),
             part_before=jnp.where(solved, state.result.reached, result.part_before),
         )
-        shorter = jnp.where(still, 0.5 * part, part)
+        eased = creeps & new.converged
+        moves = jnp.any(state.moving.unknowns.modes != state.result.solved.point.unknowns.modes)
+        begins = still & ~creeps & ~moves & ~new.converged & may_creep
+        less = jnp.where(state.creep < _LEAST_CREEP, 0.0, _LESS_CREEP * state.creep)
+        creep = jnp.where(begins, _CREEP, jnp.where(eased, less, 0.0))
+        # A snap on its way goes on under the same load.
+        halves = (still & ~begins & ~moves) | (eases & ~new.converged)
+        shorter = jnp.where(halves, 0.5 * part, part)
         part = jnp.where(solved, 2.0 * part, shorter)
-        tries = state.tries + 1
-        if not can_snap:
-            return _Search(result, part, tries, viscosity, state.moving, state.predicts)
-        viscosity = _next_viscosity(viscosity, new.converged, part)
-        given_up = ~still & ~new.converged & (viscosity == 0.0)
+        given_up = eases & ~new.converged
+        predicts = state.predicts
+        if can_snap:
+            waits = begins | eased
+            after = _next_viscosity(viscosity, new.converged, part)
+            viscosity = jnp.where(waits, viscosity, after)
+            given_up = given_up | (~still & ~new.converged & (viscosity == 0.0))
+            # Where one way of finding the contacts fails, the other is tried next.
+            other = (state.predicts == new.converged) & (viscosity == 0.0)
+            predicts = jnp.where(waits, predicts, other)
         last_point = result.solved.point
         moving = choose(given_up, last_point, choose(new.converged, new.point, state.moving))
-        # Where one way of finding the contacts fails, the other is tried next.
-        predicts = (state.predicts == new.converged) & (viscosity == 0.0)
-        return _Search(result, part, tries, viscosity, moving, predicts)
+        return _Search(result, part, state.tries + 1, viscosity, creep, eased, moving, predicts)
 
     start = LoadStepResult(
         solved=last,
@@ -210,7 +238,8 @@ def solve_load_step(
         part_before=jnp.zeros(()),
     )
     none, tries = jnp.zeros(()), jnp.zeros((), int)
-    begin = _Search(start, jnp.ones(()), tries, none, last.point, jnp.array(True))
+    no, yes = jnp.array(False), jnp.array(True)
+    begin = _Search(start, jnp.ones(()), tries, none, none, no, last.point, yes)
     return jax.lax.while_loop(proceed, substep, begin).result
 
 
@@ -235,27 +264,26 @@ def _solve_substep(
     solved: SolverState,
     settings: Settings,
     aim: Array,
-    retry: _Retry | None,
+    retry: _Retry,
 ) -> NewtonResult:
-    """Solve for a command near a solved state, from the predicted log ratios.
-
-    See `_Retry` for robots that can snap.
-    """
+    """Solve for a command near a solved state, from the predicted log ratios."""
     memory, last_tension = solved.memory, solved.point.base_tension
     base_tension = command.either(last_tension, command.target)
     log_ratio = predict_log_ratios(chain, last_tension, base_tension, memory)
     start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
     enough = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
     enough = jnp.where(aim < 1.0, enough, 0.0)
+    enough = jnp.where(retry.creep > 0.0, jnp.maximum(enough, _CREEPING_RESIDUAL), enough)
     predicts: Bool[Array, ""] | bool = True
-    if retry is not None:
-        if command.by_stroke is not None:
-            predicts = retry.predicts
-            sliding = jax.tree.map(lambda old: _SLIDES_ON * old, memory.log_ratio)
-            log_ratio = choose(predicts, log_ratio, sliding)
-            start = start._replace(unknowns=start.unknowns._replace(log_ratio=log_ratio))
-        moves = jnp.any(retry.moving.unknowns.modes != solved.point.unknowns.modes)
-        start = choose(moves, retry.moving, start)
+    if command.by_stroke is not None:
+        predicts = retry.predicts
+        sliding = jax.tree.map(lambda old: _SLIDES_ON * old, memory.log_ratio)
+        log_ratio = choose(predicts, log_ratio, sliding)
+        start = start._replace(unknowns=start.unknowns._replace(log_ratio=log_ratio))
+    moves = jnp.any(retry.moving.unknowns.modes != solved.point.unknowns.modes)
+    start = choose(moves, retry.moving, start)
+    memory = memory._replace(creep=retry.creep)
+    if retry.viscosity is not None:
         memory = memory._replace(drag=(retry.viscosity, retry.moving.unknowns.modes))
     problem = NewtonProblem(chain, command, memory, last_tension, predicts)
     return newton(problem, start, settings, enough)

@@ -13,12 +13,12 @@ from jaxtyping import Array, Bool, Float
 from notchflex._jax import jnp
 from notchflex.mechanics.chain import Chain
 
-# The friction law x = clip(x + rate (slip - (x - x_prev) / stiction)). The rate is how strongly
-# slip changes the log ratio while Newton searches, and drops out at the solution; the stiction only
-# keeps the equation regular where a slack tendon makes the tension ratio meaningless. Both are
-# per slip in heights of the notch, so that a scaled robot is solved alike.
+# The friction law x = clip(x + rate (slip - give (x - x_prev))). The rate is how strongly slip
+# changes the log ratio while Newton searches, and drops out at the solution; what sticking contacts
+# give only keeps the equation regular where a slack tendon makes the tension ratio meaningless.
+# Slip is in heights of the notch, so that a scaled robot is solved alike.
 RATE = 8.0
-STICTION = 1e15
+LEAST_GIVE = 1e-15
 
 
 class Unknowns(NamedTuple):
@@ -46,6 +46,8 @@ class Memory(NamedTuple):
         material: Memory of the material at every node; () where it has none.
         drag: While a notch snaps: viscosity as a part of the stiffness at rest, and the modes of
             the state before, which it drags on; None otherwise.
+        creep: Slip over a sticking contact, in heights of the notch, per change of its log ratio;
+            None for next to none.
     """
 
     log_ratio: tuple[Float[Array, "*n t 2"], ...]
@@ -53,6 +55,12 @@ class Memory(NamedTuple):
     bound: tuple[Float[Array, "*n t 2"], ...]
     material: Any = ()
     drag: tuple[Float[Array, ""], Float[Array, "*n modes"]] | None = None
+    creep: Float[Array, ""] | None = None
+
+    @property
+    def give(self) -> Float[Array, ""] | float:
+        """Slip per change of a log ratio that sticks, the least there is included."""
+        return LEAST_GIVE if self.creep is None else LEAST_GIVE + self.creep
 
 
 def notch_heights(chain: Chain) -> Float[Array, " n"]:
@@ -69,7 +77,7 @@ def trial_log_ratio(
 ) -> Float[Array, "n t 2"]:
     """Log ratios of the k-th group as slip drives them, before they are clipped to their bound."""
     slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
-    return log_ratio + RATE * (slip - (log_ratio - memory.log_ratio[k]) / STICTION)
+    return log_ratio + RATE * (slip - memory.give * (log_ratio - memory.log_ratio[k]))
 
 
 def clip_symmetric(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:

@@ -27,6 +27,10 @@ from notchflex.solver.residual import slip_mask
 LARGEST_LOG_RATIO = 1.0
 """A step may change a log ratio by so much; beyond, the linear model says nothing of use."""
 
+# Base tensions up to these parts of the force that closes a notch act on next to nothing, and on
+# nothing that the tolerance of the solver could show. A log ratio behind them may change by so much
+# in a step: whichever way the contact slides, it is soon found.
+_NEARLY_SLACK, _NOTHING, _SMALL_LOG_RATIO = 1e-8, 1e-14, 0.1
 # Tensions below this (N) count as slack, so that logarithms stay finite.
 _SLACK = 1e-100
 
@@ -78,19 +82,19 @@ def _cumulate(values: Float[Array, "n t 2"]) -> Float[Array, "n t 2"]:
 
 
 def limit_slack(chain: Chain, point: Iterate, step: Iterate) -> Iterate:
-    """Limit the log-ratio step of slack tendons.
+    """Limit the log-ratio step of slack tendons, and of those that are all but slack.
 
     Without tension they act on nothing, and a sticking contact would change them at random: all
     that matters is which way it slides. The rest of the step need not be shortened for their sake.
     """
-    slack = (point.base_tension == 0.0) & (step.base_tension == 0.0)
+    tension = jnp.maximum(jnp.abs(point.base_tension), jnp.abs(step.base_tension))
+    part = tension / chain.closing_force
+    most = jnp.where(part <= _NOTHING, _SMALL_LOG_RATIO, LARGEST_LOG_RATIO)
+    most = jnp.where(part <= _NEARLY_SLACK, most, jnp.inf)
     logs = tuple(
-        jnp.where(
-            slack[jnp.array(group.numbers)][None, :, None],
-            jnp.clip(change, -LARGEST_LOG_RATIO, LARGEST_LOG_RATIO),
-            change,
-        )
+        jnp.clip(change, -limit, limit)
         for group, change in zip(chain.groups, step.unknowns.log_ratio, strict=True)
+        for limit in (most[jnp.array(group.numbers)][None, :, None],)
     )
     return step._replace(unknowns=step.unknowns._replace(log_ratio=logs))
 

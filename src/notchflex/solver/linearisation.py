@@ -29,7 +29,6 @@ from notchflex.mechanics.flexure import geometric_stiffness, material_tangent
 from notchflex.mechanics.motion import Motion, skew, wrench_turn
 from notchflex.solver.element import (
     RATE,
-    STICTION,
     Memory,
     Unknowns,
     is_active,
@@ -310,7 +309,7 @@ def _friction_rows(here: _Linearisation, k: int) -> Float[Array, "n 2t z"]:
         rows = jnp.stack([before, tendon.gap_tension], axis=2)
         limit = limit + slope((none, none), (one, one))[..., None] * rows
     height = notch_heights(chain)[:, None, None, None]
-    stuck = -RATE * (tendon.at_edges / height - tendon.log_ratio[None] / STICTION)
+    stuck = -RATE * (tendon.at_edges / height - here.memory.give * tendon.log_ratio[None])
     value, bound = trial_log_ratio(chain, log_ratio, span.slid, here.memory, k), span.bound
     upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
     slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)

@@ -38,7 +38,8 @@ _TRIALS = 12
 _PRECISION = 1e-11  # relative, of the tension
 # A notch that snaps shut has no root but a jump, next to which the solver need not converge.
 _AT_SNAP = 1e-3
-_ROUNDS = 100
+# Enough to bisect every fifth time, which is what a jump takes.
+_ROUNDS = 200
 
 
 def closing_tensions(
@@ -92,7 +93,7 @@ def _bracket(
 def find_roots(
     overlap: Overlap, low: Float[np.ndarray, " m"], high: Float[np.ndarray, " m"]
 ) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
-    """Find roots by false position (Illinois), bisecting where that stalls.
+    """Find roots by false position, bisecting where that stalls.
 
     After a failed solve the next trials are elsewhere in the bracket, ever closer to its lower end.
 
@@ -113,16 +114,20 @@ def find_roots(
             break
         with np.errstate(divide="ignore", invalid="ignore"):
             part = at_low / (at_low - at_high)
-        part = np.where((slow > 1) | ~((part > 0.0) & (part < 1.0)), 0.5, part)
+        part = np.where((slow > 3) | ~((part > 0.0) & (part < 1.0)), 0.5, part)
         part = np.where(misses > 0, 0.6 ** np.maximum(misses, 1), part)
         trial = low + part * (high - low)
         value = np.where(open_still, overlap(trial), np.nan)
         up, down = value > 0.0, value <= 0.0
+        # The end that stays a second time counts less, by what the other one has changed: a slope
+        # that differs beyond the root does not keep it from being reached (Anderson, Björck).
+        with np.errstate(divide="ignore", invalid="ignore"):
+            less_low, less_high = 1.0 - value / at_high, 1.0 - value / at_low
+        less_low, less_high = (np.where(m > 0.0, m, 0.5) for m in (less_low, less_high))
         high, at_high = np.where(up, trial, high), np.where(up, value, at_high)
         low, at_low = np.where(down, trial, low), np.where(down, value, at_low)
-        # The end that stays a second time counts half, so that the other side is reached.
-        at_low = np.where(up & (side > 0), 0.5 * at_low, at_low)
-        at_high = np.where(down & (side < 0), 0.5 * at_high, at_high)
+        at_low = np.where(up & (side > 0), less_low * at_low, at_low)
+        at_high = np.where(down & (side < 0), less_high * at_high, at_high)
         side = np.where(up, 1, np.where(down, -1, side))
         misses = np.where(up | down, 0, misses + open_still)
         # One bisection earns one trial by false position: at a kink that alone would crawl.

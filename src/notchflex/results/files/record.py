@@ -31,6 +31,7 @@ IN_BASE = "_in_base"
 _STATE, _START = "state", "before."
 _RUN = ("residual", "iterations", "converged", "tried", "reached")
 _HELD = ("smallest_eigenvalue", "determinant_sign")
+_SNAPPED = "snapped"
 
 
 @dataclass(frozen=True)
@@ -168,6 +169,7 @@ def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
         yield ("solver_converged" if name == "converged" else name), np.asarray(getattr(run, name))
     yield _HELD[0], path.smallest_eigenvalue
     yield _HELD[1], path.determinant_sign
+    yield _SNAPPED, run.snapped
     for name in BEFORE:
         yield _START + name, run.before(name)
     if not isinstance(run.solved.memory.material, tuple):
@@ -221,11 +223,15 @@ def _path_of(record: Record) -> EquilibriumPath:
     if not isinstance(at_rest, tuple):  # older files do not have it
         material = arrays.get(_START + MATERIAL, np.asarray(at_rest))
         first[MATERIAL] = _of_shape(material, np.shape(at_rest), _START + MATERIAL)
+    # Older files do not have it, nor do those of robots that cannot snap need it.
+    notches = (steps, ready.chain.flexures)
+    snapped = _of_shape(arrays.get(_SNAPPED, np.zeros(notches)), notches, _SNAPPED)
     recorded = Recorded(
         solved=tree_util.tree_unflatten(structure, state),
         reported=reported,
         first=first,
         held=(arrays[_HELD[0]], arrays[_HELD[1]]),
+        snapped=snapped,
         **run,
     )
     return EquilibriumPath(

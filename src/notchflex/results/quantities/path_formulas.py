@@ -129,6 +129,16 @@ def determinant_sign(path: EquilibriumPath) -> np.ndarray:
     return path.stability[1]
 
 
+@Quantity("path", "snap", per=("notch",), kind=int, after="determinant_sign",
+          note="Found by the solver: on the way to this state the tension that holds the notch has "
+          "passed an extremum. Where a stroke is commanded the way leads through the shapes "
+          "between, and none is counted.")  # fmt: skip
+def snap(path: EquilibriumPath) -> np.ndarray:
+    """1 where a notch passed a limit point under tension and snapped shut, -1 open; 0 elsewhere."""
+    under_tension = np.isnan(path.load.stroke).all(axis=1) & np.asarray(path.run.converged)
+    return np.where(under_tension[:, None], path.run.snapped, 0.0).astype(int)
+
+
 @Quantity("path", "residual", "r", key="residual", column="residual")
 def residual(path: EquilibriumPath) -> np.ndarray:
     """Largest scaled residual of the equations at the end of the iteration."""

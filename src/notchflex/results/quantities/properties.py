@@ -149,6 +149,8 @@ class _Quantities:
     """Smallest eigenvalue, N mm."""
     determinant_sign = Number()
     """Sign of the determinant."""
+    snap = Array()
+    """Snap, shape (n)."""
     residual = Number()
     """Residual."""
     iterations = Count()

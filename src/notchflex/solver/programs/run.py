@@ -18,6 +18,7 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
+from notchflex.solver.derived.limit_points import snapped_notches
 from notchflex.solver.derived.quantities import Shape, quantities, shape, unpad_quantity
 from notchflex.solver.derived.solved_state import notch_lips
 from notchflex.solver.held_stiffness import stability, stable
@@ -137,6 +138,20 @@ class SolverRun:
             return np.asarray(start.memory.material)
         return np.asarray(start.point.base_tension if name == "tension" else start.stroke)
 
+    @cached_property
+    def snapped(self) -> Float[np.ndarray, "s n"]:
+        """Notches that snapped shut (1) or open (-1) on the way to each state; 0 for the others."""
+        own, long = self._prepared, self._prepared.long
+        if own.chain.rods.section.ends is None:
+            return np.zeros((len(self.table), own.chain.flexures))
+        pairs = (
+            pad_rows(rows, own.state, long.state) for rows in (self.states_before, self.states)
+        )
+        vectors = (np.zeros(1), long.dynamic_vector, *pairs)
+        by_row = (False, False, True, True)
+        notches = _snapped.along(by_row, *vectors, long.static_structure, long.state)
+        return notches[:, : own.chain.flexures]
+
     def stability(self, commands: Command) -> tuple[np.ndarray, np.ndarray]:
         """Return the smallest real part of the eigenvalues, and the determinant's sign."""
         return stability(self._prepared, commands, self.solved)
@@ -244,6 +259,20 @@ def _quantities(
 ) -> tuple[Array, dict[str, Array]]:
     """Derived quantities of a state beyond its shape, by name; nothing is carried on."""
     return carried, quantities(chain_layout.unpack(vector), state_layout.unpack(state))
+
+
+@native(4, lane_sizes)
+def _snapped(
+    carried: Float[Array, " one"],
+    vector: Float[Array, " chain"],
+    before: Float[Array, " state"],
+    after: Float[Array, " state"],
+    chain_layout: StaticStructure,
+    state_layout: PytreeLayout,
+) -> tuple[Array, Array]:
+    """Notches that snapped between two states; nothing is carried on."""
+    states = (state_layout.unpack(state) for state in (before, after))
+    return carried, snapped_notches(chain_layout.unpack(vector), *states)
 
 
 def solve_contacts(
