@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from notchflex.control.drive_model import Response
 from notchflex.control.problem import Attempt, Problem
-from notchflex.control.search import find
+from notchflex.control.search import find, meet
 from notchflex.control.walk import limit_rows
 from notchflex.errors import Failure
 
@@ -133,8 +133,12 @@ def find_anyhow(
     """
     # Where other tendons move, a tendon slides within its dead band too.
     alone = bool(np.count_nonzero(start[problem.driven]) < 2)
-    best = find(problem, before, start, goal, known, over_bands=alone)
+    best = meet(problem, before, start, goal, known, over_bands=alone)
+    if best.failure is None:
+        return best
     solves = best.solves
+    best = find(problem, before, start, goal, known, over_bands=alone)
+    solves += best.solves
     if best.failure is not None:
         other = find(problem, before, start, goal, known, over_bands=not alone)
         solves += other.solves

@@ -10,15 +10,18 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import Response
+from notchflex.control.drive_model import DriveAim, Response
 from notchflex.control.problem import Attempt, Problem, size_of
-from notchflex.control.walk import Walk
+from notchflex.control.walk import KEPT, Walk, limit_rows
+from notchflex.errors import Failure
 
 # Damping: where a step fails, its factor after one that did, the gain above which it is lifted, and
 # the largest with which a step is worth trying.
 _FIRST, _FACTOR, _GOOD_GAIN, _MOST_DAMPING = 1e-3, 8.0, 0.5, 1e12
 # The part of the promised improvement that a step must bring.
 _LEAST_GAIN = 1e-3
+# Loads that the program may solve for a target.
+_ROUNDS = 3
 # A step that changes drives by less than this part of them is none.
 _NO_STEP = 1e-11
 # Drives that are redundant are made smaller in so many rounds of so many corrections, while a round
@@ -66,6 +69,62 @@ def find(
     if walk.done and len(walk.free) > len(rows):
         _relax(walk, budget)
     return walk.result()
+
+
+def meet(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    start: Float[np.ndarray, " t"],
+    goal: Float[np.ndarray, " m"],
+    known: Response | None = None,
+    *,
+    over_bands: bool = True,
+) -> Attempt:
+    """Meet a target from the present drives by one program, as mostly succeeds.
+
+    Args:
+        problem: What is aimed at, and the limits.
+        before: The state before, packed.
+        start: Its drives.
+        goal: The target; NaN where an entry is free.
+        known: Values and slopes there, where they are known.
+        over_bands: Whether dead bands of the drives are left out.
+
+    Returns:
+        What was found; where it does not meet the target within the limits, `failure` says that the
+        search stopped.
+    """
+    model, search = problem.model, problem.search
+    rows = np.flatnonzero(goal == goal)
+    entries, weights, wanted = problem.entries[rows], problem.weights[rows], goal[rows]
+    solves = 0
+    if known is None:
+        known, solves = model.solve(before, start), 1
+    error = size_of(weights * (known.values[entries] - wanted))
+    redundant = len(start) > len(rows) and int(problem.driven.sum()) > len(rows)
+    if not known.converged or not np.isfinite(known.jacobian[entries]).all():
+        return Attempt(start, known, error, 0.0, solves, Failure.SEARCH_STOPPED)
+    if error <= search.tolerance and not redundant:
+        return _within_limits(problem, Attempt(start, known, error, 0.0, solves, None))
+    band = model.dead_band(before) if over_bands else (start, start)
+    aim = DriveAim(
+        entries, wanted, weights, problem.low, problem.high, band, problem.driven,
+        search.tolerance, problem.unit, min(_ROUNDS, search.solves),
+    )  # fmt: skip
+    response, drive, error, met, more = model.search(before, start, known, aim)
+    failure = None if met else Failure.SEARCH_STOPPED
+    return _within_limits(problem, Attempt(drive, response, error, 0.0, solves + more, failure))
+
+
+def _within_limits(problem: Problem, attempt: Attempt) -> Attempt:
+    """The attempt, which has failed where a limit is broken."""
+    response = attempt.response
+    room = limit_rows(problem, response.values, response.jacobian)[1]
+    excess = max(0.0, -float(room.min())) if room.size else 0.0
+    broken = excess > KEPT or not (attempt.drive >= problem.low).all()
+    broken = broken or not (attempt.drive <= problem.high).all()
+    failure = Failure.SEARCH_STOPPED if broken else attempt.failure
+    return attempt._replace(excess=excess, failure=failure)
 
 
 def _relax(walk: Walk, budget: int) -> None:

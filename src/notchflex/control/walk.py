@@ -20,7 +20,7 @@ _LEAST_DRIVES = 1e-10
 _GROWTH, _FIRST_PART = 1.0, 0.05
 # Limits count as kept within this part of them; those smaller than the second number (N, mm, or a
 # strain) within parts of it.
-_KEPT, _LEAST_LIMIT = 1e-7, 1e-3
+KEPT, _LEAST_LIMIT = 1e-7, 1e-3
 # What a violation of limits, as parts of them, counts beside the error.
 _PENALTY = 1e4
 # A column of the slopes that is this part of the target over the drives is that of a tendon that
@@ -135,7 +135,7 @@ class Walk:
         """Whether the target is met within the limits."""
         here = self.point
         met = here.error <= self.problem.search.tolerance and here.response.converged
-        return met and here.excess <= _KEPT
+        return met and here.excess <= KEPT
 
     def step(self, damping: float) -> Float[np.ndarray, " t"]:
         """Return the next step of all drives.
@@ -303,7 +303,7 @@ class Walk:
         )
         # What of the way down is left where limits forbid the rest of it.
         left = np.where(at_low | at_high, 0.0, down)
-        tight = here.limits[here.room <= _KEPT]
+        tight = here.limits[here.room <= KEPT]
         if len(tight):
             along = left - tight.T @ np.linalg.lstsq(tight.T, left, rcond=None)[0]
             if np.abs(along).max() <= flat:
