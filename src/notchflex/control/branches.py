@@ -133,7 +133,7 @@ def find_anyhow(
     """
     # Where other tendons move, a tendon slides within its dead band too.
     alone = bool(np.count_nonzero(start[problem.driven]) < 2)
-    best = meet(problem, before, start, goal, known, over_bands=alone)
+    best = meet(problem, before, start, goal, known)
     if best.failure is None:
         return best
     solves = best.solves

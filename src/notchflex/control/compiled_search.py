@@ -8,14 +8,14 @@ target are met at once. A correction costs as much as one iteration of a solve.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import jax, jnp
+from notchflex._jax import array_module, jax, jnp
 from notchflex._pytree import choose
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import report_quantities
@@ -32,7 +32,7 @@ from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
 from notchflex.solver.programs.static_structure import StaticStructure
-from notchflex.solver.residual import evaluate
+from notchflex.solver.residual import Evaluation, evaluate
 
 LEAST_DRIVES = 1e-10
 """Where drives are redundant the smallest meet the target. This weight decides among those that
@@ -48,6 +48,16 @@ SLACK = 1e-10
 
 # A corrected state is solved where its residual is below this multiple of the tolerance.
 _SOLVED = 100.0
+# What a step weighs beside the error of the target, as a part of the slopes, for a target that is as
+# far as the drives reach.
+_DAMPING = 0.01
+# A tendon sticks where its slopes, squared, are this part of those with which it last slid,
+_STUCK = 1e-12
+# and stays where it is if it must slide by less than this part of its dead band.
+_SMALL_LEAP = 1e-3
+# Corrections go on while each leaves this part of the error at most, or the target is this multiple
+# of its tolerance away.
+_LEAST_FALL, _NEAR = 0.5, 100.0
 # A correction of the drives by less than this part of them is none.
 _NO_CHANGE = 1e-11
 
@@ -59,12 +69,11 @@ class Task(NamedTuple):
         goal: What the numbers are to become, (n,).
         weights: What an error of each counts, 0 of one that is free, (n,).
         miss: Weighted differences from the target at the present drives, (n,).
-        slopes: Their slopes there; zero where they are not known, (n, t).
+        slopes: Their slopes there, of a tendon that sticks as it last slid; zero where they are not
+            known, (n, t).
         present: Drives to start from, (t,).
         low: Lowest drives, (t,).
         high: Highest drives, (t,).
-        band_low: Lower end of the dead band around `present`, (t,).
-        band_high: Its upper end, (t,).
         driven: 1 where a tendon is driven, 0 where it is held, (t,).
         turn: Rotation from the base to the world, (3, 3).
         tolerance: Weighted error at which the target is met.
@@ -81,8 +90,6 @@ class Task(NamedTuple):
     present: Float[Array, " t"]
     low: Float[Array, " t"]
     high: Float[Array, " t"]
-    band_low: Float[Array, " t"]
-    band_high: Float[Array, " t"]
     driven: Float[Array, " t"]
     turn: Float[Array, "3 3"]
     tolerance: Float[Array, ""]
@@ -101,7 +108,7 @@ def blank_task(numbers: int, tendons: int, turn: np.ndarray) -> Task:
         turn: Rotation from the base to the world.
     """
     none, drives, slopes = np.zeros(numbers), np.zeros(tendons), np.zeros((numbers, tendons))
-    task = Task(*[none] * 3, slopes, *[drives] * 6, turn, *[np.zeros(())] * 5)  # pyright: ignore[reportArgumentType]
+    task = Task(*[none] * 3, slopes, *[drives] * 4, turn, *[np.zeros(())] * 5)  # pyright: ignore[reportArgumentType]
     return task._replace(unit=np.ones(()), rounds=np.ones(()))  # pyright: ignore[reportArgumentType]
 
 
@@ -113,6 +120,8 @@ class SearchLayouts(NamedTuple):
         command: Layout of one load.
         state: Layout of a state.
         task: Layout of a task.
+        first_contact: Where a packed state has the log ratios of the first contacts of all tendons,
+            and their largest.
         outputs: Names of the quantities.
     """
 
@@ -120,6 +129,7 @@ class SearchLayouts(NamedTuple):
     command: PytreeLayout
     state: PytreeLayout
     task: PytreeLayout
+    first_contact: tuple[tuple[int, ...], tuple[int, ...]]
     outputs: tuple[str, ...]
 
 
@@ -133,10 +143,14 @@ class _At(NamedTuple):
         values: The numbers of the response, (n,).
         slopes: Their slopes by the drives, (t, n).
         error: Weighted distance from the target.
+        sticks: 1 where a tendon sticks, (t,).
         change: Correction of the drives from here, (t,).
         next_point: Unknowns and base tensions after the correction.
+        stuck: Whether a tendon sticks that must move.
+        beyond: Drives to solve next, beyond the dead bands of tendons that stick, (t,).
+        falls: Whether the last correction has brought it nearer.
         met: Whether balance and target are met.
-        count: How many corrections were made.
+        corrected: How many corrections were made.
     """
 
     drive: Array
@@ -144,11 +158,34 @@ class _At(NamedTuple):
     state: SolverState
     values: Array
     slopes: Array
+    sticks: Array
     error: Array
     change: Array
     next_point: Iterate
+    stuck: Bool[Array, ""]
+    beyond: Array
+    falls: Bool[Array, ""]
     met: Bool[Array, ""]
-    count: Int[Array, ""]
+    corrected: Int[Array, ""]
+
+
+class _Moves(NamedTuple):
+    """Linear response of a point.
+
+    Attributes:
+        residual: Largest residual there.
+        values: The numbers of the response there, (n,).
+        state: The state there.
+        points: Changes of the point by a step to the balance, and by a unit of every drive, as
+            leading axis, 1 + t.
+        changes: The same of the numbers, (1 + t, n).
+    """
+
+    residual: Array
+    values: Array
+    state: SolverState
+    points: Iterate
+    changes: Array
 
 
 class _Round(NamedTuple):
@@ -157,7 +194,7 @@ class _Round(NamedTuple):
     drive: Array
     at: _At
     result: LoadStepResult
-    count: Int[Array, ""]
+    solved: Int[Array, ""]
 
 
 def drive_step(
@@ -167,6 +204,7 @@ def drive_step(
     low: Float[Array, " t"],
     high: Float[Array, " t"],
     driven: Float[Array, " t"],
+    scale: Float[Array, ""],
 ) -> Float[Array, " t"]:
     """Return the step of least squares to a target within limits, that of the smallest drives.
 
@@ -179,6 +217,7 @@ def drive_step(
         low: Lowest step.
         high: Highest step.
         driven: 1 where a drive may change.
+        scale: Size of the drives.
     """
     count = len(drive)
     slopes = slopes * driven
@@ -188,7 +227,15 @@ def drive_step(
     size = jnp.where(known, size, 1.0)
     small = LEAST_DRIVES * size
     eye = jnp.eye(count)
-    hessian, gradient = normal + small * eye, slopes.T @ miss + small * drive * driven
+    gradient = slopes.T @ miss + small * drive * driven
+    # Far from the target slopes hold roughly: directions that move little are left for later.
+    part = jnp.linalg.norm(miss) / (jnp.sqrt(size) * scale)
+    several = jnp.sum(driven) > 1.0
+    damping = jnp.where(several, _DAMPING * jnp.minimum(part, 1.0), 0.0) * size
+    hessian = normal + (small + damping) * eye
+    # What moves nothing stays.
+    column = jnp.sum(slopes**2, axis=0)
+    driven = driven * (column > _STUCK * jnp.max(column))
     free, step = driven, jnp.zeros(count)
     for _ in range(count):
         both = free[:, None] * free[None, :]
@@ -209,49 +256,25 @@ def search_drives(
     task_vector: Float[Array, " task"],
     numbers: Float[Array, " settings"],
     layouts: SearchLayouts,
-) -> tuple[Array, Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array, Array, Array]:
     """Solve the load at the drives that the slopes predict, and correct them to the target.
 
     Returns:
         The state, packed; the numbers asked of it; their slopes by the drives, drives as leading
-        axis; the drives; and whether it is solved, whether in one part, whether the target is met,
+        axis; 1 where a tendon sticks; the drives; and whether it is solved, whether in one part, whether the target is met,
         its error, and how many loads were solved.
     """
     chain, command = layouts.chain.unpack(chain_vector), layouts.command.unpack(load)
     last, task = layouts.state.unpack(before), layouts.task.unpack(task_vector)
     settings = Settings.of(numbers)
-    scale = _scale(task, task.present)
-
-    def again(state: _Round) -> Bool[Array, ""]:
-        more = (state.count < task.rounds) & state.result.converged & ~state.at.met
-        moves = jnp.max(jnp.abs(state.at.change)) > _NO_CHANGE * scale
-        return (state.count == 0) | (more & moves)
-
-    def solve(state: _Round) -> _Round:
-        towards = command._replace(target=state.drive)
-        result = solve_load_step(chain, towards, last, settings)
-        at = _correct(chain, command, result, task, state.drive, settings, layouts.outputs)
-        return _Round(at[0], at[1], result, state.count + 1)
-
-    reach = GROWTH * scale
-    first = drive_step(
-        task.miss,
-        task.slopes,
-        task.present,
-        jnp.maximum(jnp.minimum(task.low - task.band_low, 0.0), -reach),
-        jnp.minimum(jnp.maximum(task.high - task.band_high, 0.0), reach),
-        task.driven,
-    )
-    edge = jnp.where(first > 0.0, task.band_high, task.band_low)
-    start = jnp.where(first == 0.0, task.present, edge + first)
-    start = _within(task, start)
-    found = jax.lax.while_loop(again, solve, _nowhere(chain, last, start, task))
+    search = _Search(chain, command, last, task, settings, layouts)
+    found = jax.lax.while_loop(search.goes_on, search.solve, search.begin())
     at, result = found.at, found.result
     good = result.converged & believable(SolvedState(chain, at.state).quantity)
     good = good & tension_is_bounded(chain, command, at.point.base_tension)
-    flags = [good, result.parts == 1, at.met & good, at.error, found.count]
+    flags = [good, result.parts == 1, at.met & good, at.error, found.solved]
     status = jnp.stack([jnp.asarray(one, float) for one in flags])
-    return layouts.state.pack(at.state), at.values, at.slopes, at.drive, status
+    return layouts.state.pack(at.state), at.values, at.slopes, at.sticks, at.drive, status
 
 
 def _scale(task: Task, drive: Float[Array, " t"]) -> Float[Array, ""]:
@@ -266,97 +289,138 @@ def _within(task: Task, drive: Float[Array, " t"]) -> Float[Array, " t"]:
     return jnp.where(task.driven > 0.0, inside, task.present)
 
 
-def _nowhere(chain: Chain, last: SolverState, start: Array, task: Task) -> _Round:
-    """The loop before anything is solved."""
-    zero, none = jnp.zeros(()), jnp.zeros(len(start))
-    no, count = jnp.array(False), jnp.zeros((), int)
-    at = _At(
-        start,
-        last.point,
-        last,
-        jnp.zeros(len(task.goal)),
-        jnp.zeros(task.slopes.T.shape),
-        zero,
-        none,
-        last.point,
-        no,
-        count,
-    )
-    result = LoadStepResult(last, zero, count, jnp.array(True), zero, count, last, zero)
-    return _Round(start, at, result, count)
-
-
-def _correct(
-    chain: Chain,
-    command: Command,
-    result: LoadStepResult,
-    task: Task,
+def dead_band(
     drive: Float[Array, " t"],
-    settings: Settings,
-    outputs: tuple[str, ...],
-) -> tuple[Float[Array, " t"], _At]:
-    """Correct drives and equilibrium together, from a solved load.
+    ratio: Float[Array, " t"],
+    bound: Float[Array, " t"],
+    by_stroke: Bool[Array, " t"] | bool,
+) -> tuple[Float[Array, " t"], Float[Array, " t"]]:
+    """Return between which drives nothing moves, as the first contact of a tendon sticks.
 
-    Returns:
-        Drives from which to solve again, and where the corrections ended: at the solved load itself
-        where they do not meet the target.
+    Exactly so while the other tendons stay as they are. A stroke always moves something.
+
+    Args:
+        drive: The drives, N or mm.
+        ratio: Log ratios of the first contacts.
+        bound: Their largest.
+        by_stroke: Which drives are strokes.
     """
-    memory = result.between.memory
-    here = _evaluate_at(chain, command, memory, task, settings, outputs)
-    count = jnp.zeros((), int)
-    solved = here(drive, result.solved.point, count)
-    # Where the load was cut into parts, the history of the last one depends on the drives; and a
-    # notch that can snap is solved whole.
-    allowed = task.corrections
-    if chain.rods.section.ends is not None:
-        allowed = jnp.zeros(())
-    allowed = jnp.where(result.converged & (result.parts == 1), allowed, 0.0)
-
-    def proceed(at: _At) -> Bool[Array, ""]:
-        return ~at.met & (at.count < allowed) & jnp.isfinite(at.error)
-
-    def step(at: _At) -> _At:
-        drive, point = _within(task, at.drive + at.change), at.next_point
-        tension = command.either(point.base_tension, drive)
-        return here(drive, point._replace(base_tension=tension), at.count + 1)
-
-    last = jax.lax.while_loop(proceed, step, solved)
-    exact = solved._replace(state=result.solved)
-    return _within(task, drive + solved.change), choose(last.met & (last.count > 0), last, exact)
+    xp = array_module(drive)
+    still = by_stroke | (xp.abs(ratio) > bound)
+    low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
+    low = xp.where(still, drive, xp.minimum(low, drive))
+    return low, xp.where(still, drive, xp.maximum(high, drive))
 
 
-def _evaluate_at(
-    chain: Chain,
-    command: Command,
-    memory: Memory,
-    task: Task,
-    settings: Settings,
-    outputs: tuple[str, ...],
-) -> Callable[[Array, Iterate, Array], _At]:
-    """Return a function that evaluates a point and finds the next one."""
+class _Search:
+    """The loop over solved loads, as it is traced."""
 
-    def state_at(point: Iterate) -> SolverState:
-        at = evaluate(chain, point.unknowns, memory, point.base_tension, command.applied)
-        return SolverState(
-            point,
-            Memory(
-                log_ratio=point.unknowns.log_ratio,
-                slid=tuple(span.slid for span in at.spans),
-                bound=tuple(span.bound for span in at.spans),
-                material=at.flexure.memory,
-            ),
-            stroke(chain, point.base_tension, at.base),
-            command.applied,
+    def __init__(
+        self,
+        chain: Chain,
+        command: Command,
+        last: SolverState,
+        task: Task,
+        settings: Settings,
+        layouts: SearchLayouts,
+    ) -> None:
+        """Take what stays the same."""
+        self.chain, self.command, self.last = chain, command, last
+        self.task, self.settings, self.layouts = task, settings, layouts
+
+    def begin(self) -> _Round:
+        """Return the loop before anything is solved, with the drives that the slopes predict."""
+        task, start = self.task, self.task.present
+        change = self._step(task.miss, task.slopes, start)
+        drive = self._beyond(self.last, start, change, jnp.array(True))
+        zero, none, count = jnp.zeros(()), jnp.zeros(len(start)), jnp.zeros((), int)
+        slopes, no = jnp.zeros(task.slopes.T.shape), jnp.array(False)
+        values = jnp.zeros(len(task.goal))
+        at = _At(
+            drive, self.last.point, self.last, values, slopes, none, zero, none, self.last.point,
+            no, drive, no, no, count,
+        )  # fmt: skip
+        last = self.last
+        result = LoadStepResult(last, zero, count, jnp.array(True), zero, count, last, zero)
+        return _Round(drive, at, result, count)
+
+    def goes_on(self, state: _Round) -> Bool[Array, ""]:
+        """Return whether another load is solved."""
+        task, at = self.task, state.at
+        more = (state.solved < task.rounds) & state.result.converged & ~at.met
+        size = _NO_CHANGE * _scale(task, task.present)
+        moves = jnp.max(jnp.abs(at.beyond - at.drive)) > size
+        return (state.solved == 0) | (more & moves)
+
+    def solve(self, state: _Round) -> _Round:
+        """Solve a load, and correct drives and equilibrium together from there."""
+        towards = self.command._replace(target=state.drive)
+        result = solve_load_step(self.chain, towards, self.last, self.settings)
+        memory, task = result.between.memory, self.task
+        here = self._evaluate(memory, state.drive, result.solved.point, jnp.zeros((), int))
+        # Where the load was cut into parts, the history of the last one depends on the drives; and
+        # a notch that can snap is solved whole.
+        whole = (result.parts == 1) if self.chain.rods.section.ends is None else jnp.array(False)
+        allowed = jnp.where(result.converged & whole & ~here.stuck, task.corrections, 0.0)
+
+        def proceed(at: _At) -> Bool[Array, ""]:
+            return ~at.met & (at.corrected < allowed) & at.falls
+
+        def correct(at: _At) -> _At:
+            drive, point = _within(task, at.drive + at.change), at.next_point
+            tension = self.command.either(point.base_tension, drive)
+            point = point._replace(base_tension=tension)
+            new = self._evaluate(memory, drive, point, at.corrected + 1)
+            enough = jnp.maximum(_LEAST_FALL * at.error, _NEAR * task.tolerance)
+            return new._replace(falls=new.error <= enough)
+
+        last = jax.lax.while_loop(proceed, correct, here)
+        exact = here._replace(state=result.solved)
+        at = choose(last.met & (last.corrected > 0), last, exact)
+        return _Round(here.beyond, at, result, state.solved + 1)
+
+    def _step(self, miss: Array, slopes: Array, drive: Array) -> Array:
+        """Step of the drives to the target, within their limits."""
+        task = self.task
+        scale = _scale(task, drive)
+        low = jnp.maximum(task.low - drive, -GROWTH * scale)
+        high = jnp.minimum(task.high - drive, GROWTH * scale)
+        return drive_step(miss, slopes, drive, low, high, task.driven, scale)
+
+    def _beyond(
+        self, state: SolverState, drive: Array, change: Array, stuck: Array
+    ) -> Float[Array, " t"]:
+        """Drives after a change; of tendons that stick that beyond their dead bands."""
+        packed, by_stroke = self.layouts.state.pack(state), self.command.by_stroke
+        ratio, bound = (packed[np.array(at)] for at in self.layouts.first_contact)
+        edges = dead_band(drive, ratio, bound, False if by_stroke is None else by_stroke)
+        leap = jnp.where(change > 0.0, edges[1], edges[0]) - drive
+        leap = jnp.where(stuck & (change != 0.0), leap, 0.0)
+        small = jnp.abs(change) <= _SMALL_LEAP * jnp.abs(leap)
+        return _within(self.task, drive + jnp.where(small, 0.0, change + leap))
+
+    def _values(self, memory: Memory, point: Iterate) -> tuple[Array, tuple[Evaluation, Any]]:
+        """What is asked of a point, in the world; its balance, and the state with its history."""
+        chain, applied, outputs = self.chain, self.command.applied, self.layouts.outputs
+        at = evaluate(chain, point.unknowns, memory, point.base_tension, applied)
+        history = Memory(
+            log_ratio=point.unknowns.log_ratio,
+            slid=tuple(span.slid for span in at.spans),
+            bound=tuple(span.bound for span in at.spans),
+            material=at.flexure.memory,
         )
+        drawn = stroke(chain, point.base_tension, at.base)
+        state = SolverState(point, history, drawn, applied)
+        found = report_quantities(chain, state, outputs)
+        turned = [REGISTERED[name].turned(found[name], self.task.turn) for name in outputs]
+        return jnp.concatenate([jnp.ravel(one) for one in turned]), (at, state)
 
-    def flat(point: Iterate) -> Array:
-        found = report_quantities(chain, state_at(point), outputs)
-        turned = [REGISTERED[name].turned(found[name], task.turn) for name in outputs]
-        return jnp.concatenate([jnp.ravel(one) for one in turned])
-
-    def evaluated(drive: Array, point: Iterate, count: Array) -> _At:
-        unknowns, tension = point
-        at = evaluate(chain, unknowns, memory, tension, command.applied)
+    def _moves(self, memory: Memory, drive: Array, point: Iterate) -> _Moves:
+        """Linear response of a point to a step to the balance, and to a unit of every drive."""
+        chain, command, (unknowns, tension) = self.chain, self.command, point
+        values, by_point, (at, state) = jax.linearize(
+            partial(self._values, memory), point, has_aux=True
+        )
         demand = command_residual(chain, command._replace(target=drive), tension, at.base)
         residual = jnp.max(jnp.abs(ravel_pytree((at.residual, demand))[0]))
 
@@ -366,7 +430,6 @@ def _evaluate_at(
 
         step, by_drive = jax.linearize(step_to, drive)
         step = limit_slack(chain, point, step)
-        values, by_point = jax.linearize(flat, point)
 
         def column(none: Array, unit: Array) -> tuple[Array, Any]:
             first = 1.0 - jnp.sum(unit)
@@ -375,27 +438,38 @@ def _evaluate_at(
 
         units = jnp.concatenate([jnp.zeros((1, len(drive))), jnp.eye(len(drive))])
         moves, changes = jax.lax.scan(column, jnp.zeros(()), units)[1]
+        return _Moves(residual, values, state, moves, changes)
+
+    def _evaluate(self, memory: Memory, drive: Array, point: Iterate, corrected: Array) -> _At:
+        """Evaluate a point, and find the way on."""
+        task = self.task
+        residual, values, state, moves, changes = self._moves(memory, drive, point)
         miss = task.weights * (values - task.goal)
-        ahead = miss + task.weights * changes[0]
         slopes = changes[1:]
-        reach = GROWTH * _scale(task, drive)
-        change = drive_step(
-            ahead,
-            (task.weights * slopes).T,
-            drive,
-            jnp.maximum(task.low - drive, -reach),
-            jnp.minimum(task.high - drive, reach),
-            task.driven,
-        )
+        own, last = ((task.weights * one) ** 2 for one in (slopes, task.slopes.T))
+        stuck = jnp.sum(own, axis=1) <= _STUCK * jnp.sum(last, axis=1)
+        weighted = jnp.where(stuck[:, None], task.slopes.T, task.weights * slopes)
+        change = self._step(miss + task.weights * changes[0], weighted.T, drive)
         by_change = jnp.concatenate([jnp.ones(1), change])
         next_point = jax.tree.map(
             lambda value, by: value + jnp.tensordot(by_change, by, 1), point, moves
         )
         error = jnp.linalg.norm(miss)
         settled = jnp.max(jnp.abs(change)) <= SMALL_RELAXATION * _scale(task, drive)
-        met = (error <= task.tolerance) & (residual <= _SOLVED * settings.tolerance)
-        met = met & (settled | (task.redundant == 0.0))
-        return _At(drive, point, state_at(point), values, slopes, error, change, next_point, met,
-                   count)  # fmt: skip
-
-    return evaluated
+        met = (error <= task.tolerance) & (residual <= _SOLVED * self.settings.tolerance)
+        return _At(
+            drive=drive,
+            point=point,
+            state=state,
+            values=values,
+            slopes=slopes,
+            sticks=1.0 * stuck,
+            error=error,
+            change=change,
+            next_point=next_point,
+            stuck=jnp.any(stuck & (change != 0.0)),
+            beyond=self._beyond(state, drive, change, stuck),
+            met=met & (settled | (task.redundant == 0.0)),
+            falls=jnp.isfinite(error),
+            corrected=corrected,
+        )

@@ -17,7 +17,13 @@ from jaxtyping import Float
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.solve import prepare_for
-from notchflex.control.compiled_search import SearchLayouts, Task, blank_task, search_drives
+from notchflex.control.compiled_search import (
+    SearchLayouts,
+    Task,
+    blank_task,
+    dead_band,
+    search_drives,
+)
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.motion import rotation_about
@@ -44,6 +50,7 @@ class Response(NamedTuple):
             so hard that its derivatives are not known.
         converged: Whether the load has an equilibrium within what the model is for.
         whole: Whether it was solved in one substep.
+        sliding: The Jacobian, of tendons that stick as they last slid, (m, t).
     """
 
     state: Float[np.ndarray, " state"]
@@ -51,6 +58,7 @@ class Response(NamedTuple):
     jacobian: Float[np.ndarray, "m t"]
     converged: bool
     whole: bool
+    sliding: Float[np.ndarray, "m t"]
 
 
 class DriveAim(NamedTuple):
@@ -62,7 +70,6 @@ class DriveAim(NamedTuple):
         weights: What an error of each counts, (m,).
         low: Lowest drives, (t,).
         high: Highest drives, (t,).
-        band: Lower and upper end of the dead bands around the drives to start from, (t,) each.
         driven: Which tendons are driven, (t,).
         tolerance: Weighted error at which the target is met.
         unit: Drive that about closes a notch, N or mm.
@@ -74,7 +81,6 @@ class DriveAim(NamedTuple):
     weights: np.ndarray
     low: np.ndarray
     high: np.ndarray
-    band: tuple[np.ndarray, np.ndarray]
     driven: np.ndarray
     tolerance: float
     unit: float
@@ -128,7 +134,7 @@ class DriveModel:
         """
         task = self._plain.copy()
         at = self._fields
-        task[at["present"].start : at["band_high"].stop].reshape(5, -1)[:] = drive
+        task[at["present"].start : at["high"].stop].reshape(3, -1)[:] = drive
         return self._run(before, task)[0]
 
     def search(
@@ -155,9 +161,9 @@ class DriveModel:
         task[at["goal"]][own], task[at["weights"]][own] = aim.goal, aim.weights
         task[at["miss"]][own] = aim.weights * (known.values[entries] - aim.goal)
         slopes = task[at["slopes"]].reshape(-1, len(start))
-        slopes[own] = aim.weights[:, None] * known.jacobian[entries]
-        rows = (start, aim.low, aim.high, *aim.band, aim.driven)
-        task[at["present"].start : at["driven"].stop].reshape(6, -1)[:] = rows
+        slopes[own] = aim.weights[:, None] * known.sliding[entries]
+        rows = (start, aim.low, aim.high, aim.driven)
+        task[at["present"].start : at["driven"].stop].reshape(4, -1)[:] = rows
         redundant = float(aim.driven.sum()) > len(entries)
         task[at["tolerance"].start :] = (
             aim.tolerance,
@@ -166,17 +172,23 @@ class DriveModel:
             _CORRECTIONS,
             redundant,
         )
-        response, drive, status = self._run(before, task)
+        response, drive, status = self._run(before, task, known.sliding)
         return response, drive, float(status[3]), bool(status[2]), int(status[4])
 
-    def _run(self, before: np.ndarray, task: np.ndarray) -> tuple[Response, np.ndarray, np.ndarray]:
+    def _run(
+        self, before: np.ndarray, task: np.ndarray, sliding: np.ndarray | None = None
+    ) -> tuple[Response, np.ndarray, np.ndarray]:
         chain, settings = self.prepared.long.dynamic_vector, self._numbers
-        state, values, slopes, drive, status = search_drives(
+        state, values, slopes, sticks, drive, status = search_drives(
             chain, before, self._packed_load, task, settings, self._layouts
         )
         own = self._own
-        whole = Response(state, values[own], slopes[:, own].T, bool(status[0]), bool(status[1]))
-        return whole, drive, status
+        jacobian = slopes[:, own].T
+        slid = jacobian
+        if sliding is not None and sticks.any():
+            slid = np.where(sticks > 0.0, sliding, jacobian)
+        good, whole = bool(status[0]), bool(status[1])
+        return Response(state, values[own], jacobian, good, whole, slid), drive, status
 
     @cached_property
     def prepared(self) -> PreparedChain:
@@ -203,13 +215,9 @@ class DriveModel:
 
         Exactly so while the other tendons stay as they are. A stroke always moves something.
         """
-        drive, places = self.drives(state), self._places
-        by_stroke = ~np.isnan(self.load.stroke[0])
+        places, by_stroke = self._places, ~np.isnan(self.load.stroke[0])
         ratio, bound = state[places.first_ratio], state[places.first_bound]
-        low, high = (drive * np.exp(-ratio + side * bound) for side in (-1.0, 1.0))
-        still = by_stroke | (np.abs(ratio) > bound)
-        low = np.where(still, drive, np.minimum(low, drive))
-        return low, np.where(still, drive, np.maximum(high, drive))
+        return dead_band(self.drives(state), ratio, bound, by_stroke)
 
     def friction(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
         """Return the logarithm of the largest tension ratio over all contacts of every tendon."""
@@ -299,8 +307,10 @@ class DriveModel:
     @cached_property
     def _layouts(self) -> SearchLayouts:
         long, form = self.prepared.long, PytreeLayout.of(self._blank)
+        ratio, bound = self._places.first_ratio, self._places.first_bound
+        first = tuple(ratio.tolist()), tuple(bound.tolist())
         return SearchLayouts(
-            long.static_structure, self._commands[1], long.state, form, self.outputs
+            long.static_structure, self._commands[1], long.state, form, first, self.outputs
         )
 
     @cached_property

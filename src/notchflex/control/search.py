@@ -21,7 +21,7 @@ _FIRST, _FACTOR, _GOOD_GAIN, _MOST_DAMPING = 1e-3, 8.0, 0.5, 1e12
 # The part of the promised improvement that a step must bring.
 _LEAST_GAIN = 1e-3
 # Loads that the program may solve for a target.
-_ROUNDS = 3
+_ROUNDS = 6
 # A step that changes drives by less than this part of them is none.
 _NO_STEP = 1e-11
 # Drives that are redundant are made smaller in so many rounds of so many corrections, while a round
@@ -77,8 +77,6 @@ def meet(
     start: Float[np.ndarray, " t"],
     goal: Float[np.ndarray, " m"],
     known: Response | None = None,
-    *,
-    over_bands: bool = True,
 ) -> Attempt:
     """Meet a target from the present drives by one program, as mostly succeeds.
 
@@ -88,7 +86,6 @@ def meet(
         start: Its drives.
         goal: The target; NaN where an entry is free.
         known: Values and slopes there, where they are known.
-        over_bands: Whether dead bands of the drives are left out.
 
     Returns:
         What was found; where it does not meet the target within the limits, `failure` says that the
@@ -106,9 +103,8 @@ def meet(
         return Attempt(start, known, error, 0.0, solves, Failure.SEARCH_STOPPED)
     if error <= search.tolerance and not redundant:
         return _within_limits(problem, Attempt(start, known, error, 0.0, solves, None))
-    band = model.dead_band(before) if over_bands else (start, start)
     aim = DriveAim(
-        entries, wanted, weights, problem.low, problem.high, band, problem.driven,
+        entries, wanted, weights, problem.low, problem.high, problem.driven,
         search.tolerance, problem.unit, min(_ROUNDS, search.solves),
     )  # fmt: skip
     response, drive, error, met, more = model.search(before, start, known, aim)
