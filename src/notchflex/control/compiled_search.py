@@ -391,10 +391,13 @@ class _Search:
         self, state: SolverState, drive: Array, change: Array, stuck: Array
     ) -> Float[Array, " t"]:
         """Drives after a change; of tendons that stick that beyond their dead bands."""
-        packed, by_stroke = self.layouts.state.pack(state), self.command.by_stroke
+        packed, command = self.layouts.state.pack(state), self.command
         ratio, bound = (packed[np.array(at)] for at in self.layouts.first_contact)
-        edges = dead_band(drive, ratio, bound, False if by_stroke is None else by_stroke)
-        leap = jnp.where(change > 0.0, edges[1], edges[0]) - drive
+        there = command.either(state.stroke, state.point.base_tension)
+        by_stroke = False if command.by_stroke is None else command.by_stroke
+        low, high = dead_band(there, ratio, bound, by_stroke)
+        up, down = jnp.maximum(high - drive, 0.0), jnp.minimum(low - drive, 0.0)
+        leap = jnp.where(change > 0.0, up, down)
         leap = jnp.where(stuck & (change != 0.0), leap, 0.0)
         small = jnp.abs(change) <= _SMALL_LEAP * jnp.abs(leap)
         return _within(self.task, drive + jnp.where(small, 0.0, change + leap))
