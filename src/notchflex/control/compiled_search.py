@@ -48,8 +48,8 @@ SLACK = 1e-10
 
 # A corrected state is solved where its residual is below this multiple of the tolerance.
 _SOLVED = 100.0
-# What a step weighs beside the error of the target, as a part of the slopes, for a target that is as
-# far as the drives reach.
+# What a step weighs beside the error of the target, as a part of the slopes, for a target as far as
+# the drives reach.
 _DAMPING = 0.01
 # A tendon sticks where its slopes, squared, are this part of those with which it last slid,
 _STUCK = 1e-12
@@ -261,8 +261,8 @@ def search_drives(
 
     Returns:
         The state, packed; the numbers asked of it; their slopes by the drives, drives as leading
-        axis; 1 where a tendon sticks; the drives; and whether it is solved, whether in one part, whether the target is met,
-        its error, and how many loads were solved.
+        axis; 1 where a tendon sticks; the drives; and whether it is solved, whether in one part,
+        whether the target is met, its error, and how many loads were solved.
     """
     chain, command = layouts.chain.unpack(chain_vector), layouts.command.unpack(load)
     last, task = layouts.state.unpack(before), layouts.task.unpack(task_vector)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from notchflex.control.inverse import make_problem, present_drives
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
 from notchflex.control.problem import TargetSearch
-from notchflex.control.search import find
+from notchflex.control.search import find, meet
 from notchflex.control.targets import DIRECTION, Targets, target_shapes
 from notchflex.errors import Failure, InputError
 from notchflex.loads import Load
@@ -184,6 +185,8 @@ class Controller:
         """Go on from the state that measured tension and stroke tell."""
         assert self.observer is not None
         model, state = self.observer.observe(tension, stroke)
+        if not self.observer.accepted:
+            raise ValueError
         if state.shape == self._before.shape:
             self._problem = self._problem._replace(
                 model=self.observer.seen_by(model, self._problem)
@@ -196,8 +199,14 @@ class Controller:
             low = np.maximum(problem.low, self._command - self._rate)
             high = np.minimum(problem.high, self._command + self._rate)
             problem = problem._replace(low=np.minimum(low, high), high=high)
-        alone = bool(np.count_nonzero(self._command) < 2)
-        found = find(problem, self._before, self._command, goal, self._known, over_bands=alone)
+        found = meet(problem, self._before, self._command, goal, self._known)
+        left = problem.search.solves - found.solves
+        if found.failure is not None and left > 0:
+            fewer = problem._replace(search=replace(problem.search, solves=left))
+            alone = bool(np.count_nonzero(self._command) < 2)
+            begin = self._before, self._command
+            other = find(fewer, *begin, goal, self._known, over_bands=alone)
+            found = other._replace(solves=found.solves + other.solves)
         failure, good = found.failure, found.response.converged and np.isfinite(found.error)
         code = failure.name if failure else ""
         if good:

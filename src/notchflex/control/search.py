@@ -20,6 +20,10 @@ from notchflex.errors import Failure
 _FIRST, _FACTOR, _GOOD_GAIN, _MOST_DAMPING = 1e-3, 8.0, 0.5, 1e12
 # The part of the promised improvement that a step must bring.
 _LEAST_GAIN = 1e-3
+# Tendons whose slopes (mm, N or rad per N or mm) are below this stick. Beside their drives, by these
+# parts of them, they slide.
+_STUCK = 1e-9
+_ASIDE = (1e-6, -1e-6)
 # Loads that the program may solve for a target.
 _ROUNDS = 6
 # A step that changes drives by less than this part of them is none.
@@ -96,7 +100,7 @@ def meet(
     entries, weights, wanted = problem.entries[rows], problem.weights[rows], goal[rows]
     solves = 0
     if known is None:
-        known, solves = model.solve(before, start), 1
+        known, solves = _present(problem, before, start)
     error = size_of(weights * (known.values[entries] - wanted))
     redundant = len(start) > len(rows) and int(problem.driven.sum()) > len(rows)
     if not known.converged or not np.isfinite(known.jacobian[entries]).all():
@@ -110,6 +114,22 @@ def meet(
     response, drive, error, met, more = model.search(before, start, known, aim)
     failure = None if met else Failure.SEARCH_STOPPED
     return _within_limits(problem, Attempt(drive, response, error, 0.0, solves + more, failure))
+
+
+def _present(problem: Problem, before: np.ndarray, start: np.ndarray) -> tuple[Response, int]:
+    """Solve the present drives, and drives beside them for slopes of tendons that stick."""
+    model, driven = problem.model, problem.driven
+    known, solves = model.solve(before, start), 1
+    sliding = known.sliding
+    for part in _ASIDE:
+        stuck = driven & (np.abs(sliding[problem.entries]).max(axis=0) <= _STUCK)
+        if not stuck.any():
+            break
+        aside = model.solve(before, np.where(driven, (1.0 + part) * start, start))
+        solves += 1
+        if aside.converged and np.isfinite(aside.jacobian).all():
+            sliding = np.where(stuck, aside.jacobian, sliding)
+    return known._replace(sliding=sliding), solves
 
 
 def _within_limits(problem: Problem, attempt: Attempt) -> Attempt:
