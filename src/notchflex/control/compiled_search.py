@@ -2,8 +2,10 @@
 
 A solved load tells by one linear step how its equilibrium changes with the drives. So Newton's
 method need not solve a load for every drive that is tried: the drives and the equilibrium are
-corrected together, with the friction history of the same state before, until the balance and the
-target are met at once. A correction costs as much as one iteration of a solve.
+corrected together, with the friction history of the same state before, until balance and target
+are nearly met. A correction costs as much as a few iterations of a solve. Then the load is solved
+anew, from the state before: other states may be in balance under it, and this is the one that the
+robot comes to.
 """
 
 from __future__ import annotations
@@ -16,7 +18,6 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from notchflex._jax import array_module, jax, jnp
-from notchflex._pytree import choose
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import report_quantities
 from notchflex.loads.command import Command
@@ -58,6 +59,9 @@ _SMALL_LEAP = 1e-3
 # Corrections go on while each leaves this part of the error at most, or the target is this multiple
 # of its tolerance away.
 _LEAST_FALL, _NEAR = 0.5, 100.0
+# The next correction leaves about the square of the error, over the size of what the drives move:
+# it meets the target where that is this part of the tolerance.
+_CLOSE = 0.1
 # A correction of the drives by less than this part of them is none.
 _NO_CHANGE = 1e-11
 
@@ -148,6 +152,7 @@ class _At(NamedTuple):
         next_point: Unknowns and base tensions after the correction.
         stuck: Whether a tendon sticks that must move.
         beyond: Drives to solve next, beyond the dead bands of tendons that stick, (t,).
+        close: Whether one more correction meets the target.
         falls: Whether the last correction has brought it nearer.
         met: Whether balance and target are met.
         corrected: How many corrections were made.
@@ -164,6 +169,7 @@ class _At(NamedTuple):
     next_point: Iterate
     stuck: Bool[Array, ""]
     beyond: Array
+    close: Bool[Array, ""]
     falls: Bool[Array, ""]
     met: Bool[Array, ""]
     corrected: Int[Array, ""]
@@ -338,7 +344,7 @@ class _Search:
         values = jnp.zeros(len(task.goal))
         at = _At(
             drive, self.last.point, self.last, values, slopes, none, zero, none, self.last.point,
-            no, drive, no, no, count,
+            no, drive, no, no, no, count,
         )  # fmt: skip
         last = self.last
         result = LoadStepResult(last, zero, count, jnp.array(True), zero, count, last, zero)
@@ -364,7 +370,7 @@ class _Search:
         allowed = jnp.where(result.converged & whole & ~here.stuck, task.corrections, 0.0)
 
         def proceed(at: _At) -> Bool[Array, ""]:
-            return ~at.met & (at.corrected < allowed) & at.falls
+            return ~at.met & ~at.close & (at.corrected < allowed) & at.falls
 
         def correct(at: _At) -> _At:
             drive, point = _within(task, at.drive + at.change), at.next_point
@@ -375,9 +381,11 @@ class _Search:
             return new._replace(falls=new.error <= enough)
 
         last = jax.lax.while_loop(proceed, correct, here)
-        exact = here._replace(state=result.solved)
-        at = choose(last.met & (last.corrected > 0), last, exact)
-        return _Round(here.beyond, at, result, state.solved + 1)
+        # What counts is the load solved from the state before, as a robot is pulled.
+        corrected = _within(task, last.drive + last.change)
+        onward = jnp.where((last.corrected > 0) & last.falls, corrected, here.beyond)
+        at = here._replace(state=result.solved, beyond=onward)
+        return _Round(onward, at, result, state.solved + 1)
 
     def _step(self, miss: Array, slopes: Array, drive: Array) -> Array:
         """Step of the drives to the target, within their limits."""
@@ -458,6 +466,7 @@ class _Search:
             lambda value, by: value + jnp.tensordot(by_change, by, 1), point, moves
         )
         error = jnp.linalg.norm(miss)
+        size = jnp.linalg.norm(weighted) * _scale(task, drive)
         settled = jnp.max(jnp.abs(change)) <= SMALL_RELAXATION * _scale(task, drive)
         met = (error <= task.tolerance) & (residual <= _SOLVED * self.settings.tolerance)
         return _At(
@@ -473,6 +482,7 @@ class _Search:
             stuck=jnp.any(stuck & (change != 0.0)),
             beyond=self._beyond(state, drive, change, stuck),
             met=met & (settled | (task.redundant == 0.0)),
+            close=error**2 <= _CLOSE * task.tolerance * size,
             falls=jnp.isfinite(error),
             corrected=corrected,
         )

@@ -20,8 +20,8 @@ from notchflex.errors import Failure
 _FIRST, _FACTOR, _GOOD_GAIN, _MOST_DAMPING = 1e-3, 8.0, 0.5, 1e12
 # The part of the promised improvement that a step must bring.
 _LEAST_GAIN = 1e-3
-# Tendons whose slopes (mm, N or rad per N or mm) are below this stick. Beside their drives, by these
-# parts of them, they slide.
+# Tendons whose slopes (mm, N or rad per N or mm) are below this stick. They slide at drives that
+# differ by these parts.
 _STUCK = 1e-9
 _ASIDE = (1e-6, -1e-6)
 # Loads that the program may solve for a target.
