@@ -86,7 +86,7 @@ def draw_tips(goals: np.ndarray, tips: dict[str, tuple[np.ndarray, str]], name: 
         right.axvline(119.5, color=GREY, lw=0.8, ls="--")
         low, high = right.get_ylim()
         right.text(123, low * (high / low) ** 0.03, "back", color=GREY)
-        figure.legend(loc="outside lower center", ncols=4)
+        figure.legend(loc="outside lower center", ncols=5)
         save(figure, IMAGES / f"{name}.svg")
 
 

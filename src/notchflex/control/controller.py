@@ -203,9 +203,10 @@ class Controller:
         left = problem.search.solves - found.solves
         if found.failure is not None and left > 0:
             fewer = problem._replace(search=replace(problem.search, solves=left))
-            alone = bool(np.count_nonzero(self._command) < 2)
-            begin = self._before, self._command
-            other = find(fewer, *begin, goal, self._known, over_bands=alone)
+            # From the present drives dead bands are left out; elsewhere they have been crossed.
+            stays = found.drive is self._command and np.count_nonzero(self._command) < 2
+            there = found.drive, goal, found.response
+            other = find(fewer, self._before, *there, over_bands=stays)
             found = other._replace(solves=found.solves + other.solves)
         failure, good = found.failure, found.response.converged and np.isfinite(found.error)
         code = failure.name if failure else ""

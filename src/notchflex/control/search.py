@@ -92,8 +92,8 @@ def meet(
         known: Values and slopes there, where they are known.
 
     Returns:
-        What was found; where it does not meet the target within the limits, `failure` says that the
-        search stopped.
+        What was found, or the present drives where that is no nearer; where the target is not met
+        within the limits, `failure` says that the search stopped.
     """
     model, search = problem.model, problem.search
     rows = np.flatnonzero(goal == goal)
@@ -111,9 +111,12 @@ def meet(
         entries, wanted, weights, problem.low, problem.high, problem.driven,
         search.tolerance, problem.unit, min(_ROUNDS, search.solves),
     )  # fmt: skip
-    response, drive, error, met, more = model.search(before, start, known, aim)
+    response, drive, nearest, met, more = model.search(before, start, known, aim)
+    solves += more
+    if not met and not (response.converged and nearest < error):
+        return Attempt(start, known, error, 0.0, solves, Failure.SEARCH_STOPPED)
     failure = None if met else Failure.SEARCH_STOPPED
-    return _within_limits(problem, Attempt(drive, response, error, 0.0, solves + more, failure))
+    return _within_limits(problem, Attempt(drive, response, nearest, 0.0, solves, failure))
 
 
 def _present(problem: Problem, before: np.ndarray, start: np.ndarray) -> tuple[Response, int]:
