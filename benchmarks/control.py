@@ -15,9 +15,9 @@ import time
 import numpy as np
 
 import notchflex as nf
-from notchflex.control.branches import approach_target
-from notchflex.control.drive_model import DriveModel
 from notchflex.control.inverse import make_problem, present_drives
+from notchflex.control.program.drive_model import DriveModel
+from notchflex.control.search.branches import approach_target
 from notchflex.control.targets import make_targets
 from notchflex.loads.load_path import load_path
 

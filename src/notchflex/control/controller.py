@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import Response
 from notchflex.control.inverse import make_problem, present_drives
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
-from notchflex.control.problem import TargetSearch
-from notchflex.control.search import find, meet
+from notchflex.control.program.response import Response
+from notchflex.control.search.find import find, meet
+from notchflex.control.search.problem import TargetSearch
 from notchflex.control.targets import DIRECTION, Targets, target_shapes
 from notchflex.errors import Failure, InputError
 from notchflex.loads import Load
@@ -204,7 +204,8 @@ class Controller:
         if found.failure is not None and left > 0:
             fewer = problem._replace(search=replace(problem.search, solves=left))
             # From the present drives dead bands are left out; elsewhere they have been crossed.
-            stays = found.drive is self._command and np.count_nonzero(self._command) < 2
+            alone = bool(np.count_nonzero(self._command) < 2)
+            stays = found.drive is self._command and alone
             there = found.drive, goal, found.response
             other = find(fewer, self._before, *there, over_bands=stays)
             found = other._replace(solves=found.solves + other.solves)

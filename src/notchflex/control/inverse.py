@@ -7,11 +7,11 @@ from typing import Any, get_args
 
 import numpy as np
 
-from notchflex.control.branches import Approach, approach_target
-from notchflex.control.drive_model import DriveModel
 from notchflex.control.following import Following, Reach
 from notchflex.control.limits import Drive, Limits, bounds_of_robot
-from notchflex.control.problem import Attempt, Problem, TargetSearch
+from notchflex.control.program.drive_model import DriveModel
+from notchflex.control.search.branches import Approach, approach_target
+from notchflex.control.search.problem import Attempt, Problem, TargetSearch
 from notchflex.control.targets import Aim, Targets, aim_at, make_targets
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import DriveModel
-from notchflex.control.problem import Problem
+from notchflex.control.program.drive_model import DriveModel
+from notchflex.control.search.problem import Problem
 from notchflex.errors import InputError
 from notchflex.loads import Load
 from notchflex.loads.load_path import load_path

@@ -17,13 +17,22 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import array_module, jax, jnp
+from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import report_quantities
+from notchflex.control.program.drive_step import (
+    FIRST_PART,
+    GROWTH,
+    NO_SLOPE,
+    SLACK,
+    dead_band,
+    drive_step,
+)
+from notchflex.control.program.task import SearchLayouts, Task
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
-from notchflex.solver.block_elimination import Iterate, gauss_jordan, linear_step
+from notchflex.solver.block_elimination import Iterate, linear_step
 from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
 from notchflex.solver.derived.quantities import believable
 from notchflex.solver.derived.solved_state import SolvedState
@@ -31,29 +40,14 @@ from notchflex.solver.element import Memory
 from notchflex.solver.friction_predictor import limit_slack
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
-from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
-from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.programs.pytree_layout import lane_sizes
 from notchflex.solver.residual import Evaluation, evaluate
 
-LEAST_DRIVES = 1e-10
-"""Where drives are redundant the smallest meet the target. This weight decides among those that
-meet it equally well, and is too small to act against the target."""
-GROWTH, FIRST_PART = 1.0, 0.05
-"""A step may change a drive by so many times the largest one, or the first by a part of what closes
-a notch."""
-SMALL_RELAXATION = 1e-3
-"""Redundant drives are as small as they get where a step would change them by this part."""
-
-SLACK = 1e-10
-"""Drives within this part of what about closes a notch of their limit are at it."""
-
+# Redundant drives are as small as they get where a step would change them by this part.
+_SMALL_RELAXATION = 1e-3
 # A corrected state is solved where its residual is below this multiple of the tolerance.
 _SOLVED = 100.0
-# What a step weighs beside the error of the target, as a part of the slopes, for a target as far as
-# the drives reach.
-_DAMPING = 0.01
-# A tendon sticks where its slopes, squared, are this part of those with which it last slid,
-_STUCK = 1e-12
+# A tendon sticks where its slopes, squared, are `NO_SLOPE` of those with which it last slid,
 # and stays where it is if it must slide by less than this part of its dead band.
 _SMALL_LEAP = 1e-3
 # Corrections go on while each leaves this part of the error at most, or the target is this multiple
@@ -64,77 +58,6 @@ _LEAST_FALL, _NEAR = 0.5, 100.0
 _CLOSE = 0.1
 # A correction of the drives by less than this part of them is none.
 _NO_CHANGE = 1e-11
-
-
-class Task(NamedTuple):
-    """What the program is to do; n numbers of a response, t tendons.
-
-    Attributes:
-        goal: What the numbers are to become, (n,).
-        weights: What an error of each counts, 0 of one that is free, (n,).
-        miss: Weighted differences from the target at the present drives, (n,).
-        slopes: Their slopes there, of a tendon that sticks as it last slid; zero where they are not
-            known, (n, t).
-        present: Drives to start from, (t,).
-        low: Lowest drives, (t,).
-        high: Highest drives, (t,).
-        driven: 1 where a tendon is driven, 0 where it is held, (t,).
-        turn: Rotation from the base to the world, (3, 3).
-        tolerance: Weighted error at which the target is met.
-        unit: Drive that about closes a notch, N or mm.
-        rounds: How many loads may be solved.
-        corrections: How many times the drives may be corrected after each.
-        redundant: 1 where drives are made as small as the target allows.
-    """
-
-    goal: Float[Array, " n"]
-    weights: Float[Array, " n"]
-    miss: Float[Array, " n"]
-    slopes: Float[Array, "n t"]
-    present: Float[Array, " t"]
-    low: Float[Array, " t"]
-    high: Float[Array, " t"]
-    driven: Float[Array, " t"]
-    turn: Float[Array, "3 3"]
-    tolerance: Float[Array, ""]
-    unit: Float[Array, ""]
-    rounds: Float[Array, ""]
-    corrections: Float[Array, ""]
-    redundant: Float[Array, ""]
-
-
-def blank_task(numbers: int, tendons: int, turn: np.ndarray) -> Task:
-    """Return the task of solving one load, without drives and without a target.
-
-    Args:
-        numbers: How many numbers a response has.
-        tendons: Number of tendons.
-        turn: Rotation from the base to the world.
-    """
-    none, drives, slopes = np.zeros(numbers), np.zeros(tendons), np.zeros((numbers, tendons))
-    task = Task(*[none] * 3, slopes, *[drives] * 4, turn, *[np.zeros(())] * 5)  # pyright: ignore[reportArgumentType]
-    return task._replace(unit=np.ones(()), rounds=np.ones(()))  # pyright: ignore[reportArgumentType]
-
-
-class SearchLayouts(NamedTuple):
-    """How the program takes chain, load, state and task as vectors, and what it reports.
-
-    Attributes:
-        chain: Structure and layout of the chain.
-        command: Layout of one load.
-        state: Layout of a state.
-        task: Layout of a task.
-        first_contact: Where a packed state has the log ratios of the first contacts of all tendons,
-            and their largest.
-        outputs: Names of the quantities.
-    """
-
-    chain: StaticStructure
-    command: PytreeLayout
-    state: PytreeLayout
-    task: PytreeLayout
-    first_contact: tuple[tuple[int, ...], tuple[int, ...]]
-    outputs: tuple[str, ...]
 
 
 class _At(NamedTuple):
@@ -203,57 +126,6 @@ class _Round(NamedTuple):
     solved: Int[Array, ""]
 
 
-def drive_step(
-    miss: Float[Array, " n"],
-    slopes: Float[Array, "n t"],
-    drive: Float[Array, " t"],
-    low: Float[Array, " t"],
-    high: Float[Array, " t"],
-    driven: Float[Array, " t"],
-    scale: Float[Array, ""],
-) -> Float[Array, " t"]:
-    """Return the step of least squares to a target within limits, that of the smallest drives.
-
-    Drives that the step would carry beyond a limit are set to it, and the others found again.
-
-    Args:
-        miss: Weighted differences from the target.
-        slopes: Their slopes by the drives.
-        drive: The drives, of which the smallest are sought.
-        low: Lowest step.
-        high: Highest step.
-        driven: 1 where a drive may change.
-        scale: Size of the drives.
-    """
-    count = len(drive)
-    slopes = slopes * driven
-    normal = slopes.T @ slopes
-    size = jnp.trace(normal) / jnp.maximum(jnp.sum(driven), 1.0)
-    known = size > 0.0
-    size = jnp.where(known, size, 1.0)
-    small = LEAST_DRIVES * size
-    eye = jnp.eye(count)
-    gradient = slopes.T @ miss + small * drive * driven
-    # Far from the target slopes hold roughly: directions that move little are left for later.
-    part = jnp.linalg.norm(miss) / (jnp.sqrt(size) * scale)
-    several = jnp.sum(driven) > 1.0
-    damping = jnp.where(several, _DAMPING * jnp.minimum(part, 1.0), 0.0) * size
-    hessian = normal + (small + damping) * eye
-    # What moves nothing stays.
-    column = jnp.sum(slopes**2, axis=0)
-    driven = driven * (column > _STUCK * jnp.max(column))
-    free, step = driven, jnp.zeros(count)
-    for _ in range(count):
-        both = free[:, None] * free[None, :]
-        matrix = both * hessian + (1.0 - free) * size * eye
-        right = -free * (gradient + hessian @ ((1.0 - free) * step))
-        step = jnp.where(free > 0.0, gauss_jordan(matrix, right[:, None])[:, 0], step)
-        inside = jnp.clip(step, low, high)
-        free = free * (inside == step)
-        step = inside
-    return jnp.where(known, step * driven, 0.0)
-
-
 @native(5, lambda layouts: lane_sizes(layouts.chain))
 def search_drives(
     chain_vector: Float[Array, " chain"],
@@ -293,29 +165,6 @@ def _within(task: Task, drive: Float[Array, " t"]) -> Float[Array, " t"]:
     near = SLACK * task.unit
     inside = jnp.where(drive <= task.low + near, task.low, jnp.minimum(drive, task.high))
     return jnp.where(task.driven > 0.0, inside, task.present)
-
-
-def dead_band(
-    drive: Float[Array, " t"],
-    ratio: Float[Array, " t"],
-    bound: Float[Array, " t"],
-    by_stroke: Bool[Array, " t"] | bool,
-) -> tuple[Float[Array, " t"], Float[Array, " t"]]:
-    """Return between which drives nothing moves, as the first contact of a tendon sticks.
-
-    Exactly so while the other tendons stay as they are. A stroke always moves something.
-
-    Args:
-        drive: The drives, N or mm.
-        ratio: Log ratios of the first contacts.
-        bound: Their largest.
-        by_stroke: Which drives are strokes.
-    """
-    xp = array_module(drive)
-    still = by_stroke | (xp.abs(ratio) > bound)
-    low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
-    low = xp.where(still, drive, xp.minimum(low, drive))
-    return low, xp.where(still, drive, xp.maximum(high, drive))
 
 
 class _Search:
@@ -458,7 +307,7 @@ class _Search:
         miss = task.weights * (values - task.goal)
         slopes = changes[1:]
         own, last = ((task.weights * one) ** 2 for one in (slopes, task.slopes.T))
-        stuck = jnp.sum(own, axis=1) <= _STUCK * jnp.sum(last, axis=1)
+        stuck = jnp.sum(own, axis=1) <= NO_SLOPE * jnp.sum(last, axis=1)
         weighted = jnp.where(stuck[:, None], task.slopes.T, task.weights * slopes)
         change = self._step(miss + task.weights * changes[0], weighted.T, drive)
         by_change = jnp.concatenate([jnp.ones(1), change])
@@ -467,7 +316,7 @@ class _Search:
         )
         error = jnp.linalg.norm(miss)
         size = jnp.linalg.norm(weighted) * _scale(task, drive)
-        settled = jnp.max(jnp.abs(change)) <= SMALL_RELAXATION * _scale(task, drive)
+        settled = jnp.max(jnp.abs(change)) <= _SMALL_RELAXATION * _scale(task, drive)
         met = (error <= task.tolerance) & (residual <= _SOLVED * self.settings.tolerance)
         return _At(
             drive=drive,

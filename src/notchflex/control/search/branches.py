@@ -12,10 +12,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import Response
-from notchflex.control.problem import Attempt, Problem
-from notchflex.control.search import find, meet
-from notchflex.control.walk import limit_rows
+from notchflex.control.program.response import Response
+from notchflex.control.search.find import find, meet
+from notchflex.control.search.problem import Attempt, Problem
+from notchflex.control.search.search_point import limit_rows
 from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]

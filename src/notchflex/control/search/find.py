@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import DriveAim, Response
-from notchflex.control.problem import Attempt, Problem, size_of
-from notchflex.control.walk import KEPT, Walk, limit_rows
+from notchflex.control.program.response import DriveAim, Response
+from notchflex.control.search.damped_search import DampedSearch
+from notchflex.control.search.problem import Attempt, Problem, size_of
+from notchflex.control.search.search_point import KEPT, limit_rows
 from notchflex.errors import Failure
 
 # Damping: where a step fails, its factor after one that did, the gain above which it is lifted, and
@@ -57,22 +58,22 @@ def find(
     """
     rows = np.flatnonzero(~np.isnan(goal))
     aim = problem.entries[rows], problem.weights[rows], goal[rows]
-    walk = Walk(problem, before, *aim, over_bands)
-    walk.begin(start, known)
+    search = DampedSearch(problem, before, *aim, over_bands)
+    search.begin(start, known)
     damping, budget = 0.0, problem.search.solves
-    while not walk.done and walk.solves < budget:
-        step = walk.step(damping)
-        if np.abs(step).max() <= _NO_STEP * walk.scale or damping > _MOST_DAMPING:
-            walk.settled = True
+    while not search.done and search.solves < budget:
+        step = search.step(damping)
+        if np.abs(step).max() <= _NO_STEP * search.scale or damping > _MOST_DAMPING:
+            search.settled = True
             break
-        gain = walk.go(step, _LEAST_GAIN)
+        gain = search.go(step, _LEAST_GAIN)
         if gain >= _GOOD_GAIN:
             damping = 0.0 if damping <= _FIRST else damping / _FACTOR
         elif gain < _LEAST_GAIN:
             damping = max(_FIRST, damping * _FACTOR)
-    if walk.done and len(walk.free) > len(rows):
-        _relax(walk, budget)
-    return walk.result()
+    if search.done and len(search.free) > len(rows):
+        _relax(search, budget)
+    return search.result()
 
 
 def meet(
@@ -146,18 +147,18 @@ def _within_limits(problem: Problem, attempt: Attempt) -> Attempt:
     return attempt._replace(excess=excess, failure=failure)
 
 
-def _relax(walk: Walk, budget: int) -> None:
+def _relax(search: DampedSearch, budget: int) -> None:
     """Go on to the smallest drives that meet the target."""
     for _ in range(_MOST_RELAXATIONS):
-        step = walk.step(0.0)
-        if walk.solves >= budget or np.abs(step).max() <= _SMALL_RELAXATION * walk.scale:
+        step = search.step(0.0)
+        if search.solves >= budget or np.abs(step).max() <= _SMALL_RELAXATION * search.scale:
             return
-        kept, effort = walk.point, size_of(walk.point.drive)
-        walk.jump(step)
+        kept, effort = search.point, size_of(search.point.drive)
+        search.jump(step)
         for _ in range(_CORRECTIONS):
-            if walk.done or walk.solves >= budget:
+            if search.done or search.solves >= budget:
                 break
-            walk.go(walk.step(0.0), _LEAST_GAIN)
-        if not walk.done or size_of(walk.point.drive) > (1.0 - _SMALL_GAIN) * effort:
-            walk.point = kept
+            search.go(search.step(0.0), _LEAST_GAIN)
+        if not search.done or size_of(search.point.drive) > (1.0 - _SMALL_GAIN) * effort:
+            search.point = kept
             return
