@@ -11,11 +11,11 @@ robot comes to.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
@@ -28,6 +28,7 @@ from notchflex.control.program.drive_step import (
     dead_band,
     drive_step,
 )
+from notchflex.control.program.search_state import LinearResponse, SearchState, SolvedRound
 from notchflex.control.program.task import SearchLayouts, Task
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
@@ -58,72 +59,6 @@ _LEAST_FALL, _NEAR = 0.5, 100.0
 _CLOSE = 0.1
 # A correction of the drives by less than this part of them is none.
 _NO_CHANGE = 1e-11
-
-
-class _At(NamedTuple):
-    """Where the corrections of a solved load are.
-
-    Attributes:
-        drive: The drives, (t,).
-        point: Unknowns and base tensions.
-        state: The state there, its history included.
-        values: The numbers of the response, (n,).
-        slopes: Their slopes by the drives, (t, n).
-        error: Weighted distance from the target.
-        sticks: 1 where a tendon sticks, (t,).
-        change: Correction of the drives from here, (t,).
-        next_point: Unknowns and base tensions after the correction.
-        stuck: Whether a tendon sticks that must move.
-        beyond: Drives to solve next, beyond the dead bands of tendons that stick, (t,).
-        close: Whether one more correction meets the target.
-        falls: Whether the last correction has brought it nearer.
-        met: Whether balance and target are met.
-        corrected: How many corrections were made.
-    """
-
-    drive: Array
-    point: Iterate
-    state: SolverState
-    values: Array
-    slopes: Array
-    sticks: Array
-    error: Array
-    change: Array
-    next_point: Iterate
-    stuck: Bool[Array, ""]
-    beyond: Array
-    close: Bool[Array, ""]
-    falls: Bool[Array, ""]
-    met: Bool[Array, ""]
-    corrected: Int[Array, ""]
-
-
-class _Moves(NamedTuple):
-    """Linear response of a point.
-
-    Attributes:
-        residual: Largest residual there.
-        values: The numbers of the response there, (n,).
-        state: The state there.
-        points: Changes of the point by a step to the balance, and by a unit of every drive, as
-            leading axis, 1 + t.
-        changes: The same of the numbers, (1 + t, n).
-    """
-
-    residual: Array
-    values: Array
-    state: SolverState
-    points: Iterate
-    changes: Array
-
-
-class _Round(NamedTuple):
-    """State of the loop over solved loads."""
-
-    drive: Array
-    at: _At
-    result: LoadStepResult
-    solved: Int[Array, ""]
 
 
 @native(5, lambda layouts: lane_sizes(layouts.chain))
@@ -183,7 +118,7 @@ class _Search:
         self.chain, self.command, self.last = chain, command, last
         self.task, self.settings, self.layouts = task, settings, layouts
 
-    def begin(self) -> _Round:
+    def begin(self) -> SolvedRound:
         """Return the loop before anything is solved, with the drives that the slopes predict."""
         task, start = self.task, self.task.present
         change = self._step(task.miss, task.slopes, start)
@@ -191,15 +126,15 @@ class _Search:
         zero, none, count = jnp.zeros(()), jnp.zeros(len(start)), jnp.zeros((), int)
         slopes, no = jnp.zeros(task.slopes.T.shape), jnp.array(False)
         values = jnp.zeros(len(task.goal))
-        at = _At(
+        at = SearchState(
             drive, self.last.point, self.last, values, slopes, none, zero, none, self.last.point,
             no, drive, no, no, no, count,
         )  # fmt: skip
         last = self.last
         result = LoadStepResult(last, zero, count, jnp.array(True), zero, count, last, zero)
-        return _Round(drive, at, result, count)
+        return SolvedRound(drive, at, result, count)
 
-    def goes_on(self, state: _Round) -> Bool[Array, ""]:
+    def goes_on(self, state: SolvedRound) -> Bool[Array, ""]:
         """Return whether another load is solved."""
         task, at = self.task, state.at
         more = (state.solved < task.rounds) & state.result.converged & ~at.met
@@ -207,7 +142,7 @@ class _Search:
         moves = jnp.max(jnp.abs(at.beyond - at.drive)) > size
         return (state.solved == 0) | (more & moves)
 
-    def solve(self, state: _Round) -> _Round:
+    def solve(self, state: SolvedRound) -> SolvedRound:
         """Solve a load, and correct drives and equilibrium together from there."""
         towards = self.command._replace(target=state.drive)
         result = solve_load_step(self.chain, towards, self.last, self.settings)
@@ -218,10 +153,10 @@ class _Search:
         whole = (result.parts == 1) if self.chain.rods.section.ends is None else jnp.array(False)
         allowed = jnp.where(result.converged & whole & ~here.stuck, task.corrections, 0.0)
 
-        def proceed(at: _At) -> Bool[Array, ""]:
+        def proceed(at: SearchState) -> Bool[Array, ""]:
             return ~at.met & ~at.close & (at.corrected < allowed) & at.falls
 
-        def correct(at: _At) -> _At:
+        def correct(at: SearchState) -> SearchState:
             drive, point = _within(task, at.drive + at.change), at.next_point
             tension = self.command.either(point.base_tension, drive)
             point = point._replace(base_tension=tension)
@@ -234,7 +169,7 @@ class _Search:
         corrected = _within(task, last.drive + last.change)
         onward = jnp.where((last.corrected > 0) & last.falls, corrected, here.beyond)
         at = here._replace(state=result.solved, beyond=onward)
-        return _Round(onward, at, result, state.solved + 1)
+        return SolvedRound(onward, at, result, state.solved + 1)
 
     def _step(self, miss: Array, slopes: Array, drive: Array) -> Array:
         """Step of the drives to the target, within their limits."""
@@ -275,7 +210,7 @@ class _Search:
         turned = [REGISTERED[name].turned(found[name], self.task.turn) for name in outputs]
         return jnp.concatenate([jnp.ravel(one) for one in turned]), (at, state)
 
-    def _moves(self, memory: Memory, drive: Array, point: Iterate) -> _Moves:
+    def _moves(self, memory: Memory, drive: Array, point: Iterate) -> LinearResponse:
         """Linear response of a point to a step to the balance, and to a unit of every drive."""
         chain, command, (unknowns, tension) = self.chain, self.command, point
         values, by_point, (at, state) = jax.linearize(
@@ -298,9 +233,11 @@ class _Search:
 
         units = jnp.concatenate([jnp.zeros((1, len(drive))), jnp.eye(len(drive))])
         moves, changes = jax.lax.scan(column, jnp.zeros(()), units)[1]
-        return _Moves(residual, values, state, moves, changes)
+        return LinearResponse(residual, values, state, moves, changes)
 
-    def _evaluate(self, memory: Memory, drive: Array, point: Iterate, corrected: Array) -> _At:
+    def _evaluate(
+        self, memory: Memory, drive: Array, point: Iterate, corrected: Array
+    ) -> SearchState:
         """Evaluate a point, and find the way on."""
         task = self.task
         residual, values, state, moves, changes = self._moves(memory, drive, point)
@@ -318,7 +255,7 @@ class _Search:
         size = jnp.linalg.norm(weighted) * _scale(task, drive)
         settled = jnp.max(jnp.abs(change)) <= _SMALL_RELAXATION * _scale(task, drive)
         met = (error <= task.tolerance) & (residual <= _SOLVED * self.settings.tolerance)
-        return _At(
+        return SearchState(
             drive=drive,
             point=point,
             state=state,
