@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.inverse import make_problem, present_drives
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
+from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
 from notchflex.control.program.response import Response
 from notchflex.control.search.find import find, meet
 from notchflex.control.search.problem import TargetSearch
@@ -101,8 +101,9 @@ class Controller:
         self._shapes = {name: shapes[name] for name in names}
         some = Targets({name: np.zeros((1, *shape)) for name, shape in self._shapes.items()})
         search = search or TargetSearch(tolerance=1e-5, solves=10)
-        self._problem, aims = make_problem(robot, some, state, load, drive, limits, weights, search)
-        self._rate = np.inf if limits is None or limits.rate is None else limits.rate
+        options = ProblemOptions(state, load, drive, limits, weights, search)
+        self._problem, aims = make_problem(robot, some, options)
+        self._rate = options.rate
         self._feedback, self.observer = feedback, observer
         self._deviation = np.zeros(aims.goals.shape[1])
         self._before = self._problem.model.first
