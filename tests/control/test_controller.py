@@ -23,7 +23,7 @@ def test_a_loop_is_followed_within_the_budget():
     for tip in forward.tip_position:
         commands.append(float(controller.step(tip)[0]))
         assert controller.status.reached
-        assert controller.status.solves <= 10 + 4
+        assert controller.status.solves <= 16 + 4
     np.testing.assert_allclose(path(WRIST, commands).tip_position, forward.tip_position, atol=1e-4)
 
 

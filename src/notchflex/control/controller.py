@@ -100,7 +100,7 @@ class Controller:
             raise InputError.OUT_OF_RANGE(f"feedback is from 0 to 1; got {feedback:g}")
         self._shapes = {name: shapes[name] for name in names}
         some = Targets({name: np.zeros((1, *shape)) for name, shape in self._shapes.items()})
-        search = search or TargetSearch(tolerance=1e-5, solves=10)
+        search = search or TargetSearch(tolerance=1e-5, solves=16)
         options = ProblemOptions(state, load, drive, limits, weights, search)
         self._problem, aims = make_problem(robot, some, options)
         self._rate = options.rate

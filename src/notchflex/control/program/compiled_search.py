@@ -49,7 +49,7 @@ _SMALL_RELAXATION = 1e-3
 # A corrected state is solved where its residual is below this multiple of the tolerance.
 _SOLVED = 100.0
 # A tendon sticks where its slopes, squared, are `NO_SLOPE` of those with which it last slid,
-# and stays where it is if it must slide by less than this part of its dead band.
+# and, beside others, stays where it is if it must slide by less than this part of its dead band.
 _SMALL_LEAP = 1e-3
 # Corrections go on while each leaves this part of the error at most, or the target is this multiple
 # of its tolerance away.
@@ -191,7 +191,8 @@ class _Search:
         up, down = jnp.maximum(high - drive, 0.0), jnp.minimum(low - drive, 0.0)
         leap = jnp.where(change > 0.0, up, down)
         leap = jnp.where(stuck & (change != 0.0), leap, 0.0)
-        small = jnp.abs(change) <= _SMALL_LEAP * jnp.abs(leap)
+        several = jnp.sum(self.task.driven) > 1.0
+        small = several & (jnp.abs(change) <= _SMALL_LEAP * jnp.abs(leap))
         return _within(self.task, drive + jnp.where(small, 0.0, change + leap))
 
     def _values(self, memory: Memory, point: Iterate) -> tuple[Array, tuple[Evaluation, Any]]:
