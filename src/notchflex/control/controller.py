@@ -204,11 +204,14 @@ class Controller:
         left = problem.search.solves - found.solves
         if found.failure is not None and left > 0:
             fewer = problem._replace(search=replace(problem.search, solves=left))
-            # From the present drives dead bands are left out; elsewhere they have been crossed.
+            # One tendon goes on from where it came nearest. Several, of which one may have turned
+            # round, begin anew; so does one whose dead band is still to be crossed.
+            begin, known = found.drive, found.response
+            if problem.driven.sum() > 1:
+                begin, known = self._command, self._known
             alone = bool(np.count_nonzero(self._command) < 2)
-            stays = found.drive is self._command and alone
-            there = found.drive, goal, found.response
-            other = find(fewer, self._before, *there, over_bands=stays)
+            stays = begin is self._command and alone
+            other = find(fewer, self._before, begin, goal, known, over_bands=stays)
             found = other._replace(solves=found.solves + other.solves)
         failure, good = found.failure, found.response.converged and np.isfinite(found.error)
         code = failure.name if failure else ""
