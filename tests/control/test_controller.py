@@ -23,7 +23,7 @@ def test_a_loop_is_followed_within_the_budget():
     for tip in forward.tip_position:
         commands.append(float(controller.step(tip)[0]))
         assert controller.status.reached
-        assert controller.status.solves <= 10 + 4
+        assert controller.status.solves <= 16 + 4
     np.testing.assert_allclose(path(WRIST, commands).tip_position, forward.tip_position, atol=1e-4)
 
 
@@ -103,3 +103,33 @@ def test_out_of_reach_is_flagged_and_the_nearest_commanded():
     assert np.isfinite(tension).all()
     assert not controller.status.reached
     assert controller.status.code
+
+
+@pytest.mark.parametrize(
+    ("tension", "stroke"),
+    [
+        ("x", [1.0]),
+        (None, None),
+        (object(), [1.0]),
+        ([np.nan], [1.0]),
+        ([np.inf], [1.0]),
+        ([1.0], [np.inf]),
+        ([1.0, 2.0], [1.0, 2.0]),
+        ([1.0], [1.0, 2.0]),
+        (1.0, 1.0),
+        ([[1.0]], [[1.0]]),
+        ([], []),
+        (1 << 2000, [1.0]),
+    ],
+    ids=range(12),
+)
+def test_an_observer_ignores_what_it_cannot_use(tension, stroke):
+    observer = nf.Observer(WRIST, (0.8, 1.0))
+    kept, state = observer.observe([0.5], [0.62])
+    friction = observer.friction
+    again, same = observer.observe(tension, stroke)
+    assert not observer.accepted
+    assert (again, observer.friction) == (kept, friction)
+    np.testing.assert_array_equal(same, state)
+    observer.observe([0.6], [np.nan])  # a stroke that was not measured
+    assert observer.accepted

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
-from notchflex.control.drive_model import DriveModel
+from notchflex.control.program.drive_model import DriveModel
 from notchflex.loads.load_path import load_path
 
 OUTPUTS = ("tip_position", "tip_rotation", "total_angle")

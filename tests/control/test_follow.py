@@ -45,6 +45,17 @@ def test_the_tip_of_two_axes_is_met_with_drives_that_are_no_larger():
 
 
 @pytest.mark.nightly
+def test_what_counts_as_met_is_met_by_a_simulation():
+    """Other states are in balance under the same tensions; a pulled robot comes to one of them."""
+    t = np.linspace(0.0, 2.0 * np.pi, 120)[50:90]
+    goals = 2.0 * np.stack([np.cos(t), np.sin(t)], axis=1)
+    robot = TWO_AXES.with_value("friction.coefficient", 0.2)
+    found = nf.follow(robot, {"tip_position": [[x, y, None] for x, y in goals.tolist()]})
+    assert found.reached.all()
+    np.testing.assert_allclose(found.tip_position[:, :2], goals, atol=1e-6)
+
+
+@pytest.mark.nightly
 def test_strokes_meet_an_angle():
     found = nf.reach(WRIST, {"total_angle": 1.2}, drive="stroke", approach="direct")
     assert found.reached

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import Response
-from notchflex.control.inverse import make_problem, present_drives
 from notchflex.control.limits import Drive, Limits
 from notchflex.control.observer import Observer
-from notchflex.control.problem import TargetSearch
-from notchflex.control.search import find
+from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
+from notchflex.control.program.response import Response
+from notchflex.control.search.find import find, meet
+from notchflex.control.search.problem import TargetSearch
 from notchflex.control.targets import DIRECTION, Targets, target_shapes
 from notchflex.errors import Failure, InputError
 from notchflex.loads import Load
@@ -99,9 +100,10 @@ class Controller:
             raise InputError.OUT_OF_RANGE(f"feedback is from 0 to 1; got {feedback:g}")
         self._shapes = {name: shapes[name] for name in names}
         some = Targets({name: np.zeros((1, *shape)) for name, shape in self._shapes.items()})
-        search = search or TargetSearch(tolerance=1e-5, solves=10)
-        self._problem, aims = make_problem(robot, some, state, load, drive, limits, weights, search)
-        self._rate = np.inf if limits is None or limits.rate is None else limits.rate
+        search = search or TargetSearch(tolerance=1e-5, solves=16)
+        options = ProblemOptions(state, load, drive, limits, weights, search)
+        self._problem, aims = make_problem(robot, some, options)
+        self._rate = options.rate
         self._feedback, self.observer = feedback, observer
         self._deviation = np.zeros(aims.goals.shape[1])
         self._before = self._problem.model.first
@@ -184,6 +186,8 @@ class Controller:
         """Go on from the state that measured tension and stroke tell."""
         assert self.observer is not None
         model, state = self.observer.observe(tension, stroke)
+        if not self.observer.accepted:
+            raise ValueError
         if state.shape == self._before.shape:
             self._problem = self._problem._replace(
                 model=self.observer.seen_by(model, self._problem)
@@ -196,8 +200,19 @@ class Controller:
             low = np.maximum(problem.low, self._command - self._rate)
             high = np.minimum(problem.high, self._command + self._rate)
             problem = problem._replace(low=np.minimum(low, high), high=high)
-        alone = bool(np.count_nonzero(self._command) < 2)
-        found = find(problem, self._before, self._command, goal, self._known, over_bands=alone)
+        found = meet(problem, self._before, self._command, goal, self._known)
+        left = problem.search.solves - found.solves
+        if found.failure is not None and left > 0:
+            fewer = problem._replace(search=replace(problem.search, solves=left))
+            # One tendon goes on from where it came nearest. Several, of which one may have turned
+            # round, begin anew; so does one whose dead band is still to be crossed.
+            begin, known = found.drive, found.response
+            if problem.driven.sum() > 1:
+                begin, known = self._command, self._known
+            alone = bool(np.count_nonzero(self._command) < 2)
+            stays = begin is self._command and alone
+            other = find(fewer, self._before, begin, goal, known, over_bands=stays)
+            found = other._replace(solves=found.solves + other.solves)
         failure, good = found.failure, found.response.converged and np.isfinite(found.error)
         code = failure.name if failure else ""
         if good:

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex._summary import Displayed, Summary, short, vector
 from notchflex.analysis.solve import simulate
-from notchflex.control.problem import Attempt
+from notchflex.control.search.problem import Attempt
 from notchflex.control.targets import Targets
 from notchflex.errors import Failure
 from notchflex.loads import Load, LoadPath

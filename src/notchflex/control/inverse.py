@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, get_args
 
 import numpy as np
 
-from notchflex.control.branches import Approach, approach_target
-from notchflex.control.drive_model import DriveModel
 from notchflex.control.following import Following, Reach
-from notchflex.control.limits import Drive, Limits, bounds_of_robot
-from notchflex.control.problem import Attempt, Problem, TargetSearch
-from notchflex.control.targets import Aim, Targets, aim_at, make_targets
+from notchflex.control.limits import Drive, Limits
+from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
+from notchflex.control.search.branches import Approach, approach_target
+from notchflex.control.search.problem import Attempt, Problem, TargetSearch
+from notchflex.control.targets import Targets, make_targets
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
-from notchflex.loads.load_path import load_path
 from notchflex.loads.validation import check_is_robot, short_repr
-from notchflex.results.state import SavedState, State, check_robot
+from notchflex.results.state import SavedState, State
 from notchflex.robot import Robot
-
-# Drives are sought up to so many times what about closes a notch, where no limit is given.
-_MOST = {"tension": 4.0, "stroke": 2.0}
-# A program is compiled for every set of quantities; those of a group cost little beside each other.
-_ASKED_TOGETHER = (
-    ("tip_position", "tip_rotation", "total_angle"),
-    ("tension", "stroke", "peak_strain", "gap"),
-)
 
 
 def reach(
@@ -80,8 +71,8 @@ def reach(
     targets = make_targets(target, check_is_robot(robot), several=False)
     if len(targets) > 1:
         raise InputError.WRONG_SHAPE("reach takes one target; give several to follow")
-    settings = (state, load, drive, limits, approach, weights, search)
-    return _follow(robot, targets, *settings)[0]
+    options = ProblemOptions(state, load, drive, limits, weights, search)
+    return _follow(robot, targets, options, approach)[0]
 
 
 def follow(
@@ -128,27 +119,19 @@ def follow(
         (True, True)
     """
     checked = make_targets(targets, check_is_robot(robot), several=True)
-    return _follow(robot, checked, state, load, drive, limits, approach, weights, search)
+    options = ProblemOptions(state, load, drive, limits, weights, search)
+    return _follow(robot, checked, options, approach)
 
 
 def _follow(
-    robot: Robot,
-    targets: Targets,
-    state: State | SavedState | None,
-    load: Load | None,
-    drive: Drive,
-    limits: Limits | None,
-    approach: Approach,
-    weights: Mapping[str, float] | None,
-    search: TargetSearch | None,
+    robot: Robot, targets: Targets, options: ProblemOptions, approach: Approach
 ) -> Following:
     if approach not in get_args(Approach):
         raise InputError.UNKNOWN_NAME(
             f"approach is one of {', '.join(get_args(Approach))}; got {short_repr(approach)}"
         )
-    problem, aim = make_problem(robot, targets, state, load, drive, limits, weights, search)
-    model = problem.model
-    rate = np.inf if limits is None or limits.rate is None else limits.rate
+    problem, aim = make_problem(robot, targets, options)
+    model, rate = problem.model, options.rate
     before, known = model.first, None
     present = present_drives(problem, before)
     drives: list[np.ndarray] = []
@@ -170,91 +153,9 @@ def _follow(
             before = known.state
     applied = _load_path(problem, np.array(drives))
     tolerance = problem.search.tolerance
-    return Following(robot, targets, applied, np.array(last), tuple(attempts), state, tolerance)
-
-
-def make_problem(
-    robot: Robot,
-    targets: Targets,
-    state: State | SavedState | None,
-    load: Load | None,
-    drive: Drive,
-    limits: Limits | None,
-    weights: Mapping[str, float] | None,
-    search: TargetSearch | None,
-) -> tuple[Problem, Aim]:
-    """Return what a search needs of robot and limits, and the targets as numbers.
-
-    Raises:
-        InputError: Anything that cannot be used.
-    """
-    if drive not in get_args(Drive):
-        raise InputError.UNKNOWN_NAME(f'drive is "tension" or "stroke"; got {short_repr(drive)}')
-    for value, kind, name in (
-        (load, Load, "load"),
-        (limits, Limits, "limits"),
-        (search, TargetSearch, "search"),
-        (state, State | SavedState, "state"),
-    ):
-        if value is not None and not isinstance(value, kind):
-            raise InputError.WRONG_TYPE(f"{name} cannot be {short_repr(value)}; see its help")
-    if state is not None:
-        check_robot(state, robot)
-    tendons, limits = robot.number_of_tendons, limits or Limits()
-    given = load_path(load or Load(), tendons)
-    held = ~np.isnan(given.tension[0]) | ~np.isnan(given.stroke[0])
-    if held.all():
-        raise InputError.CONFLICT(
-            "the load commands every tendon, so that none is left to be driven; "
-            "leave the tension of those to be driven out"
-        )
-    low, high = limits.bounds(drive, tendons)
-    fixed = np.where(np.isnan(given.stroke[0]), given.tension[0], given.stroke[0])
-    bounds = tuple(bounds_of_robot(limits, drive, tendons, robot.number_of_notches))
-    outputs = [*targets.outputs, *(one.quantity for one in bounds)]
-    model = DriveModel(robot, _driven(given, drive, held), _together(outputs), state)
-    chain = model.prepared.chain
-    unit = float(chain.closing_force)
-    if drive == "stroke":
-        unit = float(np.asarray(chain.rods.length).sum())
-    most = _MOST[drive] * unit
-    low = np.where(held, fixed, np.maximum(low, -most if drive == "stroke" else 0.0))
-    chosen = held | (high <= most)
-    high = np.where(held, fixed, np.maximum(np.minimum(high, most), low))
-    aim = aim_at(targets, model.slices, weights)
-    problem = Problem(
-        model=model,
-        entries=aim.entries,
-        weights=aim.weights,
-        driven=~held,
-        low=low,
-        high=high,
-        chosen=chosen,
-        bounds=bounds,
-        unit=unit,
-        by_tension=drive == "tension",
-        search=search or TargetSearch(),
+    return Following(
+        robot, targets, applied, np.array(last), tuple(attempts), options.state, tolerance
     )
-    return problem, aim
-
-
-def _together(outputs: Sequence[str]) -> tuple[str, ...]:
-    """Quantities that are asked, with those usually asked beside them: fewer programs."""
-    groups = [group for group in _ASKED_TOGETHER if set(group) & set(outputs)]
-    usual = [name for group in groups for name in group]
-    return tuple(dict.fromkeys([*usual, *sorted(set(outputs))]))
-
-
-def present_drives(problem: Problem, state: np.ndarray) -> np.ndarray:
-    """Return the drives of a packed state; of held tendons what they are held at."""
-    return np.where(problem.driven, problem.model.drives(state), problem.low)
-
-
-def _driven(given: LoadPath, drive: Drive, held: np.ndarray) -> LoadPath:
-    """The load with a command for every tendon, of what is driven a zero."""
-    tables = {"tension": given.tension.copy(), "stroke": given.stroke.copy()}
-    tables[drive][0, ~held] = 0.0
-    return LoadPath(tables["tension"], tables["stroke"], given.base_rotation, given.external)
 
 
 def _load_path(problem: Problem, drives: np.ndarray) -> LoadPath:
@@ -266,4 +167,4 @@ def _load_path(problem: Problem, drives: np.ndarray) -> LoadPath:
     return LoadPath(np.maximum(tension, 0.0), stroke, one.base_rotation, external)
 
 
-__all__ = ["follow", "make_problem", "present_drives", "reach"]
+__all__ = ["follow", "reach"]

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import DriveModel
-from notchflex.control.problem import Problem
+from notchflex.control.program.drive_model import DriveModel
+from notchflex.control.search.problem import Problem
 from notchflex.errors import InputError
 from notchflex.loads import Load
 from notchflex.loads.load_path import load_path
@@ -27,6 +27,9 @@ FRICTION = "friction.coefficient"
 
 class Observer:
     """Models of a robot with different friction, pulled as the robot is.
+
+    Attributes:
+        accepted: Whether the last measurement could be used.
 
     Args:
         robot: The robot, at rest.
@@ -83,9 +86,13 @@ class Observer:
         self._noise, self._forgets = noise, 1.0 - 1.0 / max(memory, 1.0)
         self._cost = np.zeros(len(robots))
         self._seen: dict[int, DriveModel] = {}
+        self.accepted = True
 
     def observe(self, tension: Any, stroke: Any) -> tuple[int, Float[np.ndarray, " state"]]:
         """Pull all models by a measured tension, and compare their strokes with the measured one.
+
+        It never raises: a measurement that cannot be used (a wrong type or shape, a number that is
+        not finite) changes nothing, and `accepted` is false.
 
         Args:
             tension: Tension of every tendon, N; a negative one, by noise, counts as 0.
@@ -94,9 +101,24 @@ class Observer:
         Returns:
             Number of the model that fits best, and its state, packed.
         """
-        pulled, drawn = np.maximum(np.asarray(tension, float), 0.0), np.asarray(stroke, float)
-        if not np.isfinite(pulled).all() or pulled.shape != drawn.shape:
-            raise ValueError("tension and stroke are one finite number per tendon")
+        read = self._checked(tension, stroke)
+        self.accepted = read is not None
+        if read is not None:
+            self._compare(*read)
+        best = int(np.argmin(self._cost))
+        return best, self._states[best]
+
+    def _checked(self, tension: Any, stroke: Any) -> tuple[np.ndarray, np.ndarray] | None:
+        """A measurement as arrays; None where it cannot be used."""
+        try:
+            pulled, drawn = np.maximum(np.asarray(tension, float), 0.0), np.asarray(stroke, float)
+        except (ArithmeticError, TypeError, ValueError):
+            return None
+        shape = (self._models[0].robot.number_of_tendons,)
+        right = pulled.shape == drawn.shape == shape and np.isfinite(pulled).all()
+        return (pulled, drawn) if right and not np.isinf(drawn).any() else None
+
+    def _compare(self, pulled: np.ndarray, drawn: np.ndarray) -> None:
         for number, model in enumerate(self._models):
             found = model.solve(self._states[number], pulled)
             if not found.converged:
@@ -105,8 +127,6 @@ class Observer:
             miss = (found.values[model.slices["stroke"]] - drawn) / self._noise
             miss = miss[np.isfinite(miss) & (pulled > 0.0)]
             self._cost[number] = self._forgets * self._cost[number] + float(miss @ miss)
-        best = int(np.argmin(self._cost))
-        return best, self._states[best]
 
     @property
     def weights(self) -> Float[np.ndarray, " models"]:

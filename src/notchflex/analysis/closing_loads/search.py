@@ -130,8 +130,7 @@ def find_roots(
         at_high = np.where(down & (side < 0), less_high * at_high, at_high)
         side = np.where(up, 1, np.where(down, -1, side))
         misses = np.where(up | down, 0, misses + open_still)
-        # One bisection earns one trial by false position: at a kink that alone would crawl.
-        slow = np.where(high - low > 0.5 * width, slow + 1, np.maximum(slow - 1, 0))
+        slow = np.where(high - low > 0.5 * width, slow + 1, 0)
         width = high - low
     precision = np.where(misses >= _TRIALS, _AT_SNAP, _PRECISION)
     return 0.5 * (low + high), high - low <= precision * high

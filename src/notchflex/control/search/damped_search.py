@@ -1,28 +1,19 @@
-"""The points of a search for a target, and the steps between them."""
+"""The steps of a search for a target, damped as Levenberg and Marquardt do."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
-from notchflex.control.drive_model import Response
-from notchflex.control.problem import Attempt, Problem, size_of
-from notchflex.control.quadratic import least_step
-from notchflex.errors import Failure
+from notchflex.control.program.drive_step import FIRST_PART, GROWTH, LEAST_DRIVES
+from notchflex.control.program.response import Response
+from notchflex.control.search.problem import Attempt, Problem, size_of
+from notchflex.control.search.quadratic import least_step
+from notchflex.control.search.search_point import KEPT, SearchPoint, limit_rows, penalty
+from notchflex.control.search.unmet import why_unmet
 
-# Where drives are redundant the smallest meet the target. This weight decides among those that
-# meet it equally well, and is too small to act against the target.
-_LEAST_DRIVES = 1e-10
-# A step may change a drive by so many times the largest one, or the first by a part of what closes
-# a notch.
-_GROWTH, _FIRST_PART = 1.0, 0.05
-# Limits count as kept within this part of them; those smaller than the second number (N, mm, or a
-# strain) within parts of it.
-_KEPT, _LEAST_LIMIT = 1e-7, 1e-3
-# What a violation of limits, as parts of them, counts beside the error.
-_PENALTY = 1e4
 # A column of the slopes that is this part of the target over the drives is that of a tendon that
 # sticks.
 _STUCK = 1e-8
@@ -35,46 +26,7 @@ _STRIDE, _ACROSS = 4.0, 30.0
 _FLAT = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class SearchPoint:
-    """A point of a search; f driven tendons.
-
-    Attributes:
-        moved: What the drives have moved beyond the dead bands, (t,).
-        drive: The drives, (t,).
-        response: The state there.
-        slopes: Slopes of all asked quantities by the driven tendons, (all, f).
-        stuck: Which driven tendons stick.
-        miss: Weighted differences from the target.
-        error: Its size.
-        limits: Slopes of limited quantities, as parts of the limits, (c, f).
-        room: How far each is from its limit.
-    """
-
-    moved: Float[np.ndarray, " t"]
-    drive: Float[np.ndarray, " t"]
-    response: Response
-    slopes: Float[np.ndarray, "all f"]
-    stuck: Bool[np.ndarray, " f"]
-    miss: Float[np.ndarray, " m"]
-    error: float
-    limits: Float[np.ndarray, "c f"]
-    room: Float[np.ndarray, " c"]
-
-    @property
-    def excess(self) -> float:
-        """Largest violation of a limit, as a part of it."""
-        return max(0.0, -float(self.room.min())) if self.room.size else 0.0
-
-    @property
-    def merit(self) -> float:
-        """What a step must lessen: the squared error, and that of broken limits."""
-        if not self.response.converged:
-            return np.inf
-        return self.error**2 + _penalty(self.room)
-
-
-class Walk:
+class DampedSearch:
     """One search: its points one after the other.
 
     Within a dead band, between turning round and the first slip of a contact, a tendon moves
@@ -133,7 +85,7 @@ class Walk:
         """Whether the target is met within the limits."""
         here = self.point
         met = here.error <= self.problem.search.tolerance and here.response.converged
-        return met and here.excess <= _KEPT
+        return met and here.excess <= KEPT
 
     def step(self, damping: float) -> Float[np.ndarray, " t"]:
         """Return the next step of all drives.
@@ -148,10 +100,10 @@ class Walk:
         step = np.zeros(len(here.drive))
         if not size > 0.0:
             return step
-        small = _LEAST_DRIVES * size
+        small = LEAST_DRIVES * size
         hessian = normal + (damping * size + small) * self._eye
         gradient = slopes.T @ here.miss + small * here.drive[free]
-        reach = _GROWTH * self.scale
+        reach = GROWTH * self.scale
         low = np.maximum((self._low - here.moved)[free], -reach)
         high = np.minimum((self._high - here.moved)[free], reach)
         least = least_step(hessian, gradient, low, high, here.limits, here.room)
@@ -200,7 +152,10 @@ class Walk:
 
     def result(self) -> Attempt:
         """Return where the search is, and why it went no further."""
-        here, failure = self.point, None if self.done else self._failure()
+        here, failure = self.point, None
+        if not self.done:
+            aim = self.entries, self.weights, self.scale, self.settled
+            failure = why_unmet(self.problem, here, *aim)
         return Attempt(here.drive, here.response, here.error, here.excess, self.solves, failure)
 
     def _outside(self, drive: np.ndarray) -> np.ndarray:
@@ -215,7 +170,7 @@ class Walk:
 
     def _scale(self, moved: np.ndarray) -> float:
         """Size of the drives, that of the first step at least."""
-        return max(float(np.abs(self._drive(moved)).max()), _FIRST_PART * self.problem.unit)
+        return max(float(np.abs(self._drive(moved)).max()), FIRST_PART * self.problem.unit)
 
     def _solve(self, moved: np.ndarray) -> Response:
         self.solves += 1
@@ -279,63 +234,4 @@ class Walk:
         """The merit that the slopes promise after a step."""
         here = self.point
         miss = here.miss + self.weights * (here.slopes[self.entries] @ step)
-        return float(miss @ miss) + _penalty(here.room - here.limits @ step)
-
-    def _failure(self) -> Failure:
-        here, free = self.point, self.free
-        if not here.response.converged:
-            return Failure.SEARCH_STOPPED
-        slopes = self.weights[:, None] * here.slopes[self.entries]
-        down = -(slopes.T @ here.miss)
-        flat = _FLAT * float(np.linalg.norm(slopes)) * here.error
-        if np.abs(down).max() <= flat:
-            return Failure.TARGET_OUT_OF_REACH
-        edge, drive = 1e-9 * self.scale, here.drive[free]
-        low, high = self.problem.low[free], self.problem.high[free]
-        at_low, at_high = (
-            (drive <= low + edge) & (down < 0.0),
-            (drive >= high - edge) & (down > 0.0),
-        )
-        # What of the way down is left where limits forbid the rest of it.
-        left = np.where(at_low | at_high, 0.0, down)
-        tight = here.limits[here.room <= _KEPT]
-        if len(tight):
-            along = left - tight.T @ np.linalg.lstsq(tight.T, left, rcond=None)[0]
-            if np.abs(along).max() <= flat:
-                return Failure.LIMITS_PREVENT
-        if np.abs(left).max() > flat:
-            return Failure.TARGET_OUT_OF_REACH if self.settled else Failure.SEARCH_STOPPED
-        # A tendon cannot push, and cannot be pulled for ever: these are not limits of anybody.
-        chosen = (at_low & (low > 0.0)) | (at_high & self.problem.chosen[free])
-        return Failure.LIMITS_PREVENT if chosen.any() else Failure.TARGET_OUT_OF_REACH
-
-
-def limit_rows(
-    problem: Problem, values: Float[np.ndarray, " all"], slopes: Float[np.ndarray, "all f"]
-) -> tuple[Float[np.ndarray, "c f"], Float[np.ndarray, " c"]]:
-    """Return slopes of limited quantities and their distances from the limits, as parts of them.
-
-    Args:
-        problem: The limits.
-        values: Quantities of a state.
-        slopes: Their slopes.
-    """
-    if not problem.bounds:
-        return slopes[:0], slopes[:0, 0]
-    rows, room = [], []
-    for bound in problem.bounds:
-        at = problem.model.slices[bound.quantity]
-        given = np.isfinite(bound.limit)
-        scale = np.maximum(np.abs(bound.limit[given]), _LEAST_LIMIT)
-        left = bound.side * (bound.limit - values[at])[given] / scale
-        seen = np.isfinite(left)
-        rows.append((bound.side * slopes[at][given] / scale[:, None])[seen])
-        room.append(left[seen])
-    return np.concatenate(rows), np.concatenate(room)
-
-
-def _penalty(room: np.ndarray) -> float:
-    if not room.size:
-        return 0.0
-    broken = np.minimum(room, 0.0)
-    return _PENALTY * float(broken @ broken)
+        return float(miss @ miss) + penalty(here.room - here.limits @ step)

@@ -12,43 +12,29 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
-from notchflex.analysis.derivatives.tangent import StepLayouts, lanes_of, step_function
 from notchflex.analysis.solve import prepare_for
+from notchflex.control.program.compiled_search import search_drives
+from notchflex.control.program.drive_step import dead_band
+from notchflex.control.program.response import DriveAim, Response
+from notchflex.control.program.task import SearchLayouts, Task, blank_task
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.motion import rotation_about
 from notchflex.results.state import SavedState, State, fitted
 from notchflex.robot import Robot
-from notchflex.solver.continuation import SolverState, solve_load_step
-from notchflex.solver.derived.quantities import believable, unpad_quantity
-from notchflex.solver.derived.solved_state import SolvedState
+from notchflex.solver.continuation import SolverState
+from notchflex.solver.derived.quantities import unpad_quantity
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.capacity import pad_rows
-from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
+from notchflex.solver.programs.pytree_layout import PytreeLayout
 
-
-class Response(NamedTuple):
-    """A solved load, and how what was asked of it changes with the drives.
-
-    Attributes:
-        state: The state, packed for the padded chain.
-        values: Quantities that were asked, one after the other, flattened, (m,).
-        jacobian: Their change per unit of every drive (N or mm), (m, t). NaN where the load was
-            so hard that its derivatives are not known.
-        converged: Whether the load has an equilibrium within what the model is for.
-        whole: Whether it was solved in one substep.
-    """
-
-    state: Float[np.ndarray, " state"]
-    values: Float[np.ndarray, " m"]
-    jacobian: Float[np.ndarray, "m t"]
-    converged: bool
-    whole: bool
+# Corrections of drives and equilibrium after a solved load.
+_CORRECTIONS = 8.0
 
 
 class _Places(NamedTuple):
@@ -96,14 +82,63 @@ class DriveModel:
             before: The state before, packed.
             drive: Tension (N) or stroke (mm) of every tendon.
         """
-        load = self._packed_load.copy()
-        load[self._targets] = drive
+        task = self._plain.copy()
+        at = self._fields
+        task[at["present"].start : at["high"].stop].reshape(3, -1)[:] = drive
+        return self._run(before, task)[0]
+
+    def search(
+        self,
+        before: Float[np.ndarray, " state"],
+        start: Float[np.ndarray, " t"],
+        known: Response,
+        aim: DriveAim,
+    ) -> tuple[Response, Float[np.ndarray, " t"], float, bool, int]:
+        """Solve the load at the drives that slopes predict for a target, and correct them.
+
+        Args:
+            before: The state before, packed.
+            start: Drives to start from.
+            known: Values and slopes there.
+            aim: The target and the limits of the drives.
+
+        Returns:
+            The solved state, its drives, its weighted distance from the target, whether that is
+            met, and how many loads were solved.
+        """
+        task, at, entries = self._plain.copy(), self._fields, aim.entries
+        own = self._own[entries]
+        task[at["goal"]][own], task[at["weights"]][own] = aim.goal, aim.weights
+        task[at["miss"]][own] = aim.weights * (known.values[entries] - aim.goal)
+        slopes = task[at["slopes"]].reshape(-1, len(start))
+        slopes[own] = aim.weights[:, None] * known.sliding[entries]
+        rows = (start, aim.low, aim.high, aim.driven)
+        task[at["present"].start : at["driven"].stop].reshape(4, -1)[:] = rows
+        redundant = float(aim.driven.sum()) > len(entries)
+        task[at["tolerance"].start :] = (
+            aim.tolerance,
+            aim.unit,
+            aim.solves,
+            _CORRECTIONS,
+            redundant,
+        )
+        response, drive, status = self._run(before, task, known.sliding)
+        return response, drive, float(status[3]), bool(status[2]), int(status[4])
+
+    def _run(
+        self, before: np.ndarray, task: np.ndarray, sliding: np.ndarray | None = None
+    ) -> tuple[Response, np.ndarray, np.ndarray]:
         chain, settings = self.prepared.long.dynamic_vector, self._numbers
-        state, flat, slopes, status = _respond(chain, before, load, settings, self._layouts)
-        values, jacobian = flat[self._own], slopes[:, self._own].T
-        if self._turn is not None:
-            values, jacobian = self._turn @ values, self._turn @ jacobian
-        return Response(state, values, jacobian, bool(status[0]), bool(status[1]))
+        state, values, slopes, sticks, drive, status = search_drives(
+            chain, before, self._packed_load, task, settings, self._layouts
+        )
+        own = self._own
+        jacobian = slopes[:, own].T
+        slid = jacobian
+        if sliding is not None and sticks.any():
+            slid = np.where(sticks > 0.0, sliding, jacobian)
+        good, whole = bool(status[0]), bool(status[1])
+        return Response(state, values[own], jacobian, good, whole, slid), drive, status
 
     @cached_property
     def prepared(self) -> PreparedChain:
@@ -130,13 +165,9 @@ class DriveModel:
 
         Exactly so while the other tendons stay as they are. A stroke always moves something.
         """
-        drive, places = self.drives(state), self._places
-        by_stroke = ~np.isnan(self.load.stroke[0])
+        places, by_stroke = self._places, ~np.isnan(self.load.stroke[0])
         ratio, bound = state[places.first_ratio], state[places.first_bound]
-        low, high = (drive * np.exp(-ratio + side * bound) for side in (-1.0, 1.0))
-        still = by_stroke | (np.abs(ratio) > bound)
-        low = np.where(still, drive, np.minimum(low, drive))
-        return low, np.where(still, drive, np.maximum(high, drive))
+        return dead_band(self.drives(state), ratio, bound, by_stroke)
 
     def friction(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
         """Return the logarithm of the largest tension ratio over all contacts of every tendon."""
@@ -186,23 +217,16 @@ class DriveModel:
         return found
 
     @cached_property
-    def _own(self) -> np.ndarray:
-        return np.concatenate([places for _, places in self._selected.values()])
+    def _size(self) -> int:
+        """How many numbers the outputs of the padded robot have."""
+        long = self.prepared.long.chain
+        sizes = {"tendon": long.tendons, "notch": long.flexures, "body": long.flexures + 1}
+        per = (REGISTERED[name].per for name in self.outputs)
+        return sum(int(np.prod([sizes.get(axis, 3) for axis in axes])) for axes in per)
 
     @cached_property
-    def _turn(self) -> np.ndarray | None:
-        """Turns flattened values from the frame of the base to the world; None for no turn."""
-        angles = self.load.base_rotation
-        if not angles.any():
-            return None
-        rotation = np.asarray(rotation_about(jnp.asarray(angles)))
-        every = np.eye(len(self._own))
-        for name, shape in self.shapes.items():
-            at = self.slices[name]
-            columns = every[at, at].reshape(-1, *shape)
-            turned = REGISTERED[name].turned(columns, rotation)
-            every[at, at] = np.reshape(turned, (len(columns), -1)).T
-        return every
+    def _own(self) -> np.ndarray:
+        return np.concatenate([places for _, places in self._selected.values()])
 
     @cached_property
     def _packed_load(self) -> np.ndarray:
@@ -214,42 +238,31 @@ class DriveModel:
         return ready.padded_commands(make_commands(self.load, self.robot, ready.chain))
 
     @cached_property
-    def _targets(self) -> np.ndarray:
-        return self._commands[1].indices[0]  # the first field of a `Command`
+    def _plain(self) -> np.ndarray:
+        """The task of solving one load, of drives that are still to be put in, packed."""
+        return self._layouts.task.pack(self._blank)
 
     @cached_property
-    def _layouts(self) -> StepLayouts:
-        long = self.prepared.long
-        return StepLayouts(long.static_structure, self._commands[1], long.state, self.outputs)
+    def _blank(self) -> Task:
+        tendons = self.prepared.long.chain.tendons
+        turn = np.asarray(rotation_about(jnp.asarray(self.load.base_rotation)))
+        return blank_task(self._size, tendons, turn)
+
+    @cached_property
+    def _fields(self) -> dict[str, slice]:
+        """Where the fields of a task are in the packed vector."""
+        numbers = zip(Task._fields, self._layouts.task.indices, strict=True)
+        return {name: slice(int(at.min()), int(at.max()) + 1) for name, at in numbers}
+
+    @cached_property
+    def _layouts(self) -> SearchLayouts:
+        long, form = self.prepared.long, PytreeLayout.of(self._blank)
+        ratio, bound = self._places.first_ratio, self._places.first_bound
+        first = tuple(ratio.tolist()), tuple(bound.tolist())
+        return SearchLayouts(
+            long.static_structure, self._commands[1], long.state, form, first, self.outputs
+        )
 
     @cached_property
     def _numbers(self) -> np.ndarray:
         return np.array(self.settings.numbers, float)
-
-
-@native(4, lanes_of)
-def _respond(
-    chain_vector: Float[Array, " chain"],
-    before: Float[Array, " state"],
-    load: Float[Array, " command"],
-    numbers: Float[Array, " settings"],
-    layouts: StepLayouts,
-) -> tuple[Array, Array, Array, Array]:
-    """A solved load: its state, what is asked of it, its slopes by the drives, and its status."""
-    chain, command = layouts.chain.unpack(chain_vector), layouts.command.unpack(load)
-    last = layouts.state.unpack(before)
-    result = solve_load_step(chain, command, last, Settings.of(numbers))
-    state = layouts.state.pack(result.solved)
-    way = jnp.stack([result.part_before, 1.0 * result.parts, 1.0 * result.converged, 0.0])
-    step = step_function(state, layouts.state.pack(result.between), way, layouts)
-
-    def flat(load: Array) -> Array:
-        found = step(chain, load, before)[1]
-        return jnp.concatenate([jnp.ravel(found[name]) for name in layouts.outputs])
-
-    values, change = jax.linearize(flat, load)
-    at = np.asarray(layouts.command.indices[0])
-    units = jnp.zeros((len(at), load.size)).at[np.arange(len(at)), at].set(1.0)
-    slopes = jax.lax.scan(lambda none, unit: (none, change(unit)), jnp.zeros(()), units)[1]
-    good = result.converged & believable(SolvedState(chain, result.solved).quantity)
-    return state, values, slopes, jnp.stack([1.0 * good, 1.0 * (result.parts == 1)])

@@ -12,10 +12,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import Response
-from notchflex.control.problem import Attempt, Problem
-from notchflex.control.search import find
-from notchflex.control.walk import limit_rows
+from notchflex.control.program.response import Response
+from notchflex.control.search.find import find, meet
+from notchflex.control.search.problem import Attempt, Problem
+from notchflex.control.search.search_point import limit_rows
 from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]
@@ -133,13 +133,28 @@ def find_anyhow(
     """
     # Where other tendons move, a tendon slides within its dead band too.
     alone = bool(np.count_nonzero(start[problem.driven]) < 2)
-    best = find(problem, before, start, goal, known, over_bands=alone)
+    best = meet(problem, before, start, goal, known)
     solves = best.solves
+    taut = problem.driven & (start > 0.0)
+    if best.failure is not None and 0 < taut.sum() < problem.driven.sum():
+        # Where a tendon turns round, one that is slack may seem to serve instead.
+        best = meet(problem._replace(driven=taut), before, start, goal, known)
+        solves += best.solves
+    if best.failure is None:
+        return best._replace(solves=solves)
+    best = find(problem, before, start, goal, known, over_bands=alone)
+    solves += best.solves
     if best.failure is not None:
         other = find(problem, before, start, goal, known, over_bands=not alone)
         solves += other.solves
         best = min(best, other, key=_quality)
-    for other_start, over_bands in _other_starts(problem, before, start):
+    others = [(best.drive, True), *_other_starts(problem, before, start)]
+    for other_start, _ in others if best.failure is not None else ():
+        other = meet(problem, before, other_start, goal)
+        solves += other.solves
+        if other.failure is None:
+            return other._replace(solves=solves)
+    for other_start, over_bands in others[1:]:
         if best.failure is None:
             return best._replace(solves=solves)
         other = find(problem, before, other_start, goal, over_bands=over_bands)

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.control.drive_model import DriveModel, Response
 from notchflex.control.limits import Bound
+from notchflex.control.program.drive_model import DriveModel
+from notchflex.control.program.response import Response
 from notchflex.errors import Failure, InputError
 from notchflex.loads.validation import check_integer, check_number
 

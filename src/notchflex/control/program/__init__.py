@@ -1,0 +1,1 @@
+"""One compiled program that solves loads for drives, and how it is called."""

@@ -1,0 +1,275 @@
+"""One compiled program that solves a load, differentiates it, and moves its drives to a target.
+
+A solved load tells by one linear step how its equilibrium changes with the drives. So Newton's
+method need not solve a load for every drive that is tried: the drives and the equilibrium are
+corrected together, with the friction history of the same state before, until balance and target
+are nearly met. A correction costs as much as a few iterations of a solve. Then the load is solved
+anew, from the state before: other states may be in balance under it, and this is the one that the
+robot comes to.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Bool, Float
+
+from notchflex._jax import jax, jnp
+from notchflex._quantity import REGISTERED
+from notchflex.analysis.outputs import report_quantities
+from notchflex.control.program.drive_step import (
+    FIRST_PART,
+    GROWTH,
+    NO_SLOPE,
+    SLACK,
+    dead_band,
+    drive_step,
+)
+from notchflex.control.program.search_state import LinearResponse, SearchState, SolvedRound
+from notchflex.control.program.task import SearchLayouts, Task
+from notchflex.loads.command import Command
+from notchflex.mechanics.chain import Chain
+from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
+from notchflex.solver.block_elimination import Iterate, linear_step
+from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
+from notchflex.solver.derived.quantities import believable
+from notchflex.solver.derived.solved_state import SolvedState
+from notchflex.solver.element import Memory
+from notchflex.solver.friction_predictor import limit_slack
+from notchflex.solver.newton import Settings
+from notchflex.solver.programs.compiled import native
+from notchflex.solver.programs.pytree_layout import lane_sizes
+from notchflex.solver.residual import Evaluation, evaluate
+
+# Redundant drives are as small as they get where a step would change them by this part.
+_SMALL_RELAXATION = 1e-3
+# A corrected state is solved where its residual is below this multiple of the tolerance.
+_SOLVED = 100.0
+# A tendon sticks where its slopes, squared, are `NO_SLOPE` of those with which it last slid,
+# and, beside others, stays where it is if it must slide by less than this part of its dead band.
+_SMALL_LEAP = 1e-3
+# Corrections go on while each leaves this part of the error at most, or the target is this multiple
+# of its tolerance away.
+_LEAST_FALL, _NEAR = 0.5, 100.0
+# The next correction leaves about the square of the error, over the size of what the drives move:
+# it meets the target where that is this part of the tolerance.
+_CLOSE = 0.1
+# A correction of the drives by less than this part of them is none.
+_NO_CHANGE = 1e-11
+
+
+@native(5, lambda layouts: lane_sizes(layouts.chain))
+def search_drives(
+    chain_vector: Float[Array, " chain"],
+    before: Float[Array, " state"],
+    load: Float[Array, " command"],
+    task_vector: Float[Array, " task"],
+    numbers: Float[Array, " settings"],
+    layouts: SearchLayouts,
+) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Solve the load at the drives that the slopes predict, and correct them to the target.
+
+    Returns:
+        The state, packed; the numbers asked of it; their slopes by the drives, drives as leading
+        axis; 1 where a tendon sticks; the drives; and whether it is solved, whether in one part,
+        whether the target is met, its error, and how many loads were solved.
+    """
+    chain, command = layouts.chain.unpack(chain_vector), layouts.command.unpack(load)
+    last, task = layouts.state.unpack(before), layouts.task.unpack(task_vector)
+    settings = Settings.of(numbers)
+    search = _Search(chain, command, last, task, settings, layouts)
+    found = jax.lax.while_loop(search.goes_on, search.solve, search.begin())
+    at, result = found.at, found.result
+    good = result.converged & believable(SolvedState(chain, at.state).quantity)
+    good = good & tension_is_bounded(chain, command, at.point.base_tension)
+    flags = [good, result.parts == 1, at.met & good, at.error, found.solved]
+    status = jnp.stack([jnp.asarray(one, float) for one in flags])
+    return layouts.state.pack(at.state), at.values, at.slopes, at.sticks, at.drive, status
+
+
+def _scale(task: Task, drive: Float[Array, " t"]) -> Float[Array, ""]:
+    """Size of the drives, that of a first step at least."""
+    return jnp.maximum(jnp.max(jnp.abs(drive)), FIRST_PART * task.unit)
+
+
+def _within(task: Task, drive: Float[Array, " t"]) -> Float[Array, " t"]:
+    """Drives within their limits, exactly at them where rounding leaves a difference."""
+    near = SLACK * task.unit
+    inside = jnp.where(drive <= task.low + near, task.low, jnp.minimum(drive, task.high))
+    return jnp.where(task.driven > 0.0, inside, task.present)
+
+
+class _Search:
+    """The loop over solved loads, as it is traced."""
+
+    def __init__(
+        self,
+        chain: Chain,
+        command: Command,
+        last: SolverState,
+        task: Task,
+        settings: Settings,
+        layouts: SearchLayouts,
+    ) -> None:
+        """Take what stays the same."""
+        self.chain, self.command, self.last = chain, command, last
+        self.task, self.settings, self.layouts = task, settings, layouts
+
+    def begin(self) -> SolvedRound:
+        """Return the loop before anything is solved, with the drives that the slopes predict."""
+        task, start = self.task, self.task.present
+        change = self._step(task.miss, task.slopes, start)
+        drive = self._beyond(self.last, start, change, jnp.array(True))
+        zero, none, count = jnp.zeros(()), jnp.zeros(len(start)), jnp.zeros((), int)
+        slopes, no = jnp.zeros(task.slopes.T.shape), jnp.array(False)
+        values = jnp.zeros(len(task.goal))
+        at = SearchState(
+            drive, self.last.point, self.last, values, slopes, none, zero, none, self.last.point,
+            no, drive, no, no, no, count,
+        )  # fmt: skip
+        last = self.last
+        result = LoadStepResult(last, zero, count, jnp.array(True), zero, count, last, zero)
+        return SolvedRound(drive, at, result, count)
+
+    def goes_on(self, state: SolvedRound) -> Bool[Array, ""]:
+        """Return whether another load is solved."""
+        task, at = self.task, state.at
+        more = (state.solved < task.rounds) & state.result.converged & ~at.met
+        size = _NO_CHANGE * _scale(task, task.present)
+        moves = jnp.max(jnp.abs(at.beyond - at.drive)) > size
+        return (state.solved == 0) | (more & moves)
+
+    def solve(self, state: SolvedRound) -> SolvedRound:
+        """Solve a load, and correct drives and equilibrium together from there."""
+        towards = self.command._replace(target=state.drive)
+        result = solve_load_step(self.chain, towards, self.last, self.settings)
+        memory, task = result.between.memory, self.task
+        here = self._evaluate(memory, state.drive, result.solved.point, jnp.zeros((), int))
+        # Where the load was cut into parts, the history of the last one depends on the drives; and
+        # a notch that can snap is solved whole.
+        whole = (result.parts == 1) if self.chain.rods.section.ends is None else jnp.array(False)
+        allowed = jnp.where(result.converged & whole & ~here.stuck, task.corrections, 0.0)
+
+        def proceed(at: SearchState) -> Bool[Array, ""]:
+            return ~at.met & ~at.close & (at.corrected < allowed) & at.falls
+
+        def correct(at: SearchState) -> SearchState:
+            drive, point = _within(task, at.drive + at.change), at.next_point
+            tension = self.command.either(point.base_tension, drive)
+            point = point._replace(base_tension=tension)
+            new = self._evaluate(memory, drive, point, at.corrected + 1)
+            enough = jnp.maximum(_LEAST_FALL * at.error, _NEAR * task.tolerance)
+            return new._replace(falls=new.error <= enough)
+
+        last = jax.lax.while_loop(proceed, correct, here)
+        # What counts is the load solved from the state before, as a robot is pulled.
+        corrected = _within(task, last.drive + last.change)
+        onward = jnp.where((last.corrected > 0) & last.falls, corrected, here.beyond)
+        at = here._replace(state=result.solved, beyond=onward)
+        return SolvedRound(onward, at, result, state.solved + 1)
+
+    def _step(self, miss: Array, slopes: Array, drive: Array) -> Array:
+        """Step of the drives to the target, within their limits."""
+        task = self.task
+        scale = _scale(task, drive)
+        low = jnp.maximum(task.low - drive, -GROWTH * scale)
+        high = jnp.minimum(task.high - drive, GROWTH * scale)
+        return drive_step(miss, slopes, drive, low, high, task.driven, scale)
+
+    def _beyond(
+        self, state: SolverState, drive: Array, change: Array, stuck: Array
+    ) -> Float[Array, " t"]:
+        """Drives after a change; of tendons that stick that beyond their dead bands."""
+        packed, command = self.layouts.state.pack(state), self.command
+        ratio, bound = (packed[np.array(at)] for at in self.layouts.first_contact)
+        there = command.either(state.stroke, state.point.base_tension)
+        by_stroke = False if command.by_stroke is None else command.by_stroke
+        low, high = dead_band(there, ratio, bound, by_stroke)
+        up, down = jnp.maximum(high - drive, 0.0), jnp.minimum(low - drive, 0.0)
+        leap = jnp.where(change > 0.0, up, down)
+        leap = jnp.where(stuck & (change != 0.0), leap, 0.0)
+        several = jnp.sum(self.task.driven) > 1.0
+        small = several & (jnp.abs(change) <= _SMALL_LEAP * jnp.abs(leap))
+        return _within(self.task, drive + jnp.where(small, 0.0, change + leap))
+
+    def _values(self, memory: Memory, point: Iterate) -> tuple[Array, tuple[Evaluation, Any]]:
+        """What is asked of a point, in the world; its balance, and the state with its history."""
+        chain, applied, outputs = self.chain, self.command.applied, self.layouts.outputs
+        at = evaluate(chain, point.unknowns, memory, point.base_tension, applied)
+        history = Memory(
+            log_ratio=point.unknowns.log_ratio,
+            slid=tuple(span.slid for span in at.spans),
+            bound=tuple(span.bound for span in at.spans),
+            material=at.flexure.memory,
+        )
+        drawn = stroke(chain, point.base_tension, at.base)
+        state = SolverState(point, history, drawn, applied)
+        found = report_quantities(chain, state, outputs)
+        turned = [REGISTERED[name].turned(found[name], self.task.turn) for name in outputs]
+        return jnp.concatenate([jnp.ravel(one) for one in turned]), (at, state)
+
+    def _moves(self, memory: Memory, drive: Array, point: Iterate) -> LinearResponse:
+        """Linear response of a point to a step to the balance, and to a unit of every drive."""
+        chain, command, (unknowns, tension) = self.chain, self.command, point
+        values, by_point, (at, state) = jax.linearize(
+            partial(self._values, memory), point, has_aux=True
+        )
+        demand = command_residual(chain, command._replace(target=drive), tension, at.base)
+        residual = jnp.max(jnp.abs(ravel_pytree((at.residual, demand))[0]))
+
+        def step_to(target: Array) -> Iterate:
+            towards = command._replace(target=target)
+            return linear_step(chain, towards, unknowns, memory, tension, at)
+
+        step, by_drive = jax.linearize(step_to, drive)
+        step = limit_slack(chain, point, step)
+
+        def column(none: Array, unit: Array) -> tuple[Array, Any]:
+            first = 1.0 - jnp.sum(unit)
+            moved = jax.tree.map(lambda own, by: first * own + by, step, by_drive(unit))
+            return none, (moved, by_point(moved))
+
+        units = jnp.concatenate([jnp.zeros((1, len(drive))), jnp.eye(len(drive))])
+        moves, changes = jax.lax.scan(column, jnp.zeros(()), units)[1]
+        return LinearResponse(residual, values, state, moves, changes)
+
+    def _evaluate(
+        self, memory: Memory, drive: Array, point: Iterate, corrected: Array
+    ) -> SearchState:
+        """Evaluate a point, and find the way on."""
+        task = self.task
+        residual, values, state, moves, changes = self._moves(memory, drive, point)
+        miss = task.weights * (values - task.goal)
+        slopes = changes[1:]
+        own, last = ((task.weights * one) ** 2 for one in (slopes, task.slopes.T))
+        stuck = jnp.sum(own, axis=1) <= NO_SLOPE * jnp.sum(last, axis=1)
+        weighted = jnp.where(stuck[:, None], task.slopes.T, task.weights * slopes)
+        change = self._step(miss + task.weights * changes[0], weighted.T, drive)
+        by_change = jnp.concatenate([jnp.ones(1), change])
+        next_point = jax.tree.map(
+            lambda value, by: value + jnp.tensordot(by_change, by, 1), point, moves
+        )
+        error = jnp.linalg.norm(miss)
+        size = jnp.linalg.norm(weighted) * _scale(task, drive)
+        settled = jnp.max(jnp.abs(change)) <= _SMALL_RELAXATION * _scale(task, drive)
+        met = (error <= task.tolerance) & (residual <= _SOLVED * self.settings.tolerance)
+        return SearchState(
+            drive=drive,
+            point=point,
+            state=state,
+            values=values,
+            slopes=slopes,
+            sticks=1.0 * stuck,
+            error=error,
+            change=change,
+            next_point=next_point,
+            stuck=jnp.any(stuck & (change != 0.0)),
+            beyond=self._beyond(state, drive, change, stuck),
+            met=met & (settled | (task.redundant == 0.0)),
+            close=error**2 <= _CLOSE * task.tolerance * size,
+            falls=jnp.isfinite(error),
+            corrected=corrected,
+        )

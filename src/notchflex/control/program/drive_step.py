@@ -1,0 +1,101 @@
+"""Steps of the drives: to a target by least squares, and across the dead bands of friction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jaxtyping import Array, Float
+
+from notchflex._jax import array_module, jnp
+from notchflex.solver.block_elimination import gauss_jordan
+
+LEAST_DRIVES = 1e-10
+"""Where drives are redundant the smallest meet the target. This weight decides among those that
+meet it equally well, and is too small to act against the target."""
+GROWTH, FIRST_PART = 1.0, 0.05
+"""A step may change a drive by so many times the largest one, or the first by a part of what closes
+a notch."""
+
+SLACK = 1e-10
+"""Drives within this part of what about closes a notch of their limit are at it."""
+
+NO_SLOPE = 1e-12
+"""Slopes whose square is this part of others move nothing."""
+
+# What a step weighs beside the error of the target, as a part of the slopes, for a target as far as
+# the drives reach.
+_DAMPING = 0.01
+
+
+def drive_step(
+    miss: Float[Array, " n"],
+    slopes: Float[Array, "n t"],
+    drive: Float[Array, " t"],
+    low: Float[Array, " t"],
+    high: Float[Array, " t"],
+    driven: Float[Array, " t"],
+    scale: Float[Array, ""],
+) -> Float[Array, " t"]:
+    """Return the step of least squares to a target within limits, that of the smallest drives.
+
+    Drives that the step would carry beyond a limit are set to it, and the others found again.
+
+    Args:
+        miss: Weighted differences from the target.
+        slopes: Their slopes by the drives.
+        drive: The drives, of which the smallest are sought.
+        low: Lowest step.
+        high: Highest step.
+        driven: 1 where a drive may change.
+        scale: Size of the drives.
+    """
+    count = len(drive)
+    slopes = slopes * driven
+    normal = slopes.T @ slopes
+    size = jnp.trace(normal) / jnp.maximum(jnp.sum(driven), 1.0)
+    known = size > 0.0
+    size = jnp.where(known, size, 1.0)
+    small = LEAST_DRIVES * size
+    eye = jnp.eye(count)
+    gradient = slopes.T @ miss + small * drive * driven
+    # Far from the target slopes hold roughly: directions that move little are left for later.
+    part = jnp.linalg.norm(miss) / (jnp.sqrt(size) * scale)
+    several = jnp.sum(driven) > 1.0
+    damping = jnp.where(several, _DAMPING * jnp.minimum(part, 1.0), 0.0) * size
+    hessian = normal + (small + damping) * eye
+    # What moves nothing stays.
+    column = jnp.sum(slopes**2, axis=0)
+    driven = driven * (column > NO_SLOPE * jnp.max(column))
+    free, step = driven, jnp.zeros(count)
+    for _ in range(count):
+        both = free[:, None] * free[None, :]
+        matrix = both * hessian + (1.0 - free) * size * eye
+        right = -free * (gradient + hessian @ ((1.0 - free) * step))
+        step = jnp.where(free > 0.0, gauss_jordan(matrix, right[:, None])[:, 0], step)
+        inside = jnp.clip(step, low, high)
+        free = free * (inside == step)
+        step = inside
+    return jnp.where(known, step * driven, 0.0)
+
+
+def dead_band(
+    drive: Any,
+    ratio: Any,
+    bound: Any,
+    by_stroke: Any,
+) -> tuple[Any, Any]:
+    """Return between which drives nothing moves, as the first contact of a tendon sticks.
+
+    Exactly so while the other tendons stay as they are. A stroke always moves something.
+
+    Args:
+        drive: The drives, N or mm, (t,), of NumPy or JAX.
+        ratio: Log ratios of the first contacts, (t,).
+        bound: Their largest, (t,).
+        by_stroke: Which drives are strokes, (t,).
+    """
+    xp = array_module(drive)
+    still = by_stroke | (xp.abs(ratio) > bound)
+    low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
+    low = xp.where(still, drive, xp.minimum(low, drive))
+    return low, xp.where(still, drive, xp.maximum(high, drive))

@@ -1,0 +1,1 @@
+"""The search for drives that meet one target."""

@@ -1,0 +1,164 @@
+"""The search for drives that meet one target, from one state: Levenberg-Marquardt with limits.
+
+The tip follows the drives smoothly but for kinks: where a tendon turns round its contacts stick
+first, and a notch closes. There derivatives hold for one side only. A step is therefore judged by
+what it brings, and derivatives are taken at every point anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.control.program.response import DriveAim, Response
+from notchflex.control.search.damped_search import DampedSearch
+from notchflex.control.search.problem import Attempt, Problem, size_of
+from notchflex.control.search.search_point import KEPT, limit_rows
+from notchflex.errors import Failure
+
+# Damping: where a step fails, its factor after one that did, the gain above which it is lifted, and
+# the largest with which a step is worth trying.
+_FIRST, _FACTOR, _GOOD_GAIN, _MOST_DAMPING = 1e-3, 8.0, 0.5, 1e12
+# The part of the promised improvement that a step must bring.
+_LEAST_GAIN = 1e-3
+# Tendons whose slopes (mm, N or rad per N or mm) are below this stick. They slide at drives that
+# differ by these parts.
+_STUCK = 1e-9
+_ASIDE = (1e-6, -1e-6)
+# Loads that the program may solve for a target.
+_ROUNDS = 6
+# A step that changes drives by less than this part of them is none.
+_NO_STEP = 1e-11
+# Drives that are redundant are made smaller in so many rounds of so many corrections, while a round
+# changes them and their size by more than these parts.
+_MOST_RELAXATIONS, _CORRECTIONS, _SMALL_RELAXATION, _SMALL_GAIN = 6, 5, 1e-3, 1e-4
+
+
+def find(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    start: Float[np.ndarray, " t"],
+    goal: Float[np.ndarray, " m"],
+    known: Response | None = None,
+    *,
+    over_bands: bool = True,
+) -> Attempt:
+    """Search drives that meet a target.
+
+    Args:
+        problem: What is aimed at, and the limits.
+        before: The state before, packed.
+        start: Drives to start from.
+        goal: The target; NaN where an entry is free.
+        known: Values and slopes at `start`, where they are known.
+        over_bands: Whether dead bands of the drives are left out.
+
+    Returns:
+        The best that was found within the budget.
+    """
+    rows = np.flatnonzero(~np.isnan(goal))
+    aim = problem.entries[rows], problem.weights[rows], goal[rows]
+    search = DampedSearch(problem, before, *aim, over_bands)
+    search.begin(start, known)
+    damping, budget = 0.0, problem.search.solves
+    while not search.done and search.solves < budget:
+        step = search.step(damping)
+        if np.abs(step).max() <= _NO_STEP * search.scale or damping > _MOST_DAMPING:
+            search.settled = True
+            break
+        gain = search.go(step, _LEAST_GAIN)
+        if gain >= _GOOD_GAIN:
+            damping = 0.0 if damping <= _FIRST else damping / _FACTOR
+        elif gain < _LEAST_GAIN:
+            damping = max(_FIRST, damping * _FACTOR)
+    if search.done and len(search.free) > len(rows):
+        _relax(search, budget)
+    return search.result()
+
+
+def meet(
+    problem: Problem,
+    before: Float[np.ndarray, " state"],
+    start: Float[np.ndarray, " t"],
+    goal: Float[np.ndarray, " m"],
+    known: Response | None = None,
+) -> Attempt:
+    """Meet a target from the present drives by one program, as mostly succeeds.
+
+    Args:
+        problem: What is aimed at, and the limits.
+        before: The state before, packed.
+        start: Its drives.
+        goal: The target; NaN where an entry is free.
+        known: Values and slopes there, where they are known.
+
+    Returns:
+        What was found, or the present drives where that is no nearer; where the target is not met
+        within the limits, `failure` says that the search stopped.
+    """
+    model, search = problem.model, problem.search
+    rows = np.flatnonzero(goal == goal)
+    entries, weights, wanted = problem.entries[rows], problem.weights[rows], goal[rows]
+    solves = 0
+    if known is None:
+        known, solves = _present(problem, before, start)
+    error = size_of(weights * (known.values[entries] - wanted))
+    redundant = len(start) > len(rows) and int(problem.driven.sum()) > len(rows)
+    if not known.converged or not np.isfinite(known.jacobian[entries]).all():
+        return Attempt(start, known, error, 0.0, solves, Failure.SEARCH_STOPPED)
+    if error <= search.tolerance and not redundant:
+        return _within_limits(problem, Attempt(start, known, error, 0.0, solves, None))
+    aim = DriveAim(
+        entries, wanted, weights, problem.low, problem.high, problem.driven,
+        search.tolerance, problem.unit, min(_ROUNDS, search.solves),
+    )  # fmt: skip
+    response, drive, nearest, met, more = model.search(before, start, known, aim)
+    solves += more
+    if not met and not (response.converged and nearest < error):
+        return Attempt(start, known, error, 0.0, solves, Failure.SEARCH_STOPPED)
+    failure = None if met else Failure.SEARCH_STOPPED
+    return _within_limits(problem, Attempt(drive, response, nearest, 0.0, solves, failure))
+
+
+def _present(problem: Problem, before: np.ndarray, start: np.ndarray) -> tuple[Response, int]:
+    """Solve the present drives, and drives beside them for slopes of tendons that stick."""
+    model, driven = problem.model, problem.driven
+    known, solves = model.solve(before, start), 1
+    sliding = known.sliding
+    for part in _ASIDE:
+        stuck = driven & (np.abs(sliding[problem.entries]).max(axis=0) <= _STUCK)
+        if not stuck.any():
+            break
+        aside = model.solve(before, np.where(driven, (1.0 + part) * start, start))
+        solves += 1
+        if aside.converged and np.isfinite(aside.jacobian).all():
+            sliding = np.where(stuck, aside.jacobian, sliding)
+    return known._replace(sliding=sliding), solves
+
+
+def _within_limits(problem: Problem, attempt: Attempt) -> Attempt:
+    """The attempt, which has failed where a limit is broken."""
+    response = attempt.response
+    room = limit_rows(problem, response.values, response.jacobian)[1]
+    excess = max(0.0, -float(room.min())) if room.size else 0.0
+    broken = excess > KEPT or not (attempt.drive >= problem.low).all()
+    broken = broken or not (attempt.drive <= problem.high).all()
+    failure = Failure.SEARCH_STOPPED if broken else attempt.failure
+    return attempt._replace(excess=excess, failure=failure)
+
+
+def _relax(search: DampedSearch, budget: int) -> None:
+    """Go on to the smallest drives that meet the target."""
+    for _ in range(_MOST_RELAXATIONS):
+        step = search.step(0.0)
+        if search.solves >= budget or np.abs(step).max() <= _SMALL_RELAXATION * search.scale:
+            return
+        kept, effort = search.point, size_of(search.point.drive)
+        search.jump(step)
+        for _ in range(_CORRECTIONS):
+            if search.done or search.solves >= budget:
+                break
+            search.go(search.step(0.0), _LEAST_GAIN)
+        if not search.done or size_of(search.point.drive) > (1.0 - _SMALL_GAIN) * effort:
+            search.point = kept
+            return
