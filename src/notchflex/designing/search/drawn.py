@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
-from notchflex.analysis.varied.sparse_polynomial import fit_polynomial
+from notchflex.analysis.varied.sparse_polynomial import Wanted, fit_polynomial
 from notchflex.designing.model.point import Point, Solver
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import Problem, Vector
@@ -118,9 +118,7 @@ def _of_robots(
         [list(range(len(low)))],
         lambda _: spread,
         [np.arange(len(spread))],
-        tolerance=_ERROR,
-        aim=0.1 * _ERROR,
-        most=len(table) // 3,
+        wanted=[Wanted(_ERROR, len(table) // 3)],
         checks=checks,
     )
     if made is None:
