@@ -26,6 +26,8 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["JAX_ENABLE_X64"] = "1"
     # A shape that does not fit must not be stretched in silence.
     os.environ["JAX_NUMPY_RANK_PROMOTION"] = "raise"
+    if "jax" in sys.modules:  # a plugin of pytest may have imported it before
+        sys.modules["jax"].config.update("jax_numpy_rank_promotion", "raise")
     # Most of the time goes into compiling programs that are run a few times. Unoptimised code is
     # compiled in a third of the time; that the optimised code of users finds the same numbers is
     # a test of its own (tests/solver/test_as_users_run_it.py).

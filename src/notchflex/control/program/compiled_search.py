@@ -244,9 +244,10 @@ class _Search:
         residual, values, state, moves, changes = self._moves(memory, drive, point)
         miss = task.weights * (values - task.goal)
         slopes = changes[1:]
-        own, last = ((task.weights * one) ** 2 for one in (slopes, task.slopes.T))
+        weights = task.weights[None]
+        own, last = ((weights * one) ** 2 for one in (slopes, task.slopes.T))
         stuck = jnp.sum(own, axis=1) <= NO_SLOPE * jnp.sum(last, axis=1)
-        weighted = jnp.where(stuck[:, None], task.slopes.T, task.weights * slopes)
+        weighted = jnp.where(stuck[:, None], task.slopes.T, weights * slopes)
         change = self._step(miss + task.weights * changes[0], weighted.T, drive)
         by_change = jnp.concatenate([jnp.ones(1), change])
         next_point = jax.tree.map(

@@ -50,7 +50,7 @@ def drive_step(
         scale: Size of the drives.
     """
     count = len(drive)
-    slopes = slopes * driven
+    slopes = slopes * driven[None]
     normal = slopes.T @ slopes
     size = jnp.trace(normal) / jnp.maximum(jnp.sum(driven), 1.0)
     known = size > 0.0
@@ -69,7 +69,7 @@ def drive_step(
     free, step = driven, jnp.zeros(count)
     for _ in range(count):
         both = free[:, None] * free[None, :]
-        matrix = both * hessian + (1.0 - free) * size * eye
+        matrix = both * hessian + (1.0 - free)[None] * size * eye
         right = -free * (gradient + hessian @ ((1.0 - free) * step))
         step = jnp.where(free > 0.0, gauss_jordan(matrix, right[:, None])[:, 0], step)
         inside = jnp.clip(step, low, high)

@@ -65,10 +65,10 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
     shown = driven & (apart > 0.0)
     # Of the work that a closing notch takes, the tendons do it; an opening one gives it back.
     closes = jnp.sum(jnp.where(shown, drives, 0.0), axis=0) > 0.0
-    rising = jnp.where(closes, held, -held)
+    rising = jnp.where(closes[None], held, -held)
     so_far = jax.lax.associative_scan(jnp.maximum, jnp.where(shown, rising, -jnp.inf), axis=0)
     size = jnp.max(jnp.where(shown, jnp.abs(held), 0.0), axis=0)
-    falls = jnp.any(shown & (so_far - rising > _FALLS * size), axis=0)
+    falls = jnp.any(shown & (so_far - rising > _FALLS * size[None]), axis=0)
     return jnp.where(falls, jnp.where(closes, 1.0, -1.0), 0.0)
 
 
