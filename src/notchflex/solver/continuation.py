@@ -169,8 +169,8 @@ def solve_load_step(
     """
     external_first = _external_first(chain, last)
     can_snap = chain.rods.section.ends is not None
-    # Of a single tendon on notches that snap, it is rather a snap that makes a step fail.
-    may_creep = not can_snap or chain.tendons > 1
+    # Of a single tendon, contacts are found as they are; a step fails for another reason.
+    may_creep = chain.tendons > 1
     most = settings.max_all_iterations * (_MORE_ITERATIONS if can_snap else 1)
 
     def proceed(state: _Search) -> Bool[Array, ""]:
