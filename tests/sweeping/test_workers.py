@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import signal
 import socket
 import subprocess
@@ -151,3 +152,36 @@ def test_workers_of_this_machine_and_a_killed_client(many, tmp_path, start):
     client.wait()
     nf.sweep(plan(**MANY), folder, workers=4)
     assert digests(folder) == digests(many)
+
+
+FAULTS = """
+import resource
+import threading
+
+import numpy as np
+
+from notchflex.sweeping.engine.running import keep_memory
+
+def work():
+    keep_memory()
+    for turn in range(12):
+        if turn == 2:  # until then the memory is new
+            before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        kept = [np.ones(2_500_000) for _ in range(6)]
+        del kept
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+
+one = threading.Thread(target=work)
+one.start()
+one.join()
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="glibc's malloc")
+def test_a_worker_keeps_its_memory():
+    """A thread under dask's setting takes no new pages for arrays like those it gave back."""
+    settings = os.environ | {"MALLOC_TRIM_THRESHOLD_": "65536"}
+    found = subprocess.run(
+        [sys.executable, "-c", FAULTS], env=settings, check=True, capture_output=True, text=True
+    )
+    assert int(found.stdout) < 1000  # each turn has 29 000 pages

@@ -21,10 +21,12 @@ from notchflex.solver.programs.threads import number_of_cores, on_cores
 from notchflex.sweeping.engine.connection import ClusterConnection, scheduler_gone
 from notchflex.sweeping.engine.piece import Done, Worker, make_piece, worker_of
 
-_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+_TRIM_THRESHOLD, _TOP_PAD, _MMAP_THRESHOLD = -1, -2, -3
 """Numbers of the options in <malloc.h>."""
 _KEPT = 2**25
-"""glibc takes no larger one."""
+"""glibc takes no larger threshold."""
+_SPARE = 2**26
+"""The size of a heap of a thread: glibc gives back every heap that is empty but for so much."""
 
 _AHEAD = 2
 """So many pieces wait for each worker of dask, so that none is idle."""
@@ -132,13 +134,13 @@ def _work(text: str, folder: str, piece: int) -> Done:
         raise InputError.FILE_NOT_FOUND(
             f"a worker sees no folder {folder}; give a folder that all workers share."
         )
-    _keep_memory()
+    keep_memory()
     with threadpool_limits(1):
         return make_piece(worker_of(text), folder, piece)
 
 
 @lru_cache(maxsize=1)
-def _keep_memory() -> None:
+def keep_memory() -> None:
     """Let the C library keep the memory that arrays gave back, for the next ones.
 
     dask sets MALLOC_TRIM_THRESHOLD_ for its workers, so that all memory is given back to the system
@@ -150,3 +152,4 @@ def _keep_memory() -> None:
     if mallopt is not None:
         mallopt(_TRIM_THRESHOLD, _KEPT)
         mallopt(_MMAP_THRESHOLD, _KEPT)
+        mallopt(_TOP_PAD, _SPARE)
