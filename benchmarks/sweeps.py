@@ -133,7 +133,16 @@ class Cluster:
         command = {
             "scheduler": ["-m", "dask", "scheduler", "--host", "127.0.0.1", "--port"],
             "worker": ["-m", "dask", "worker", address, "--nthreads", "1", "--no-nanny"],
-            "client": ["-m", "notchflex", "sweep", str(self.file), "-o", str(self.folder)],
+            "client": [
+                "-X",
+                "faulthandler",
+                "-m",
+                "notchflex",
+                "sweep",
+                str(self.file),
+                "-o",
+                str(self.folder),
+            ],
         }[name.split()[0]]
         more = {
             "scheduler": [str(self.port), "--no-dashboard"],
@@ -150,8 +159,16 @@ class Cluster:
         self.processes[name].send_signal(signal.SIGKILL)
         self.processes[name].wait()
         if name == "scheduler":
-            code = self.processes["client"].wait(timeout=180)
-            print(f"  the client ended with code {code}", flush=True)
+            begun = time.monotonic()
+            try:
+                code = self.processes["client"].wait(timeout=180)
+            except subprocess.TimeoutExpired:
+                self.processes["client"].send_signal(signal.SIGABRT)  # where its threads wait
+                self.processes["client"].wait()
+                print((self.folder.parent / "client.log").read_text()[-8000:], flush=True)
+                raise
+            taken = time.monotonic() - begun
+            print(f"  the client ended with code {code} after {taken:.1f} s", flush=True)
             self.stop()
             for one in ("scheduler", "worker 1", "worker 2"):
                 self.start(one)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import signal
 import socket
 import subprocess
@@ -16,6 +17,10 @@ import pytest
 import tomlkit
 
 import notchflex as nf
+from notchflex.sweeping.engine import connection
+from notchflex.sweeping.engine.connection import scheduler_at
+from notchflex.sweeping.engine.folder import manifest_in
+from notchflex.sweeping.engine.running import on_cluster
 from swept import TABLE, digests, plan
 
 pytest.importorskip("distributed")
@@ -51,7 +56,7 @@ def start(tmp_path) -> Iterator[Start]:
         one.wait()
 
 
-def cluster(start: Start) -> tuple[str, list[subprocess.Popen[bytes]]]:
+def cluster(start: Start, *first: str) -> tuple[str, list[subprocess.Popen[bytes]]]:
     """Start a scheduler and two workers as the documentation does, on the loopback."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -59,7 +64,7 @@ def cluster(start: Start) -> tuple[str, list[subprocess.Popen[bytes]]]:
     address = f"tcp://127.0.0.1:{port}"
     scheduler = start("dask", "scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
     worker = ("dask", "worker", address, "--nthreads", "1", "--no-dashboard")
-    return address, [scheduler, start(*worker), start(*worker, "--no-nanny")]
+    return address, [scheduler, start(*worker, *first), start(*worker, "--no-nanny")]
 
 
 def test_a_real_scheduler_with_two_workers(many, tmp_path, start):
@@ -83,6 +88,53 @@ def test_a_real_scheduler_with_two_workers(many, tmp_path, start):
     assert digests(tmp_path / "swept") == digests(many)
 
 
+def test_a_piece_handed_over_while_the_scheduler_dies(many, tmp_path, start):
+    """dask would wait 20 s for a new scheduler, and may then wait for ever."""
+    address, (scheduler, *_) = cluster(start)
+    (tmp_path / "pieces").mkdir()
+    died: list[float] = []
+
+    def pieces(client: Any) -> Iterator[int]:
+        yield from range(12)
+        scheduler.send_signal(signal.SIGKILL)
+        died.append(time.monotonic())
+        while client.status == "running":
+            time.sleep(0.01)
+        yield 12
+
+    def work() -> None:
+        with scheduler_at(address) as client:
+            list(on_cluster(client, manifest_in(many).text, str(tmp_path), pieces(client)))
+
+    with pytest.raises(nf.InputError) as caught:
+        work()
+    assert caught.value.code.name == "NO_CONNECTION"
+    assert time.monotonic() - died[0] < 15
+
+
+@pytest.mark.parametrize("victims", ["workers", "frozen scheduler"])
+def test_no_answer_for_long(many, tmp_path, start, monkeypatch, victims):
+    """All workers are killed, or the scheduler answers no more, and nothing closes."""
+    monkeypatch.setattr(connection, "_ASK", 0.5)
+    monkeypatch.setattr(connection, "_ALONE", 2.0)
+    monkeypatch.setattr(connection, "_ANSWER", 3.0)
+    address, (scheduler, *workers) = cluster(start, "--no-nanny")
+    died: list[float] = []
+
+    def stop(*_: int) -> None:
+        if not died:
+            died.append(time.monotonic())
+            for one in workers if victims == "workers" else [scheduler]:
+                one.send_signal(signal.SIGKILL if victims == "workers" else signal.SIGSTOP)
+
+    with pytest.raises(nf.InputError) as caught:
+        nf.sweep(plan(**MANY), tmp_path / "swept", scheduler=address, progress=stop)
+    assert caught.value.code.name == "NO_CONNECTION"
+    assert time.monotonic() - died[0] < 40
+    nf.sweep(plan(**MANY), tmp_path / "swept")
+    assert digests(tmp_path / "swept") == digests(many)
+
+
 def test_workers_of_this_machine_and_a_killed_client(many, tmp_path, start):
     """The first client is stopped and killed; four workers do what is left."""
     folder = tmp_path / "swept"
@@ -100,3 +152,36 @@ def test_workers_of_this_machine_and_a_killed_client(many, tmp_path, start):
     client.wait()
     nf.sweep(plan(**MANY), folder, workers=4)
     assert digests(folder) == digests(many)
+
+
+FAULTS = """
+import resource
+import threading
+
+import numpy as np
+
+from notchflex.sweeping.engine.running import keep_memory
+
+def work():
+    keep_memory()
+    for turn in range(12):
+        if turn == 2:  # until then the memory is new
+            before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        kept = [np.ones(2_500_000) for _ in range(6)]
+        del kept
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+
+one = threading.Thread(target=work)
+one.start()
+one.join()
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="glibc's malloc")
+def test_a_worker_keeps_its_memory():
+    """A thread under dask's setting takes no new pages for arrays like those it gave back."""
+    settings = os.environ | {"MALLOC_TRIM_THRESHOLD_": "65536"}
+    found = subprocess.run(
+        [sys.executable, "-c", FAULTS], env=settings, check=True, capture_output=True, text=True
+    )
+    assert int(found.stdout) < 1000  # each turn has 29 000 pages

@@ -14,6 +14,7 @@ from notchflex._extras import need
 from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.validation import check_integer, short_repr
 from notchflex.robot import Robot, load_robot
+from notchflex.sweeping.engine.connection import check_address, local_cluster, scheduler_at
 from notchflex.sweeping.engine.folder import (
     check_target,
     done_piece,
@@ -23,13 +24,7 @@ from notchflex.sweeping.engine.folder import (
 )
 from notchflex.sweeping.engine.manifest import Manifest
 from notchflex.sweeping.engine.piece import Done, Worker
-from notchflex.sweeping.engine.running import (
-    check_address,
-    in_threads,
-    local_cluster,
-    on_cluster,
-    scheduler_at,
-)
+from notchflex.sweeping.engine.running import in_threads, on_cluster
 from notchflex.sweeping.model import model_of
 from notchflex.sweeping.plan import SweepPlan, read_plan
 from notchflex.sweeping.plan.reading import plan_from_table
