@@ -53,7 +53,8 @@ def sense(
     The history begins at rest, with slack tendons and without the force. From reading to reading
     tendons and force change in proportion. The force may come, change and go at any reading: that
     of every reading is found for itself, from the state that the readings before left. Consecutive
-    readings that noise explains are averaged first.
+    readings that noise explains are averaged before the model follows them; the force of each stays
+    its own, and so does its interval.
 
     Args:
         robot: The robot.
