@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from refusals import refused
 
 WRIST = nf.load_robot("pacheco2021-a")
 ROUGH = WRIST.with_value("friction.coefficient", 0.156)
@@ -133,3 +134,35 @@ def test_an_observer_ignores_what_it_cannot_use(tension, stroke):
     np.testing.assert_array_equal(same, state)
     observer.observe([0.6], [np.nan])  # a stroke that was not measured
     assert observer.accepted
+
+
+@pytest.mark.parametrize("rate", [0.107, 0.04])
+def test_a_rate_below_the_dead_band_still_turns_round(rate):
+    # Let go from 1.359 N the tendon sticks for more than 0.107 N.
+    pulled = nf.solve(WRIST, nf.Load(tension=1.359))
+    limits = nf.Limits(rate=rate)
+    controller = nf.Controller(WRIST, "total_angle", state=pulled.state, limits=limits)
+    commands, steps = [1.359], []
+    while not (steps and controller.status.reached) and len(steps) < 40:
+        commands.append(float(controller.step(1.0)[0]))
+        steps.append(controller.status)
+    assert controller.status.reached
+    assert -rate - 1e-12 <= np.diff(commands).min() <= np.diff(commands).max() < 0.0
+    assert {one.code for one in steps[:-1]} == {"LIMITS_PREVENT"}
+    assert max(one.solves for one in steps) <= 16
+    assert path(WRIST, commands).total_angle[-1] == pytest.approx(1.0, abs=1e-4)
+    wanted = {"total_angle": [1.0] * len(steps)}
+    found = nf.follow(WRIST, wanted, state=pulled.state, limits=limits)
+    assert found.reached[-1]
+    assert not found.reached[:-1].any()
+
+
+@pytest.mark.parametrize("target", [1e300, -1e300, 1e160])
+def test_a_huge_target_is_refused_without_a_warning(target, recwarn):
+    controller = nf.Controller(WRIST, "total_angle")
+    good = controller.step(0.3)
+    np.testing.assert_array_equal(controller.step(target), good)
+    assert controller.status.code == "INVALID_INPUT"
+    with refused("OUT_OF_RANGE"):
+        nf.reach(WRIST, {"total_angle": target})
+    assert not [one for one in recwarn if issubclass(one.category, RuntimeWarning)]

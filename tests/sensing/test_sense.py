@@ -8,6 +8,7 @@ from notchflex.sensing import SensorNoise, sense
 from notchflex.sensing.history import estimate, with_noise
 from notchflex.sensing.merging import merged
 from notchflex.sensing.model import SensingModel
+from notchflex.sensing.own_reading import own_readings
 from notchflex.sensing.readings import readings_of
 from notchflex.sensing.tables import sensed_document
 from notchflex.sensing.unknown import unknown_force
@@ -142,6 +143,57 @@ def test_holding_still_does_not_make_the_force_drift(wrist):
     assert abs(sensed.force[-1, 0] - 0.02) < 0.005
     assert sensed.deviation[-1, 0] < 0.5 * sensed.deviation[4, 0]
     assert len(sensed.path) < 12
+
+
+def test_a_force_that_noise_could_explain_is_in_the_interval_of_its_own_reading(wrist):
+    # Pulled, let go by a third, then touched at the held tension: the stroke changes by less than
+    # three standard deviations of a difference, and both readings are averaged.
+    tensions = np.array([0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.0, 0.8, 0.8])
+    forces = np.append(np.zeros(8), 0.03)
+    path = read(wrist, tensions, forces)
+    sensed = sense(wrist, path.tension, path.stroke)
+    assert sensed.group[-1] == sensed.group[-2]
+    assert ((sensed.low[:, 0] <= forces) & (forces <= sensed.high[:, 0])).all()
+    assert ((sensed.low <= sensed.force) & (sensed.force <= sensed.high)).all()
+    # The estimates are on their own sides of that of the mean.
+    assert sensed.force[-2, 0] < 0.005 < 0.01 < sensed.force[-1, 0]
+    # Finer sensors tell them apart.
+    fine = sense(wrist, path.tension, path.stroke, noise=SensorNoise(tension=1e-3, stroke=1e-3))
+    assert fine.group[-1] != fine.group[-2]
+    assert fine.force[-1, 0] == pytest.approx(0.03, abs=2e-3)
+
+
+def test_a_reading_alone_is_its_own_mean(wrist):
+    readings = readings_of(wrist, [0.3, 0.6, 0.6], [0.37, 0.76, 0.77], None, None, SensorNoise())
+    means, group = merged(readings)
+    model = SensingModel(wrist, means, unknown_force(wrist, "x", "tip", None), 0.2, DEFAULT)
+    history = with_noise(estimate(model))
+    (alone,), (first, second) = own_readings(history, readings, group)
+    assert alone.step is history.steps[0]
+    assert not alone.extra.any()
+    assert not alone.more.any()
+    # Half the noise of one reading is in the mean of two, the other half is its own.
+    one = first.step.noise + (first.step.driving * 2.0) @ (history.by_drive[1] ** 2).T
+    assert first.extra == pytest.approx(0.5 * np.diag(one))
+    assert first.step.measured - means.stroke[1] == pytest.approx([-0.005])
+    assert second.step.measured - means.stroke[1] == pytest.approx([0.005])
+    assert (first.part, second.part) == (0.0, 0.0)
+
+
+@pytest.mark.nightly
+def test_intervals_hold_while_a_force_changes_at_a_held_tension(wrist):
+    holds = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        tensions = np.array([0.4, 0.8, 1.1, *([0.8] * 5)])
+        forces = np.zeros(8)
+        forces[-int(rng.integers(1, 5)) :] = rng.uniform(-0.03, 0.03)
+        path = read(wrist, tensions, forces)
+        noise = 0.01 * rng.normal(size=(2, 8, 1))
+        sensed = sense(wrist, path.tension + noise[0], path.stroke + noise[1])
+        inside = (sensed.low[:, 0] <= forces) & (forces <= sensed.high[:, 0])
+        holds += inside[forces != 0.0].tolist()
+    assert np.mean(holds) > 0.9
 
 
 def test_contact_is_shown_by_a_force_and_not_by_noise(wrist):

@@ -15,7 +15,8 @@ from notchflex.control.problem_setup import ProblemOptions, make_problem, presen
 from notchflex.control.program.response import Response
 from notchflex.control.search.find import find, meet
 from notchflex.control.search.problem import TargetSearch
-from notchflex.control.targets import DIRECTION, Targets, target_shapes
+from notchflex.control.search.rate import cross_dead_bands, limit_rate
+from notchflex.control.targets import DIRECTION, LARGEST_TARGET, Targets, target_shapes
 from notchflex.errors import Failure, InputError
 from notchflex.loads import Load
 from notchflex.loads.validation import check_is_robot, check_number, short_repr
@@ -136,7 +137,7 @@ class Controller:
         """
         try:
             goal = self._flat(target)
-            if np.isinf(goal).any() or np.isnan(goal).all():
+            if (np.abs(goal) > LARGEST_TARGET).any() or np.isnan(goal).all():
                 raise ValueError
             if self.observer is not None and tension is not None and stroke is not None:
                 self._observe(tension, stroke)
@@ -195,11 +196,7 @@ class Controller:
             self._before, self._known = state, None
 
     def _seek(self, goal: np.ndarray) -> None:
-        problem = self._problem
-        if np.isfinite(self._rate):
-            low = np.maximum(problem.low, self._command - self._rate)
-            high = np.minimum(problem.high, self._command + self._rate)
-            problem = problem._replace(low=np.minimum(low, high), high=high)
+        problem = limit_rate(self._problem, self._command, self._rate)
         found = meet(problem, self._before, self._command, goal, self._known)
         left = problem.search.solves - found.solves
         if found.failure is not None and left > 0:
@@ -213,6 +210,9 @@ class Controller:
             stays = begin is self._command and alone
             other = find(fewer, self._before, begin, goal, known, over_bands=stays)
             found = other._replace(solves=found.solves + other.solves)
+        found = cross_dead_bands(
+            self._problem, self._rate, self._before, self._command, goal, found, self._known
+        )
         failure, good = found.failure, found.response.converged and np.isfinite(found.error)
         code = failure.name if failure else ""
         if good:

@@ -12,6 +12,7 @@ from notchflex.control.limits import Drive, Limits
 from notchflex.control.problem_setup import ProblemOptions, make_problem, present_drives
 from notchflex.control.search.branches import Approach, approach_target
 from notchflex.control.search.problem import Attempt, Problem, TargetSearch
+from notchflex.control.search.rate import cross_dead_bands, limit_rate
 from notchflex.control.targets import Targets, make_targets
 from notchflex.errors import InputError
 from notchflex.loads import Load, LoadPath
@@ -138,18 +139,18 @@ def _follow(
     last: list[int] = []
     attempts: list[Attempt] = []
     for goal in aim.goals:
-        low = np.maximum(problem.low, np.where(problem.driven, present - rate, -np.inf))
-        high = np.minimum(problem.high, np.where(problem.driven, present + rate, np.inf))
-        chosen = problem.chosen | np.isfinite(rate)
-        near = problem._replace(low=np.minimum(low, high), high=high, chosen=chosen)
+        near = limit_rate(problem, present, rate)
         way = approach_target(near, before, present, goal, approach, known)
-        if way.via is not None:
+        attempt = way.last._replace(solves=way.solves)
+        if way.via is None:
+            attempt = cross_dead_bands(problem, rate, before, present, goal, attempt, known)
+        else:
             drives.append(way.via)
-        drives.append(way.last.drive)
+        drives.append(attempt.drive)
         last.append(len(drives) - 1)
-        attempts.append(way.last._replace(solves=way.solves))
-        if way.last.response.converged:
-            present, known = way.last.drive, way.last.response
+        attempts.append(attempt)
+        if attempt.response.converged:
+            present, known = attempt.drive, attempt.response
             before = known.state
     applied = _load_path(problem, np.array(drives))
     tolerance = problem.search.tolerance

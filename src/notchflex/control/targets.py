@@ -17,6 +17,9 @@ from notchflex.robot import Robot
 DIRECTION = "tip_direction"
 """Unit vector along the tube at the tip, in the world: the last column of `tip_rotation`."""
 
+LARGEST_TARGET = 1e9
+"""Numbers beyond this (mm, N, rad) are refused: squares of their distances have no end."""
+
 # Rows of a rotation may miss those of a true one by so much.
 _ROTATION_ERROR = 1e-6
 _FORMS = "x, y, z of the tip in mm, or names of quantities with their values"
@@ -156,6 +159,11 @@ def _checked(values: Mapping[str, np.ndarray], robot: Robot) -> Targets:
                 f"there is no target {short_repr(name)}; there are {', '.join(shapes)}"
             )
         _check_shape(name, numbers, shapes[name])
+        if (np.abs(numbers) > LARGEST_TARGET).any():
+            raise InputError.OUT_OF_RANGE(
+                f"a target of {name} is at most {LARGEST_TARGET:g} in size (mm, N, rad); "
+                f"got {np.nanmax(np.abs(numbers)):g}"
+            )
     if len({len(numbers) for numbers in values.values()}) > 1:
         raise InputError.WRONG_SHAPE(
             "all quantities need the same number of targets; got "

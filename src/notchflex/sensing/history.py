@@ -34,7 +34,8 @@ class History:
         best: What fits best, reading by reading, up to the first that does not converge.
         covariance: Of the deviations of each reading by the noise of all up to it, (m, m) each.
         alone: The same by the noise of this reading alone, (m, m) each.
-        information: Whitened slopes of each reading by the force, (m, d) each.
+        by_force: Slopes of each reading by its force, (m, d) each.
+        by_drive: Slopes of each reading by what drives the model in it, (m, t) each.
         gain: Change of each force by every unit of noise, (d, noises) each.
     """
 
@@ -43,13 +44,19 @@ class History:
     best: list[Candidate]
     covariance: list[Float[np.ndarray, "m m"]]
     alone: list[Float[np.ndarray, "m m"]]
-    information: list[Float[np.ndarray, "m d"]]
+    by_force: list[Float[np.ndarray, "m d"]]
+    by_drive: list[Float[np.ndarray, "m t"]]
     gain: list[Float[np.ndarray, "d noises"]]
+
+    @property
+    def linear(self) -> float:
+        """Largest deviation of a force that is of first order, N."""
+        return _LINEAR * self.model.largest
 
 
 def estimate(model: SensingModel, progress: Progress | None = None) -> History:
     """Find the force of every reading, one after the other; without their noise yet."""
-    history = History(model, [], [], [], [], [], [])
+    history = History(model, [], [], [], [], [], [], [])
     state, force = None, np.zeros(model.size)
     for number in range(len(model.readings)):
         step, candidate = _estimate_one(model, number, state, force)
@@ -96,7 +103,7 @@ def with_noise(history: History) -> History:
     by what the contacts remember, those after it.
     """
     model, steps, found = history.model, history.steps, history.best
-    history = History(model, steps, found, [], [], [], [])
+    history = History(model, steps, found, [], [], [], [], [])
     if not found:
         return history
     forces = np.array([one.force for one in found])
@@ -120,20 +127,25 @@ def with_noise(history: History) -> History:
                 read -= by_force[j, k][:, rows].T @ history.gain[j]
         covariance = read @ read.T
         white = whitening_of(covariance)
-        slopes = white @ by_force[k, k][:, rows].T
-        gain = _known(slopes, _LINEAR * model.largest)
+        history.by_force.append(by_force[k, k][:, rows].T)
+        history.by_drive.append(by_drive[k, k][:, rows].T)
+        slopes = white @ history.by_force[-1]
+        gain = known_inverse(slopes, history.linear)
         before = before + gain @ (white @ read - slopes @ before)
         history.covariance.append(covariance)
-        history.information.append(slopes)
         history.gain.append(before)
     return history
 
 
-def _known(slopes: Float[np.ndarray, "m d"], most: float) -> Float[np.ndarray, "d m"]:
+def known_inverse(slopes: Float[np.ndarray, "m d"], most: float) -> Float[np.ndarray, "d m"]:
     """Return the least-squares solution, without directions whose deviation exceeds `most`.
 
     There the tendons stick, or nothing is read: to first order the noise would move the force by
     any amount, while what the contacts remember of it stays within the interval.
+
+    Args:
+        slopes: Change of whitened readings by the force.
+        most: Largest deviation that counts, N.
     """
     left, values, right = np.linalg.svd(slopes, full_matrices=False)
     kept = values * most > 1.0
@@ -163,4 +175,4 @@ def _slopes_along(
     return results[0], results[1]
 
 
-__all__ = ["History", "Progress", "estimate", "whitening_of", "with_noise"]
+__all__ = ["History", "Progress", "estimate", "known_inverse", "whitening_of", "with_noise"]

@@ -2,7 +2,8 @@
 
 A model that follows the noise of a held tendon pulls it to and fro: its contacts slide to the
 largest reading and remember it. So consecutive readings that noise explains are averaged before the
-model follows them; their mean has less noise.
+model follows them; their mean has less noise. Whether the force was the same in all of them is not
+known: what each says of it is in `own_reading`.
 """
 
 from __future__ import annotations

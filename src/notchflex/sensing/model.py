@@ -35,6 +35,8 @@ class Step:
         measured: The numbers, (m,).
         entries: Which columns of the outputs these are, (m,).
         variance: Of their noise, and of what may have happened since the reading before, (m,).
+        noise: Variance of the noise of one reading, where this is a mean of several, (m,).
+        resolution: Variance of what readings can't resolve in the model, (m,).
         driving: Variance of what drives the model, (t,).
     """
 
@@ -42,6 +44,8 @@ class Step:
     measured: Float[np.ndarray, " m"]
     entries: np.ndarray
     variance: Float[np.ndarray, " m"]
+    noise: Float[np.ndarray, " m"]
+    resolution: Float[np.ndarray, " m"]
     driving: Float[np.ndarray, " t"]
 
 
@@ -79,13 +83,15 @@ class SensingModel:
         read, deviation = self.readings.read, self.readings.deviation
         count = self.readings.count[number]
         values = np.concatenate([read[name][number] for name in self.outputs])
-        variance = [
-            np.full(read[name].shape[1], deviation[name] ** 2 / count + _RESOLUTION[name] ** 2)
-            for name in self.outputs
-        ]
+        widths = [read[name].shape[1] for name in self.outputs]
         entries = np.flatnonzero(np.isfinite(values))
+        noise, resolution = (
+            np.repeat([one[name] ** 2 for name in self.outputs], widths)[entries]
+            for one in (deviation, _RESOLUTION)
+        )
         driving = self.readings.driving_deviation[number] ** 2 / count
-        return Step(number, values[entries], entries, np.concatenate(variance)[entries], driving)
+        variance = noise / count + resolution
+        return Step(number, values[entries], entries, variance, noise, resolution, driving)
 
     def load(self, steps: Iterable[int], forces: Float[np.ndarray, "k d"]) -> LoadPath:
         """Return loads: what drives the model in some readings, each with a force."""

@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
 from notchflex.sensing.bounds import Bounds
-from notchflex.sensing.history import History
 from notchflex.sensing.model import SensingModel
+from notchflex.sensing.own_reading import OwnReading
 
 # An interval this much wider than that of the noise alone is one that stuck friction leaves.
 _STUCK = 1.5
@@ -35,31 +35,33 @@ class LeftOpen:
     hidden: Float[np.ndarray, "k d"]
 
     @classmethod
-    def of(
-        cls, model: SensingModel, history: History, ends: Bounds, number: int, level: float
-    ) -> LeftOpen:
-        """Return what a reading, counted from 0, leaves open.
+    def of(cls, model: SensingModel, reading: OwnReading, ends: Bounds, level: float) -> LeftOpen:
+        """Return what a reading leaves open.
 
         Around the best force a direction may change nothing for two reasons: the readings do not
         depend on it, or the tendons stick. Only the first leaves the interval without an end.
         """
-        factor = float(np.sqrt(chi2.ppf(level, 1)))
+        number, factor = reading.number, float(np.sqrt(chi2.ppf(level, 1)))
         half = 0.5 * (ends.high[number] - ends.low[number])
-        flat = _flat(history.information[number], model.largest)
+        flat = _flat(reading.information, model.largest)
         keeps = np.eye(model.size) - flat.T @ flat
-        gain = keeps @ history.gain[number]
-        covariance, stuck, hidden = gain @ gain.T, np.zeros(model.size, bool), []
+        of_mean, more = keeps @ reading.gain, keeps @ reading.more
+        noise, beyond = of_mean @ of_mean.T, more @ more.T
+        stuck, hidden, open_ = np.zeros(model.size, bool), [], np.zeros_like(noise)
         for row in flat:
             part = np.abs(row) > _PART
             endless = bool((ends.limited[number] & part).any())
             width = model.largest if endless else float(np.abs(row) @ half) / factor
-            covariance += width**2 * np.outer(row, row)
+            open_ += width**2 * np.outer(row, row)
             if endless:
                 hidden.append(row)
             else:
                 stuck |= part
-        wide = half > _STUCK * factor * np.sqrt(np.diagonal(covariance))
+        own = noise + beyond + open_
+        wide = half > _STUCK * factor * np.sqrt(np.diagonal(own))
         rows = np.array(hidden).reshape(-1, model.size)
+        # Where noise explains the distance from the mean, the estimate is the mean.
+        covariance = noise + reading.part * beyond + open_
         return cls(covariance, stuck | (wide & ~ends.limited[number]), rows)
 
 

@@ -99,8 +99,12 @@ class Readings:
         from 0.
         """
         slack = ~(self.tension > 3.0 * self.noise.tension)
-        strokes = np.where(slack, np.nan, self.stroke)
-        return {"stroke": strokes, "tip_position": self.tip, "notch_angle": self.angles}
+        return {**self.compared, "stroke": np.where(slack, np.nan, self.stroke)}
+
+    @property
+    def compared(self) -> dict[str, Float[np.ndarray, "s m"]]:
+        """What sensors read that the model computes, by quantity."""
+        return {"stroke": self.stroke, "tip_position": self.tip, "notch_angle": self.angles}
 
     @property
     def deviation(self) -> dict[str, float]:

@@ -14,10 +14,11 @@ from notchflex.loads.external import ExternalLoad
 from notchflex.loads.validation import check_is_robot, check_number
 from notchflex.robot import Robot
 from notchflex.sensing.bounds import Bounds, bounds
-from notchflex.sensing.history import History, estimate, with_noise
+from notchflex.sensing.history import estimate, with_noise
 from notchflex.sensing.merging import merged
 from notchflex.sensing.model import SensingModel
 from notchflex.sensing.observability import LeftOpen
+from notchflex.sensing.own_reading import own_readings
 from notchflex.sensing.readings import Readings, SensorNoise, readings_of
 from notchflex.sensing.search import Candidate
 from notchflex.sensing.sensed import SensedForce
@@ -52,7 +53,8 @@ def sense(
     The history begins at rest, with slack tendons and without the force. From reading to reading
     tendons and force change in proportion. The force may come, change and go at any reading: that
     of every reading is found for itself, from the state that the readings before left. Consecutive
-    readings that noise explains are averaged first.
+    readings that noise explains are averaged before the model follows them; the force of each stays
+    its own, and so does its interval.
 
     Args:
         robot: The robot.
@@ -88,15 +90,19 @@ def sense(
     """
     check_is_robot(robot)
     sensors = SensorNoise() if noise is None else noise
-    readings, group = merged(readings_of(robot, tensions, strokes, tip, angles, sensors))
+    given = readings_of(robot, tensions, strokes, tip, angles, sensors)
+    readings, group = merged(given)
     unknown = unknown_force(robot, components, place, known)
     model = SensingModel(robot, readings, unknown, _largest(robot, readings, largest), DEFAULT)
     places: dict[int | None, float] = {}
     if place == "search":
         model, places = _best_place(model, progress)
     history = with_noise(estimate(model, _stage(progress, "finding the force")))
-    ends = bounds(history, LEVEL, _stage(progress, "finding the interval"))
-    return _result(model, history, ends, places, group)
+    own = own_readings(history, given, group)
+    ends = bounds(history, own, LEVEL, _stage(progress, "finding the interval"))
+    every = [reading for members in own for reading in members]
+    left_open = [LeftOpen.of(model, reading, ends, LEVEL) for reading in every]
+    return _result(model, history.best, ends, left_open, places, group)
 
 
 def _largest(robot: Robot, readings: Readings, largest: float | None) -> float:
@@ -145,34 +151,31 @@ def _best_place(
 
 def _result(
     model: SensingModel,
-    history: History,
+    found: list[Candidate],
     ends: Bounds,
+    left_open: list[LeftOpen],
     places: dict[int | None, float],
     group: Int[np.ndarray, " s"],
 ) -> SensedForce:
-    count, size = len(model.readings), model.size
-    found = history.best
-    left_open = [LeftOpen.of(model, history, ends, number, LEVEL) for number in range(len(found))]
-    rest = count - len(found)
+    means, count, size = len(model.readings), len(group), model.size
+    rest = count - len(left_open)
     stuck = np.array([one.stuck for one in left_open] + [np.zeros(size, bool)] * rest)
     hidden = [*(one.hidden for one in left_open), *[np.zeros((0, size))] * rest]
-    limited = np.concatenate([ends.limited, np.zeros((rest, size), bool)])
-    entries = np.array([len(model.step(number).entries) for number in range(count)])
-    covariance = [one.covariance for one in left_open]
+    entries = np.array([len(model.step(number).entries) for number in range(means)])
     return SensedForce(
         robot=model.robot,
         components=model.unknown.names,
         directions=model.unknown.directions,
-        force=_filled([one.force for one in found], (count, size))[group],
-        covariance=_filled(covariance, (count, size, size))[group],
-        low=_filled(ends.low, (count, size))[group],
-        high=_filled(ends.high, (count, size))[group],
-        limited=limited[group],
-        stuck=stuck[group],
-        misfit=_filled([one.misfit for one in found], (count,))[group],
+        force=_filled(ends.force, (count, size)),
+        covariance=_filled([one.covariance for one in left_open], (count, size, size)),
+        low=_filled(ends.low, (count, size)),
+        high=_filled(ends.high, (count, size)),
+        limited=np.concatenate([ends.limited, np.zeros((rest, size), bool)]),
+        stuck=stuck,
+        misfit=_filled([one.misfit for one in found], (means,))[group],
         read=entries[group],
-        no_force=_filled(ends.no_force, (count,))[group],
-        hidden=tuple(hidden[number] for number in group),
+        no_force=_filled(ends.no_force, (count,)),
+        hidden=tuple(hidden),
         group=group,
         place=model.unknown.body,
         places=places,

@@ -26,15 +26,18 @@ class SensedForce(Displayed):
         robot: The robot.
         components: Names of the components, such as ("x", "z"), axes of the world.
         directions: Their unit vectors in the world, (d, 3).
-        force: The force that fits best, (s, d).
+        force: The force that fits best, (s, d); of averaged readings that of the mean, moved
+            towards that of the reading by as much as noise does not explain.
         covariance: Its covariance by the noise of all readings up to it, to first order, N²,
             (s, d, d). Along a direction that changes no reading it is that of the interval.
-        low: Smallest component that fits the readings: noise and stuck friction together, (s, d).
+        low: Smallest component that fits the reading: noise and stuck friction together, (s, d);
+            also where it was averaged with others, by its own noise.
         high: Largest component that fits, (s, d).
         limited: Whether the range of the search ends the interval, not the readings, (s, d).
         stuck: Whether friction widens the interval, (s, d): within it the tendons stick, and forces
             give the same readings.
-        misfit: Sum of squares of the deviations of each reading in units of its noise, (s,).
+        misfit: Sum of squares of the deviations of each reading, or of the mean that it went into,
+            in units of its noise, (s,).
         read: How many numbers were compared in each reading, (s,).
         no_force: How much larger the misfit is, at least, where no force acts, (s,).
         hidden: Directions that are not observable at each reading, unit rows, s arrays (k, d).

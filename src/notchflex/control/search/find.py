@@ -107,7 +107,7 @@ def meet(
     if not known.converged or not np.isfinite(known.jacobian[entries]).all():
         return Attempt(start, known, error, 0.0, solves, Failure.SEARCH_STOPPED)
     if error <= search.tolerance and not redundant:
-        return _within_limits(problem, Attempt(start, known, error, 0.0, solves, None))
+        return within_limits(problem, Attempt(start, known, error, 0.0, solves, None))
     aim = DriveAim(
         entries, wanted, weights, problem.low, problem.high, problem.driven,
         search.tolerance, problem.unit, min(_ROUNDS, search.solves),
@@ -117,7 +117,7 @@ def meet(
     if not met and not (response.converged and nearest < error):
         return Attempt(start, known, error, 0.0, solves, Failure.SEARCH_STOPPED)
     failure = None if met else Failure.SEARCH_STOPPED
-    return _within_limits(problem, Attempt(drive, response, nearest, 0.0, solves, failure))
+    return within_limits(problem, Attempt(drive, response, nearest, 0.0, solves, failure))
 
 
 def _present(problem: Problem, before: np.ndarray, start: np.ndarray) -> tuple[Response, int]:
@@ -136,8 +136,13 @@ def _present(problem: Problem, before: np.ndarray, start: np.ndarray) -> tuple[R
     return known._replace(sliding=sliding), solves
 
 
-def _within_limits(problem: Problem, attempt: Attempt) -> Attempt:
-    """The attempt, which has failed where a limit is broken."""
+def within_limits(problem: Problem, attempt: Attempt) -> Attempt:
+    """Return an attempt, which has failed where a limit is broken.
+
+    Args:
+        problem: The limits.
+        attempt: What was found.
+    """
     response = attempt.response
     room = limit_rows(problem, response.values, response.jacobian)[1]
     excess = max(0.0, -float(room.min())) if room.size else 0.0

@@ -1,0 +1,89 @@
+"""Drives that may change by a rate only from target to target."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from notchflex.control.program.response import Response
+from notchflex.control.search.find import find, within_limits
+from notchflex.control.search.problem import Attempt, Problem, size_of
+from notchflex.errors import Failure
+
+# A drive that changes by less than this part of the largest stays where it is.
+_STAYS = 1e-9
+
+
+def limit_rate(problem: Problem, present: Float[np.ndarray, " t"], rate: float) -> Problem:
+    """Return the problem with drives no farther from the present ones than the rate.
+
+    Args:
+        problem: What is aimed at, and the limits.
+        present: The present drives, N or mm.
+        rate: Largest change, N or mm; infinite where there is none.
+    """
+    if not np.isfinite(rate):
+        return problem
+    low = np.maximum(problem.low, np.where(problem.driven, present - rate, -np.inf))
+    high = np.minimum(problem.high, np.where(problem.driven, present + rate, np.inf))
+    return problem._replace(
+        low=np.minimum(low, high), high=high, chosen=np.ones_like(problem.chosen)
+    )
+
+
+def cross_dead_bands(
+    problem: Problem,
+    rate: float,
+    before: Float[np.ndarray, " state"],
+    present: Float[np.ndarray, " t"],
+    goal: Float[np.ndarray, " m"],
+    found: Attempt,
+    known: Response | None = None,
+) -> Attempt:
+    """Go on through dead bands that are wider than the rate.
+
+    Within its dead band a tendon moves nothing, so a search that may not go beyond finds no reason
+    to turn it round. Here the target is sought without the rate, and tendons that stay in such a
+    band go towards what that needs, as far as the rate lets them.
+
+    Args:
+        problem: What is aimed at, and the limits, without the rate.
+        rate: Largest change of a drive, N or mm.
+        before: The state before, packed.
+        present: Its drives.
+        goal: The target; NaN where an entry is free.
+        found: What was found within the rate.
+        known: Values and slopes of the state before, where they are known.
+
+    Returns:
+        What was found, where no tendon has a dead band to cross; otherwise the state on the way,
+        which fails as `LIMITS_PREVENT`.
+    """
+    left = problem.search.solves - found.solves - 1
+    if found.failure is None or not np.isfinite(rate) or left <= 0:
+        return found
+    near = limit_rate(problem, present, rate)
+    low, high = problem.model.dead_band(before)
+    least = _STAYS * max(float(np.abs(present).max()), problem.unit)
+    waits = problem.driven & (np.abs(found.drive - present) <= least)
+    waits &= (near.low > low) | (near.high < high)
+    if not waits.any():
+        return found
+    fewer = problem._replace(search=replace(problem.search, solves=left))
+    ahead = find(fewer, before, present, goal, known)
+    found = found._replace(solves=found.solves + ahead.solves)
+    drive = np.where(waits, np.clip(ahead.drive, near.low, near.high), found.drive)
+    better = ahead.response.converged and ahead.error < found.error
+    if not better or (np.abs(drive - present) <= least).all():
+        return found
+    response = problem.model.solve(before, drive)
+    found = found._replace(solves=found.solves + 1)
+    if not response.converged:
+        return found
+    rows = np.flatnonzero(~np.isnan(goal))
+    miss = problem.weights[rows] * (response.values[problem.entries[rows]] - goal[rows])
+    error = size_of(miss)
+    failure = None if error <= problem.search.tolerance else Failure.LIMITS_PREVENT
+    return within_limits(near, Attempt(drive, response, error, 0.0, found.solves, failure))
