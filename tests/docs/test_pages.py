@@ -85,17 +85,24 @@ def test_pictures_can_be_drawn_again(tmp_path: Path, make: Any, monkeypatch: pyt
     figures = make("figures")
     monkeypatch.setattr(figures, "IMAGES", tmp_path)
     figures.main()
-    for name, draw in (("control", "three_inverses"), ("tolerances", "main")):
+    drawings = {
+        "control": ("three_inverses", "feedback", "reversal"),
+        "learning": ("two_policies",),
+        "sweep": ("main",),
+        "tolerances": ("main",),
+    }
+    for name, functions in drawings.items():
         module = make(name)
         monkeypatch.setattr(module, "IMAGES", tmp_path)
-        getattr(module, draw)()
+        for function in functions:
+            getattr(module, function)()
     for part in ("finite_elements", "drawing"):
         make(f"against_{part}").pictures(tmp_path)
     drawn = {file.name for file in tmp_path.iterdir()}
     plain = {file.name for file in (DOCS / "images").glob("*.svg")}
     compared = {"finite_elements.svg", "drawing_wrists.svg", "drawing_depth.svg"}
     assert drawn == plain | compared
-    assert len(plain) == 13
+    assert len(plain) == 17
     # A picture that changes in more than what a drawing program does has other text.
     for name in plain:
         texts = [
