@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import lru_cache
 from typing import TypeVar
 
@@ -37,7 +37,7 @@ def on_cores(
     """Work on pieces in several threads; yield the results in the order of the pieces.
 
     Only a few pieces are begun ahead, so that other callers have their turn. Closed early
-    (`contextlib.closing`), no more of them are begun.
+    (`contextlib.closing`), no more of them are begun, and those at work are waited for.
 
     Args:
         work: Function of a piece.
@@ -56,6 +56,7 @@ def on_cores(
     finally:
         for one in begun:
             one.cancel()
+        wait(begun)
 
 
 __all__ = ["number_of_cores", "on_cores"]
