@@ -44,7 +44,8 @@ goal = "maximise"
 """
 # Tells the test that a second search begins, so that the first one is kept; the verb runs as ever.
 CHILD = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in background
 import notchflex.designing.search.search as searches
 searched, begun = searches.search_from, []
 def told(*given):
