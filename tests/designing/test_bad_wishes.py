@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import random
 from pathlib import Path
 
 import pytest
 
 import notchflex as nf
+from mutations import mutated
 from notchflex.cli import run
 from notchflex.designing import read_design
 
@@ -56,32 +56,6 @@ def test_bad_wishes(name, tmp_path, wording):
     wording(f"design: {name}", str(caught.value).replace(str(tmp_path), ""))
 
 
-def mutated(seed: int) -> str:
-    """The template with lines changed, dropped, doubled or exchanged."""
-    rng = random.Random(seed)
-    lines = TEXT.splitlines()
-    junk = ["nan", "inf", "-1", "0", "1e99", '"x"', "[]", "true", "[1.0, 2.0]", "{}", "1e-9", "[["]
-    for _ in range(rng.randint(1, 4)):
-        own = [k for k, line in enumerate(lines) if line and not line.startswith("#")]
-        if not own:
-            break
-        k = rng.choice(own)
-        way = rng.randrange(5)
-        if way == 0:
-            del lines[k]
-        elif way == 1:
-            lines.insert(k, lines[k])
-        elif way == 2 and "=" in lines[k]:
-            lines[k] = f"{lines[k].partition('=')[0]}= {rng.choice(junk)}"
-        elif way == 3:
-            place = rng.randrange(len(lines[k]))
-            lines[k] = lines[k][:place] + chr(rng.randrange(32, 127)) + lines[k][place + 1 :]
-        else:
-            other = rng.choice(own)
-            lines[k], lines[other] = lines[other], lines[k]
-    return "\n".join(lines)
-
-
 @pytest.mark.parametrize(
     "seeds", [range(40), pytest.param(range(40, 300), marks=pytest.mark.nightly)]
 )
@@ -98,7 +72,7 @@ def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("notchflex.designing.design_robot.search", stop)
     refused = 0
     for seed in seeds:
-        Path("wish.toml").write_text(mutated(seed), encoding="utf-8")
+        Path("wish.toml").write_text(mutated(TEXT, seed), encoding="utf-8")
         try:
             code = run(["design", "wish.toml", "-o", "made"])
         except ReachedError:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import random
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,11 +13,12 @@ import pytest
 from scipy.stats import qmc
 
 import notchflex as nf
+from mutations import mutated
 from notchflex.cli import run
 from notchflex.sweeping.engine.sketch import Scale, Sketch
-from notchflex.sweeping.plan.reading import TEMPLATE
 from notchflex.sweeping.points import Points
 
+TEMPLATE = Path(nf.__file__).parent / "sweeping" / "plan" / "template.toml"
 TEXT = TEMPLATE.read_text(encoding="utf-8")
 
 
@@ -134,30 +134,6 @@ def test_bad_plans(name, tmp_path, wording):
     assert not (tmp_path / "swept").exists()
 
 
-def mutated(seed: int) -> str:
-    """The commented plan with lines changed, dropped, doubled or exchanged."""
-    rng = random.Random(seed)
-    lines = TEXT.splitlines()
-    junk = ["nan", "inf", "-1", "0", "1e99", '"x"', "[]", "true", "[1.0, 2.0]", "{}", "1e-9", "[["]
-    for _ in range(rng.randint(1, 4)):
-        own = [k for k, line in enumerate(lines) if line and not line.startswith("#")]
-        k = rng.choice(own)
-        way = rng.randrange(5)
-        if way == 0:
-            del lines[k]
-        elif way == 1:
-            lines.insert(k, lines[k])
-        elif way == 2 and "=" in lines[k]:
-            lines[k] = f"{lines[k].partition('=')[0]}= {rng.choice(junk)}"
-        elif way == 3:
-            place = rng.randrange(len(lines[k]))
-            lines[k] = lines[k][:place] + chr(rng.randrange(32, 127)) + lines[k][place + 1 :]
-        else:
-            other = rng.choice(own)
-            lines[k], lines[other] = lines[other], lines[k]
-    return "\n".join(lines)
-
-
 @pytest.mark.parametrize(
     "seeds", [range(30), pytest.param(range(30, 300), marks=pytest.mark.nightly)]
 )
@@ -174,7 +150,7 @@ def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys.modules["notchflex.sweeping.sweep"], "prepare_folder", stop)
     refused = 0
     for seed in seeds:
-        Path("plan.toml").write_text(mutated(seed), encoding="utf-8")
+        Path("plan.toml").write_text(mutated(TEXT, seed), encoding="utf-8")
         try:
             code = run(["sweep", "plan.toml", "-o", "swept"])
         except ReachedError:

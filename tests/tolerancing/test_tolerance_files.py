@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
-import random
 
 import numpy as np
 import pytest
 
 import notchflex as nf
+from mutations import mutated
 from notchflex.cli import run
 from refusals import refused
 
@@ -154,28 +154,6 @@ def test_a_robot_of_the_drawing_that_fails_is_named(folder):
         nf.tolerance_analysis(WRIST, "limits.toml", draws=50)
 
 
-def mutated(seed: int) -> str:
-    """The file with lines changed, dropped, doubled or exchanged."""
-    rng = random.Random(seed)
-    lines = [line for line in FILE.splitlines() if line]
-    junk = ["nan", "inf", "-1", "0", "1e99", '"x"', "[]", "true", "[1.0, 2.0]", "{}", "1e-9", "[["]
-    for _ in range(rng.randint(1, 4)):
-        k, other = rng.randrange(len(lines)), rng.randrange(len(lines))
-        way = rng.randrange(5)
-        if way == 0:
-            del lines[k]
-        elif way == 1:
-            lines.insert(k, lines[k])
-        elif way == 2 and "=" in lines[k]:
-            lines[k] = f"{lines[k].partition('=')[0]}= {rng.choice(junk)}"
-        elif way == 3:
-            place = rng.randrange(len(lines[k]))
-            lines[k] = lines[k][:place] + chr(rng.randrange(32, 127)) + lines[k][place + 1 :]
-        else:
-            lines[k], lines[other] = lines[other], lines[k]
-    return "\n".join(lines)
-
-
 @pytest.mark.parametrize(
     "seeds", [range(20), pytest.param(range(20, 300), marks=pytest.mark.nightly)]
 )
@@ -191,7 +169,7 @@ def test_300_mutated_files(seeds, folder, monkeypatch, capsys):
     monkeypatch.setattr("notchflex.tolerancing.analysis.linear_effects", stop)
     before, refusals = set(folder.iterdir()), 0
     for seed in seeds:
-        (folder / "limits.toml").write_text(mutated(seed), encoding="utf-8")
+        (folder / "limits.toml").write_text(mutated(FILE, seed), encoding="utf-8")
         try:
             code = run(["tolerance", "pacheco2021-a", "limits.toml", "--json", "found.json"])
         except AcceptedError:

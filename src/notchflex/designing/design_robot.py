@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,11 +25,11 @@ from notchflex.designing.search.robust_search import YieldOf, check_limits, robu
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.search import Searches, search
 from notchflex.designing.specification.asked import DesignConstraint
-from notchflex.designing.specification.reading import read_design, robot_of, spec_from_table
+from notchflex.designing.specification.reading import read_design, spec_from_table
 from notchflex.designing.specification.spec import DesignSpec, RobustOptions
 from notchflex.errors import InputError
 from notchflex.loads.validation import short_repr
-from notchflex.robot import Robot
+from notchflex.robot import Robot, load_robot
 from notchflex.robot.robot import remember_source, source_of
 from notchflex.robot.tolerance import Tolerance
 
@@ -125,7 +124,7 @@ def given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
         raise InputError.WRONG_TYPE(
             f"a design needs a design file, its table or a DesignSpec; got {short_repr(spec)}"
         )
-    return spec, robot or robot_of(spec, Path())
+    return spec, robot or load_robot(spec.robot)
 
 
 def made_of(spec: DesignSpec, first: Robot, problems: list[Problem], searches: Searches) -> Design:

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from notchflex.control.program.response import Response
 from notchflex.control.search.find import find, meet
 from notchflex.control.search.problem import Attempt, Problem
-from notchflex.control.search.search_point import limit_rows
+from notchflex.control.search.search_point import largest_violation, limit_rows
 from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]
@@ -201,7 +201,7 @@ def _quality(attempt: Attempt) -> tuple[bool, bool, float]:
 def _allowed(problem: Problem, response: Response) -> bool:
     """Whether a state keeps the limits."""
     room = limit_rows(problem, response.values, response.jacobian)[1]
-    return not room.size or float(room.min()) >= -_KEPT
+    return largest_violation(room) <= _KEPT
 
 
 def _keeps_limits(attempt: Attempt) -> bool:

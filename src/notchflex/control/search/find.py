@@ -13,7 +13,7 @@ from jaxtyping import Float
 from notchflex.control.program.response import DriveAim, Response
 from notchflex.control.search.damped_search import DampedSearch
 from notchflex.control.search.problem import Attempt, Problem, size_of
-from notchflex.control.search.search_point import KEPT, limit_rows
+from notchflex.control.search.search_point import KEPT, largest_violation, limit_rows
 from notchflex.errors import Failure
 
 # Damping: where a step fails, its factor after one that did, the gain above which it is lifted, and
@@ -145,7 +145,7 @@ def within_limits(problem: Problem, attempt: Attempt) -> Attempt:
     """
     response = attempt.response
     room = limit_rows(problem, response.values, response.jacobian)[1]
-    excess = max(0.0, -float(room.min())) if room.size else 0.0
+    excess = largest_violation(room)
     broken = excess > KEPT or not (attempt.drive >= problem.low).all()
     broken = broken or not (attempt.drive <= problem.high).all()
     failure = Failure.SEARCH_STOPPED if broken else attempt.failure

@@ -46,7 +46,7 @@ class SearchPoint:
     @property
     def excess(self) -> float:
         """Largest violation of a limit, as a part of it."""
-        return max(0.0, -float(self.room.min())) if self.room.size else 0.0
+        return largest_violation(self.room)
 
     @property
     def merit(self) -> float:
@@ -78,6 +78,11 @@ def limit_rows(
         rows.append((bound.side * slopes[at][given] / scale[:, None])[seen])
         room.append(left[seen])
     return np.concatenate(rows), np.concatenate(room)
+
+
+def largest_violation(room: Float[np.ndarray, " c"]) -> float:
+    """Return by how much the most violated limit is broken, as a part of it; 0 if none is."""
+    return max(0.0, -float(room.min())) if room.size else 0.0
 
 
 def penalty(room: Float[np.ndarray, " c"]) -> float:

@@ -13,7 +13,6 @@ from notchflex._jax import constant
 from notchflex.analysis.axis_points import AxisPlaces, axis_places, points_on_axis
 from notchflex.designing.model.reading import Reading
 from notchflex.designing.specification.asked import TargetCurve
-from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.robot import Robot
 
 # Points of the axis among which the nearest is searched, and how often the search narrows.
@@ -156,9 +155,3 @@ def _moved(
     size = max(float(np.abs(position).max()), float(np.abs(rotation).max()), 1e-9)
     step = _STEP / size
     return (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step)
-
-
-def change_of_lengths(before: Robot, after: Robot) -> Float[np.ndarray, " bodies"]:
-    """Return the difference of the lengths of the bodies of two robots, mm."""
-    first, second = (body_lengths(one.tube, one.notches) for one in (before, after))
-    return second - first

@@ -7,18 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from notchflex.errors import InputError
-from notchflex.results.files.writing import read_text
-from notchflex.robot.error_messages import sentences
-from notchflex.robot.reading import load_robot, parse_toml
+from notchflex.results.files.specification import read_specification, robot_named, validated
 from notchflex.robot.robot import Robot
 from notchflex.sweeping.plan.parts import SweepPlan
-
-KIND = "plan file"
-TEMPLATE = Path(__file__).with_name("template.toml")
-"""The plan file that `notchflex new --sweep` writes."""
 
 
 def read_plan(path: str | os.PathLike[str]) -> tuple[SweepPlan, Robot]:
@@ -33,17 +26,8 @@ def read_plan(path: str | os.PathLike[str]) -> tuple[SweepPlan, Robot]:
     Raises:
         InputError: The file or its robot cannot be read, or a value in it is not allowed.
     """
-    shown = os.fspath(path)
-    text = read_text(path, KIND)
-    try:
-        plan = plan_from_table(parse_toml(text, shown, KIND, InputError))
-    except InputError as error:
-        lines = str(error).splitlines()
-        said = (line if line.startswith(shown) else f"{shown}: {line}" for line in lines)
-        raise InputError("\n".join(said), error.code) from None
-    file = Path(path).parent / plan.robot
-    is_file = plan.robot.endswith(".toml") or os.sep in plan.robot
-    return plan, load_robot(file if is_file else plan.robot)
+    plan = read_specification(path, "plan file", plan_from_table)
+    return plan, robot_named(plan.robot, Path(path).parent)
 
 
 def plan_from_table(table: Mapping[str, Any]) -> SweepPlan:
@@ -59,10 +43,7 @@ def plan_from_table(table: Mapping[str, Any]) -> SweepPlan:
         >>> plan_from_table(table).rows
         7
     """
-    try:
-        return TypeAdapter(SweepPlan).validate_python(dict(table))
-    except ValidationError as error:
-        raise InputError.INVALID_SPECIFICATION("\n".join(sentences(error, SweepPlan))) from None
+    return validated(SweepPlan, table)
 
 
 def plan_table(plan: SweepPlan) -> dict[str, Any]:
