@@ -1,0 +1,55 @@
+"""Sizes that keep the sources readable: lengths of functions and numbers of parameters.
+
+Commands are excluded: their parameters are the options that `--help` shows.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import notchflex
+
+SOURCE = Path(notchflex.__file__).parents[1]
+
+MOST_LINES = 60
+"""Lines of a function without its docstring."""
+
+MOST_PARAMETERS = 10
+
+
+def _functions() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    """Every function of the sources, with its place; those of the command line's verbs excluded."""
+    for package in ("notchflex", "lanewise"):
+        for file in sorted((SOURCE / package).rglob("*.py")):
+            place = file.relative_to(SOURCE)
+            if place.parts[:3] == ("notchflex", "cli", "verbs"):
+                continue
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                    yield f"{place}:{node.lineno} {node.name}", node
+
+
+def _lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    assert function.end_lineno is not None
+    lines = function.end_lineno - function.lineno + 1
+    if (text := ast.get_docstring(function, clean=False)) is not None:
+        lines -= text.count("\n") + 1
+    return lines
+
+
+def _parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    arguments = function.args
+    named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+    return sum(one.arg not in ("self", "cls") for one in named)
+
+
+def test_functions_are_short():
+    functions = dict(_functions())
+    assert len(functions) > 3000
+    long = {place: n for place, one in functions.items() if (n := _lines(one)) > MOST_LINES}
+    assert not long, f"a function has at most {MOST_LINES} lines without its docstring; {long}"
+
+
+def test_functions_have_few_parameters():
+    many = {place: n for place, one in _functions() if (n := _parameters(one)) > MOST_PARAMETERS}
+    assert not many, f"a function has at most {MOST_PARAMETERS} parameters; {many}"
