@@ -89,7 +89,8 @@ class _Search(NamedTuple):
         viscosity: Of the next substep; 0 outside a snap.
         creep: How far contacts creep in it; 0 for contacts that stick.
         eased: Whether it starts from a shape whose contacts crept.
-        moving: Where it starts: the last solved state, or a shape on the way to the next.
+        moving: Where it starts, and what a viscosity drags on: the last solved state, or a shape
+            on the way to the next.
         predicts: Whether contacts are predicted in it, where strokes are commanded.
     """
 
@@ -99,24 +100,6 @@ class _Search(NamedTuple):
     viscosity: Float[Array, ""]
     creep: Float[Array, ""]
     eased: Bool[Array, ""]
-    moving: Iterate
-    predicts: Bool[Array, ""]
-
-
-class _Retry(NamedTuple):
-    """How a substep is tried.
-
-    Attributes:
-        viscosity: As a part of the stiffness at rest; 0 for none. None for robots that cannot snap.
-        creep: How far contacts creep.
-        moving: The point that a viscosity drags on and where the search begins. History is that of
-            the last solved state all the same: nothing on the way is remembered.
-        predicts: Whether contacts are predicted where strokes are commanded; otherwise those that
-            slid before slide on.
-    """
-
-    viscosity: Float[Array, ""] | None
-    creep: Float[Array, ""]
     moving: Iterate
     predicts: Bool[Array, ""]
 
@@ -173,60 +156,26 @@ def solve_load_step(
     may_creep = chain.tendons > 1
     most = settings.max_all_iterations * (_MORE_ITERATIONS if can_snap else 1)
 
-    def proceed(state: _Search) -> Bool[Array, ""]:
-        result, part = state.result, state.part
-        more = (part >= settings.smallest_load_step) & (state.tries < settings.max_load_steps)
+    def proceed(search: _Search) -> Bool[Array, ""]:
+        result, part = search.result, search.part
+        more = (part >= settings.smallest_load_step) & (search.tries < settings.max_load_steps)
         return ~result.converged & more & (result.iterations < most)
 
-    def substep(state: _Search) -> _Search:
-        result, part, viscosity = state.result, state.part, state.viscosity
-        first = external_first & (result.reached < _EXTERNAL_COMPLETE)
+    def substep(search: _Search) -> _Search:
+        reached = search.result.reached
+        first = external_first & (reached < _EXTERNAL_COMPLETE)
         stop = jnp.where(first, _EXTERNAL_COMPLETE, 1.0)
-        aim = jnp.minimum(result.reached + part, stop)
+        aim = jnp.minimum(reached + search.part, stop)
         towards = interpolate_command(chain, command, last, aim)
-        eases = (state.creep > 0.0) | state.eased
-        retry = _Retry(
-            viscosity if can_snap else None, state.creep, state.moving, state.predicts & ~eases
-        )
-        new = _solve_substep(chain, towards, result.solved, settings, aim, retry)
-        memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound, new.material)
-        at_aim = SolverState(new.point, memory, new.stroke, towards.applied)
-        still = viscosity == 0.0
-        creeps = state.creep > 0.0
-        solved = new.converged & still & ~creeps
-        result = LoadStepResult(
-            solved=choose(solved, at_aim, result.solved),
-            residual=new.residual,
-            iterations=result.iterations + new.iterations,
-            converged=solved & (aim >= 1.0),
-            reached=jnp.where(solved, aim, result.reached),
-            parts=result.parts + solved,
-            between=choose(solved, result.solved, result.between),
-            part_before=jnp.where(solved, state.result.reached, result.part_before),
-        )
-        eased = creeps & new.converged
-        moves = jnp.any(state.moving.unknowns.modes != state.result.solved.point.unknowns.modes)
-        begins = still & ~creeps & ~moves & ~new.converged & may_creep
-        less = jnp.where(state.creep < _LEAST_CREEP, 0.0, _LESS_CREEP * state.creep)
-        creep = jnp.where(begins, _CREEP, jnp.where(eased, less, 0.0))
-        # A snap on its way goes on under the same load.
-        halves = (still & ~begins & ~moves) | (eases & ~new.converged)
-        shorter = jnp.where(halves, 0.5 * part, part)
-        part = jnp.where(solved, 2.0 * part, shorter)
-        given_up = eases & ~new.converged
-        predicts = state.predicts
-        if can_snap:
-            waits = begins | eased
-            after = _next_viscosity(viscosity, new.converged, part)
-            viscosity = jnp.where(waits, viscosity, after)
-            given_up = given_up | (~still & ~new.converged & (viscosity == 0.0))
-            # Where one way of finding the contacts fails, the other is tried next.
-            other = (state.predicts == new.converged) & (viscosity == 0.0)
-            predicts = jnp.where(waits, predicts, other)
-        last_point = result.solved.point
-        moving = choose(given_up, last_point, choose(new.converged, new.point, state.moving))
-        return _Search(result, part, state.tries + 1, viscosity, creep, eased, moving, predicts)
+        new = _solve_substep(chain, towards, search, settings, aim, can_snap)
+        result = _result_after(search, new, towards, aim)
+        return _search_after(search, new, result, can_snap, may_creep)
 
+    return jax.lax.while_loop(proceed, substep, _begin(last)).result
+
+
+def _begin(last: SolverState) -> _Search:
+    """Return the state of the loop before the first substep, which is the whole load step."""
     start = LoadStepResult(
         solved=last,
         residual=jnp.array(jnp.inf),
@@ -239,8 +188,59 @@ def solve_load_step(
     )
     none, tries = jnp.zeros(()), jnp.zeros((), int)
     no, yes = jnp.array(False), jnp.array(True)
-    begin = _Search(start, jnp.ones(()), tries, none, none, no, last.point, yes)
-    return jax.lax.while_loop(proceed, substep, begin).result
+    return _Search(start, jnp.ones(()), tries, none, none, no, last.point, yes)
+
+
+def _result_after(
+    search: _Search, new: NewtonResult, towards: Command, aim: Float[Array, ""]
+) -> LoadStepResult:
+    """Return the result after a substep: its state counts if no viscosity or creep held it."""
+    result = search.result
+    memory = Memory(new.point.unknowns.log_ratio, new.slid, new.bound, new.material)
+    at_aim = SolverState(new.point, memory, new.stroke, towards.applied)
+    solved = new.converged & (search.viscosity == 0.0) & ~(search.creep > 0.0)
+    return LoadStepResult(
+        solved=choose(solved, at_aim, result.solved),
+        residual=new.residual,
+        iterations=result.iterations + new.iterations,
+        converged=solved & (aim >= 1.0),
+        reached=jnp.where(solved, aim, result.reached),
+        parts=result.parts + solved,
+        between=choose(solved, result.solved, result.between),
+        part_before=jnp.where(solved, result.reached, result.part_before),
+    )
+
+
+def _search_after(
+    search: _Search, new: NewtonResult, result: LoadStepResult, can_snap: bool, may_creep: bool
+) -> _Search:
+    """Return how the next substep is tried: its length, its viscosity, creep of its contacts."""
+    part, viscosity, before = search.part, search.viscosity, search.result.solved.point
+    still, creeps = viscosity == 0.0, search.creep > 0.0
+    eases = creeps | search.eased
+    solved = new.converged & still & ~creeps
+    eased = creeps & new.converged
+    moves = jnp.any(search.moving.unknowns.modes != before.unknowns.modes)
+    begins = still & ~creeps & ~moves & ~new.converged & may_creep
+    less = jnp.where(search.creep < _LEAST_CREEP, 0.0, _LESS_CREEP * search.creep)
+    creep = jnp.where(begins, _CREEP, jnp.where(eased, less, 0.0))
+    # A snap on its way goes on under the same load.
+    halves = (still & ~begins & ~moves) | (eases & ~new.converged)
+    shorter = jnp.where(halves, 0.5 * part, part)
+    part = jnp.where(solved, 2.0 * part, shorter)
+    given_up = eases & ~new.converged
+    predicts = search.predicts
+    if can_snap:
+        waits = begins | eased
+        after = _next_viscosity(viscosity, new.converged, part)
+        viscosity = jnp.where(waits, viscosity, after)
+        given_up = given_up | (~still & ~new.converged & (viscosity == 0.0))
+        # Where one way of finding the contacts fails, the other is tried next.
+        other = (search.predicts == new.converged) & (viscosity == 0.0)
+        predicts = jnp.where(waits, predicts, other)
+    last_point = result.solved.point
+    moving = choose(given_up, last_point, choose(new.converged, new.point, search.moving))
+    return _Search(result, part, search.tries + 1, viscosity, creep, eased, moving, predicts)
 
 
 def _next_viscosity(
@@ -261,30 +261,35 @@ def _next_viscosity(
 def _solve_substep(
     chain: Chain,
     command: Command,
-    solved: SolverState,
+    search: _Search,
     settings: Settings,
     aim: Array,
-    retry: _Retry,
+    can_snap: bool,
 ) -> NewtonResult:
-    """Solve for a command near a solved state, from the predicted log ratios."""
+    """Solve for a command near the last solved state, from the predicted log ratios.
+
+    The history is that of the last solved state: nothing on the way is remembered.
+    """
+    solved, moving = search.result.solved, search.moving
     memory, last_tension = solved.memory, solved.point.base_tension
     base_tension = command.either(last_tension, command.target)
     log_ratio = predict_log_ratios(chain, last_tension, base_tension, memory)
     start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
     enough = jnp.minimum(_SUBSTEP_TOLERANCE * settings.tolerance, _SUBSTEP_RESIDUAL)
     enough = jnp.where(aim < 1.0, enough, 0.0)
-    enough = jnp.where(retry.creep > 0.0, jnp.maximum(enough, _CREEPING_RESIDUAL), enough)
+    enough = jnp.where(search.creep > 0.0, jnp.maximum(enough, _CREEPING_RESIDUAL), enough)
     predicts: Bool[Array, ""] | bool = True
     if command.by_stroke is not None:
-        predicts = retry.predicts
+        # Contacts that are not predicted slide on if they slid before.
+        predicts = search.predicts & ~((search.creep > 0.0) | search.eased)
         sliding = jax.tree.map(lambda old: _SLIDES_ON * old, memory.log_ratio)
         log_ratio = choose(predicts, log_ratio, sliding)
         start = start._replace(unknowns=start.unknowns._replace(log_ratio=log_ratio))
-    moves = jnp.any(retry.moving.unknowns.modes != solved.point.unknowns.modes)
-    start = choose(moves, retry.moving, start)
-    memory = memory._replace(creep=retry.creep)
-    if retry.viscosity is not None:
-        memory = memory._replace(drag=(retry.viscosity, retry.moving.unknowns.modes))
+    moves = jnp.any(moving.unknowns.modes != solved.point.unknowns.modes)
+    start = choose(moves, moving, start)
+    memory = memory._replace(creep=search.creep)
+    if can_snap:
+        memory = memory._replace(drag=(search.viscosity, moving.unknowns.modes))
     problem = NewtonProblem(chain, command, memory, last_tension, predicts)
     return newton(problem, start, settings, enough)
 
