@@ -300,6 +300,21 @@ def stored_energy(state: SolvedState) -> Array:
     )
 
 
+@Quantity("state", per=("notch", "row", "node"))
+def flattening(state: SolvedState) -> Array:
+    """Flattening at every node: its path X, transformed moment times length, and H times length.
+
+    Zero for materials without hysteresis; see `mechanics/material/flattening.py`.
+    """
+    chain, memory = state.chain, state.solved.memory.material
+    length = chain.rods.length
+    if isinstance(memory, tuple) or chain.rods.section.ends is None:
+        return jnp.zeros((len(length), 3, 1))
+    strain = in_space(state.at.flexure.strain)
+    at = jax.vmap(jax.vmap(chain.law.flattened))(strain, chain.rods.section, memory)
+    return jnp.stack([at.path, length * at.transformed, length * at.by_transformation], axis=1)
+
+
 def _reported(source: str) -> tuple[str, ...]:
     return tuple(name for name, one in REGISTERED.items() if one.source == source)
 
