@@ -17,6 +17,7 @@ So a change of e turns (K X(kappa) - H'(e)) de to heat, nothing where there is n
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -32,12 +33,17 @@ NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
 _RULE = np.stack([NODES, WEIGHTS], axis=-1)
 # Of a section that does not flatten, 1/mm^2: small enough to add nothing, above 0.
 _LEAST_EVEN = 1e-12
+# Where s changes the transformation less than this, it is elastic.
+_LEAST_SLOPE = 1e-9
 
 
 class Bends(Protocol):
     """A material that bends a section between its ends, see `SectionLaw.bent`."""
 
-    elastic_modulus: Any
+    @property
+    def elastic_modulus(self) -> Array:
+        """Young's modulus, MPa."""
+        ...
 
     def bent(self, reduced: Array, section: FibreSection, memory: Any) -> Any:
         """Bend a section by s."""
@@ -87,9 +93,7 @@ def flattening(law: Bends, curvature: Array, section: FibreSection, memory: Any)
     own = transformed(reduced, memory)
     middle = curvature
     if not isinstance(memory, tuple):
-        held = jax.tree.map(jax.lax.stop_gradient, (law, section, reduced, own, stiffness))
-        # H does not change with kappa_m to first order, so its derivative is not needed.
-        middle = _middle(*held)
+        middle = _middle(law, section, reduced, own, stiffness)
 
     def add(total: tuple[Array, ...], node: Array) -> tuple[tuple[Array, ...], None]:
         path, elastic, transformation = total
@@ -116,13 +120,17 @@ def _along(ends: NotchEnds, curvature: Array, node: Array) -> tuple[Array, Array
 
 
 def _middle(law: Bends, section: FibreSection, start: Array, own: Array, stiffness: Array) -> Array:
-    """Curvature where loading by halfway stresses has transformed a section as much."""
+    """Curvature where loading by halfway stresses has transformed a section as much.
+
+    The last of Newton's steps is differentiated.
+    """
     ends = section.ends
     assert ends is not None
 
-    def at(reduced: Array) -> tuple[Array, Array]:
+    def beyond(
+        law: Bends, section: FibreSection, own: Array, stiffness: Array, reduced: Array
+    ) -> tuple[Array, Array]:
         bent = law.bent(reduced, section, ())
-        assert bent.slope is not None
         return reduced - bent.moment / stiffness - own, 1.0 - bent.slope / stiffness
 
     # s is largest where kappa^2 = 1 / even, and transformation takes a part of it.
@@ -130,7 +138,15 @@ def _middle(law: Bends, section: FibreSection, start: Array, own: Array, stiffne
     side = jnp.where(own < 0.0, -1.0, 1.0)
     far = side / (2.0 * root + side * ends.odd)
     least, most = jnp.minimum(own, far), jnp.maximum(own, far)
-    reduced = bracketed_root(at, jnp.clip(start, least, most), least, most)
+    varied = law, section, own, stiffness
+    bounds = jnp.clip(start, least, most), least, most
+    still, held = jax.tree.map(jax.lax.stop_gradient, (varied, bounds))
+    reduced = bracketed_root(partial(beyond, *still), *held)
+    missing, slope = beyond(*varied, reduced)
+    slope = jax.lax.stop_gradient(slope)
+    transforms = slope > _LEAST_SLOPE
+    step = jnp.where(transforms, missing / jnp.where(transforms, slope, 1.0), 0.0)
+    reduced = jnp.clip(reduced - step, *held[1:])
     # The solution of s = kappa / q before that largest one.
     linear = 1.0 - ends.odd * reduced
     square = jnp.maximum(linear**2 - 4.0 * ends.even * reduced**2, 0.0)
