@@ -35,12 +35,13 @@ def history() -> tuple[np.ndarray, np.ndarray, np.ndarray, Flattening]:
         found = LAW.respond(strain, SECTION, memory)
         return found.memory, (found.resultants[1], found.memory)
 
-    def held(strain: jax.Array, memory: Any) -> tuple[jax.Array, Flattening]:
-        return LAW.energy(strain, SECTION, memory), LAW.flattened(strain, SECTION, memory)
-
     def every(strains: np.ndarray) -> Any:
         moment, memory = jax.lax.scan(step, LAW.rest(SECTION), strains)[1]
-        return moment, memory, *jax.vmap(held)(strains, memory)
+        return (
+            moment,
+            memory,
+            *jax.vmap(lambda *at: LAW.held(at[0], SECTION, at[1]))(strains, memory),
+        )
 
     return jax.tree.map(np.asarray, jax.jit(every)(CURVATURE[:, None] * bending(1.0)))
 

@@ -139,25 +139,25 @@ class SectionLaw(Pytree, ABC):
         The area under the moment over the curvature, and the elastic rest. Of a law with
         hysteresis it is what fibres, ends and flattening hold; the rest of the area is dissipated.
         """
+        return self.held(strain, section, memory)[0]
+
+    def held(
+        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
+    ) -> tuple[Float[Array, ""], Flattening]:
+        """Energy stored per length, and the flattening whose change with the memory costs work."""
         others = 0.5 * jnp.where(_WEAK, 0.0, self.elastic(strain, section)) @ strain
         ends, curvature = section.ends, strain[1]
         if ends is None:
-            return others + self.bending_energy(curvature, section, memory)
+            own = self.bending_energy(curvature, section, memory)
+            return others + own, Flattening.none(curvature)
         bending = self.bent(curvature / ends.flattening(curvature), section, memory)
         held = (1.0 + ends.material_share * ends.weak) * self.bending_energy(
             bending.curvature, section, memory
         )
         rigidity = self.elastic_modulus * section.second_moment_weak
         held += 0.5 * (1.0 - ends.material_share) * ends.weak * bending.moment**2 / rigidity
-        return others + held + flattening(self, curvature, section, memory).energy
-
-    def flattened(
-        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
-    ) -> Flattening:
-        """Flattening of a section under given strains; its change with the memory costs work."""
-        if section.ends is None:
-            return Flattening.none(strain[1])
-        return flattening(self, strain[1], section, memory)
+        flat = flattening(self, curvature, section, memory)
+        return others + held + flat.energy, flat
 
     def elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Float[Array, " 6"]:
         """Resultants by the moduli of the free robot."""
