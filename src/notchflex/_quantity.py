@@ -28,6 +28,7 @@ _SIZES = {
     "axis": "3",
     "span": "spans",
     "contact": "contacts",
+    "node": "nodes",
 }
 """The size of every axis that a quantity may have."""
 
@@ -49,7 +50,7 @@ class Quantity:
         column: The CSV column; `{tendon}`, `{notch}`, `{axis}` and `{span}` are filled in.
             "" where it has no column.
         per: What its entries stand for within one step, outermost first: "tendon", "notch",
-            "body", "axis", "span", "contact", "row". Empty for a single number.
+            "body", "axis", "span", "contact", "row", "node". Empty for a single number.
         after: Name of the quantity that it follows in tables; "" for the first place, None for the
             last.
         in_world: Whether the formula's vectors or rotations, which are in the frame of the base,

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from margins import Margin
 from notchflex._jax import jax
 
 NITINOL = nf.Nitinol(10_000.0, 280.0, 3_000.0, unloading_stress=120.0)
 FREE = nf.Frictionless()
 WRIST = dataclasses.replace(nf.load_robot("pacheco2021-a"), material=NITINOL, friction=FREE)
+NOTCH = nf.ArcNotch("on-axis", depth=1.4, height=0.8, uncut_length=1.2, repeat=5, ends="shell")
+FLATTENS = dataclasses.replace(WRIST, notch=(NOTCH,), material=nf.Nitinol(unloading_stress=150.0))
 TENSIONS = [0.8, 1.6, 1.0, 0.5, 0.8, 1.2, 0.8, 0.5, 0.9, 1.6, 0.0]
 
 
@@ -181,10 +184,6 @@ def test_derivatives_where_friction_holds_a_notch(margin) -> None:
 
 def test_no_loop_gains_work_where_notches_flatten() -> None:
     """Flattening and hysteresis together: back and forth over the same strokes costs work."""
-    notch = nf.ArcNotch("on-axis", depth=1.4, height=0.8, uncut_length=1.2, repeat=5, ends="shell")
-    robot = dataclasses.replace(
-        WRIST, notch=(notch,), material=nf.Nitinol(unloading_stress=150.0), friction=FREE
-    )
     random, steps, begins = np.random.default_rng(5), [], []
     last = 0.0
     for _ in range(12):
@@ -193,18 +192,41 @@ def test_no_loop_gains_work_where_notches_flatten() -> None:
         for first, then in ((last, low), (low, high), (high, low)):
             steps += np.linspace(first, then, 13)[1:].tolist()
         last = low
-    path = nf.simulate(robot, [nf.Load(stroke=one) for one in steps])
+    path = nf.simulate(FLATTENS, [nf.Load(stroke=one) for one in steps])
     assert path.converged.all(), path.reason
-    work = path.tendon_work[:, 0]
-    not_stored = work - path.stored_energy - path.material_dissipation.sum(axis=-1)
     loops = []
     for begin in begins:
         # The second time round the loop is closed: up to `high` and back to `low`.
         there = slice(begin - 1, begin + 24)
         again = [nf.Load(stroke=one) for one in steps[there][1:] * 2]
-        twice = nf.simulate(robot, again, from_state=path.state_at(begin - 1))
+        twice = nf.simulate(FLATTENS, again, from_state=path.state_at(begin - 1))
         loops.append(twice.tendon_work[-1, 0] - twice.tendon_work[23, 0])
         np.testing.assert_allclose(twice.notch_angle[-1], twice.notch_angle[23], atol=1e-8)
     assert min(loops) >= -1e-9
     assert max(loops) > 1e-3
-    assert not_stored[-1] > -1e-9
+    assert (np.diff(path.material_dissipation.sum(axis=-1)) > -1e-9).all()
+
+
+@pytest.mark.parametrize(
+    "friction",
+    [FREE, pytest.param(nf.Capstan(0.13), marks=pytest.mark.nightly)],
+    ids=["frictionless", "capstan"],
+)
+def test_work_is_stored_or_lost_where_notches_flatten(
+    friction: nf.Capstan | nf.Frictionless, margin: Margin
+) -> None:
+    """Flattening and hysteresis together: what is missing falls with the square of the steps."""
+    robot = dataclasses.replace(FLATTENS, friction=friction)
+    corners = [0.0, 1.7, 0.7, 1.3, 0.3, 1.6, 0.4]
+    missing = []
+    for count in (40, 160):
+        parts = [np.linspace(*pair, count + 1)[1:] for pair in itertools.pairwise(corners)]
+        path = nf.simulate(robot, [nf.Load(stroke=float(one)) for one in np.concatenate(parts)])
+        assert path.converged.all(), path.reason
+        lost = path.material_dissipation.sum(axis=-1) + np.nansum(path.dissipation, axis=(1, 2))
+        balance = path.tendon_work[:, 0] - path.stored_energy - lost
+        missing.append(balance / path.tendon_work.max())
+    coarse, fine = missing[0], missing[1][3::4]
+    margin.within("balance, part of the work", missing[1], 5e-5)
+    margin.within("the same without steps, extrapolated", (16.0 * fine - coarse) / 15.0, 1e-6)
+    assert np.abs(coarse).max() > 12.0 * np.abs(fine).max()  # 16 by the trapezoid rule

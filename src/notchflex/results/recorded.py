@@ -18,6 +18,9 @@ REPORTED = (*Shape._fields, *STATE)
 BEFORE = ("tension", "stroke", "span_tension", "contact_slid")
 """What is needed of the state before the first one: work is integrated from there."""
 
+FLATTENING = "flattening"
+"""What the loss of flattening is counted from, of every state; for materials that remember."""
+
 MATERIAL = "material"
 """Memory of the material in that state, where it has any."""
 
@@ -30,7 +33,7 @@ class Recorded:
         solved: The last solved state at each load.
         reported: What is reported of each state, by the names of `REPORTED`.
         first: What is reported of the state before the first load, by the names of `BEFORE`;
-            and the memory of the material, as `MATERIAL`.
+            the memory of the material, as `MATERIAL`, and `FLATTENING`.
         held: Smallest eigenvalue of every stiffness, and the sign of its determinant.
         residual: Largest scaled imbalance of the last attempt.
         iterations: Newton iterations.

@@ -2,8 +2,17 @@
 
 from notchflex._packages import import_all
 from notchflex.mechanics.material.fibre_section import Fibres, FibreSection, NotchEnds
+from notchflex.mechanics.material.flattening import Flattening
 from notchflex.mechanics.material.law import Response, SectionLaw, section_law
 
 import_all(__name__, __path__)
 
-__all__ = ["FibreSection", "Fibres", "NotchEnds", "Response", "SectionLaw", "section_law"]
+__all__ = [
+    "FibreSection",
+    "Fibres",
+    "Flattening",
+    "NotchEnds",
+    "Response",
+    "SectionLaw",
+    "section_law",
+]

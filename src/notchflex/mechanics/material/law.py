@@ -25,7 +25,9 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import array_module, constant, jax, jnp
 from notchflex._pytree import Pytree
-from notchflex.mechanics.material.fibre_section import FibreSection, NotchEnds
+from notchflex.mechanics.material.fibre_section import FibreSection
+from notchflex.mechanics.material.flattening import Flattening, flattening
+from notchflex.mechanics.material.root import bracketed_root
 
 
 class Response(NamedTuple):
@@ -63,11 +65,6 @@ class Bending(NamedTuple):
 
 # Of all strains and resultants those of weak-axis bending.
 _WEAK = np.arange(6) == 1
-_POINTS, _TWICE = np.polynomial.legendre.leggauss(64)
-NODES, WEIGHTS = 0.5 + 0.5 * _POINTS, 0.5 * _TWICE
-"""Gauss's rule on 0 ... 1."""
-# A bilinear law takes three iterations, one with a plastic branch more.
-_ITERATIONS = 20
 
 
 class SectionLaw(Pytree, ABC):
@@ -142,32 +139,25 @@ class SectionLaw(Pytree, ABC):
         The area under the moment over the curvature, and the elastic rest. Of a law with
         hysteresis it is what fibres, ends and flattening hold; the rest of the area is dissipated.
         """
+        return self.held(strain, section, memory)[0]
+
+    def held(
+        self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
+    ) -> tuple[Float[Array, ""], Flattening]:
+        """Energy stored per length, and the flattening whose change with the memory costs work."""
         others = 0.5 * jnp.where(_WEAK, 0.0, self.elastic(strain, section)) @ strain
         ends, curvature = section.ends, strain[1]
         if ends is None:
-            return others + self.bending_energy(curvature, section, memory)
+            own = self.bending_energy(curvature, section, memory)
+            return others + own, Flattening.none(curvature)
         bending = self.bent(curvature / ends.flattening(curvature), section, memory)
         held = (1.0 + ends.material_share * ends.weak) * self.bending_energy(
             bending.curvature, section, memory
         )
         rigidity = self.elastic_modulus * section.second_moment_weak
         held += 0.5 * (1.0 - ends.material_share) * ends.weak * bending.moment**2 / rigidity
-        return others + held + self._flattening_energy(curvature, section, ends)
-
-    def _flattening_energy(
-        self, curvature: Float[Array, ""], section: FibreSection, ends: NotchEnds
-    ) -> Float[Array, ""]:
-        """Work of the moment beyond that on fibres and ends: of Phi kappa q' / q^2 over kappa."""
-
-        def add(total: Array, node: Array) -> tuple[Array, None]:
-            at = node[0] * curvature
-            q, slope = ends.flattening(at), ends.odd + 2.0 * ends.even * at
-            moment = self.bent(at / q, section, ()).moment
-            return total + node[1] * curvature * moment * at * slope / q**2, None
-
-        return jax.lax.scan(
-            add, jnp.zeros_like(curvature), constant(np.stack([NODES, WEIGHTS], -1))
-        )[0]
+        flat = flattening(self, curvature, section, memory)
+        return others + held + flat.energy, flat
 
     def elastic(self, strain: Float[Array, " 6"], section: FibreSection) -> Float[Array, " 6"]:
         """Resultants by the moduli of the free robot."""
@@ -205,26 +195,10 @@ def _between_ends(law: SectionLaw, section: FibreSection, reduced: Array) -> Flo
     def at(curvature: Array) -> tuple[Array, Array]:
         return jax.jvp(partial(_imbalance, *still), (curvature,), (jnp.ones_like(curvature),))
 
-    def improve(_: int, search: tuple[Array, ...]) -> tuple[Array, ...]:
-        curvature, least, most, last = search
-        beyond, slope = at(curvature)
-        least = jnp.where(beyond <= 0.0, curvature, least)
-        most = jnp.where(beyond >= 0.0, curvature, most)
-        step = -beyond / slope
-        new = curvature + step
-        good = (new >= least) & (new <= most) & (jnp.abs(step) <= 0.5 * last)
-        new = jnp.where(good, new, 0.5 * (least + most))
-        return new, least, most, jnp.abs(new - curvature)
-
     # A section that carries nothing leaves the whole curvature to the part that follows it.
     far = aim / (1.0 + ends.material_share * ends.weak)
-    start = (
-        aim / (1.0 + ends.weak),
-        jnp.minimum(far, 0.0),
-        jnp.maximum(far, 0.0),
-        2.0 * jnp.abs(far),
-    )
-    found = jax.lax.fori_loop(0, _ITERATIONS, improve, start)[0]
+    least, most = jnp.minimum(far, 0.0), jnp.maximum(far, 0.0)
+    found = bracketed_root(at, aim / (1.0 + ends.weak), least, most)
     return found - _imbalance(law, section, reduced, found) / at(found)[1]
 
 

@@ -14,7 +14,8 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jnp
 from notchflex.mechanics.material.fibre_section import FibreSection
-from notchflex.mechanics.material.law import NODES, WEIGHTS, SectionLaw, section_law
+from notchflex.mechanics.material.flattening import NODES, WEIGHTS
+from notchflex.mechanics.material.law import SectionLaw, section_law
 from notchflex.robot import Superelastic
 
 

@@ -155,7 +155,7 @@ def _loads_from(text: str) -> tuple[Any, ...]:
 def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
     import jax.tree_util as tree_util
 
-    from notchflex.results.recorded import BEFORE, MATERIAL, REPORTED
+    from notchflex.results.recorded import BEFORE, FLATTENING, MATERIAL, REPORTED
     from notchflex.results.state import leaf_name
 
     run = path.run
@@ -174,6 +174,7 @@ def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
         yield _START + name, run.before(name)
     if not isinstance(run.solved.memory.material, tuple):
         yield _START + MATERIAL, run.before(MATERIAL)
+        yield _START + FLATTENING, run.before(FLATTENING)
     for key, leaf in tree_util.tree_flatten_with_path(run.solved)[0]:
         yield _STATE + leaf_name(key), np.asarray(leaf)
 
@@ -183,7 +184,7 @@ def _path_of(record: Record) -> EquilibriumPath:
 
     from notchflex.loads import LoadPath
     from notchflex.results.path import EquilibriumPath
-    from notchflex.results.recorded import BEFORE, MATERIAL, REPORTED, Recorded
+    from notchflex.results.recorded import BEFORE, FLATTENING, MATERIAL, REPORTED, Recorded
     from notchflex.results.state import leaf_name
     from notchflex.robot import robot_from_text
     from notchflex.solver.newton import Settings
@@ -211,7 +212,12 @@ def _path_of(record: Record) -> EquilibriumPath:
         name = _STATE + leaf_name(key)
         state.append(_of_shape(arrays[name], (steps, *np.shape(leaf)), name))
     turned = bool(load.base_rotation.any())
-    reported = {name: arrays[_key(name, turned)] for name in REPORTED}
+    # Older files do not count the loss of flattening.
+    unflattened = np.zeros((steps, ready.chain.flexures, 3, 1))
+    reported = {
+        name: arrays.get(name, unflattened) if name == FLATTENING else arrays[_key(name, turned)]
+        for name in REPORTED
+    }
     for name, values in reported.items():
         _of_shape(values, (steps, *values.shape[1:]), name)
     run = {
@@ -223,6 +229,10 @@ def _path_of(record: Record) -> EquilibriumPath:
     if not isinstance(at_rest, tuple):  # older files do not have it
         material = arrays.get(_START + MATERIAL, np.asarray(at_rest))
         first[MATERIAL] = _of_shape(material, np.shape(at_rest), _START + MATERIAL)
+        flat = reported[FLATTENING].shape[1:]
+        first[FLATTENING] = _of_shape(
+            arrays.get(_START + FLATTENING, np.zeros(flat)), flat, _START + FLATTENING
+        )
     # Older files do not have it, nor do those of robots that cannot snap need it.
     notches = (steps, ready.chain.flexures)
     snapped = _of_shape(arrays.get(_SNAPPED, np.zeros(notches)), notches, _SNAPPED)

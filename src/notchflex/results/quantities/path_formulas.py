@@ -50,18 +50,21 @@ def dissipation(path: EquilibriumPath) -> np.ndarray:
 @Quantity("path", "dissipation of the material", "D_j", "N mm", per=("notch",),
           after="dissipation",
           note="Half the width of the hysteresis of every fibre times the change of its "
-          "transformed strain, from step to step. Zero for materials without hysteresis."
+          "transformed strain, from step to step. Where the notch flattens, the loss of flattening "
+          "is added by the trapezoid rule. Zero for materials without hysteresis."
           )  # fmt: skip
 def material_dissipation(path: EquilibriumPath) -> np.ndarray:
     """Energy that the material of a notch has turned to heat since the start of the path."""
     chain, after = path.chain, path.run.solved.memory.material
     if isinstance(after, tuple):  # no memory
         return np.zeros((len(path), chain.flexures))
-    first = path.run.before("material")
-    before = np.broadcast_to(first, after.shape)
-    if not path.each_from_rest:
-        before = np.concatenate([before[:1], after[:-1]])
+    before, after = _before_and_after(path, after, "material")
     loss = np.sum(chain.law.dissipated(chain.rods.section, before, after) * chain.rods.length, -1)
+    flat_before, flat_after = _before_and_after(
+        path, path.solver_quantity("flattening"), "flattening"
+    )
+    shift, change = 0.5 * (flat_before + flat_after), flat_after - flat_before
+    loss = loss + np.sum(shift[..., 0, :] * change[..., 1, :] - change[..., 2, :], axis=-1)
     return loss if path.each_from_rest else np.cumsum(loss, axis=0)
 
 
@@ -155,16 +158,22 @@ def _accumulated(path: EquilibriumPath, force: str, length: str) -> np.ndarray:
     """Integrate a force over a length by the trapezoid rule, from the state before the path on."""
     pairs: list[tuple[np.ndarray, ...]] = []
     for name in (force, length):
-        after, first = path.solver_quantity(name), path.run.before(name)[None]
-        earlier = np.broadcast_to(first, after.shape)
-        if not path.each_from_rest:
-            earlier = np.concatenate([first, after[:-1]])
-        pairs.append((earlier, after))
+        pairs.append(_before_and_after(path, path.solver_quantity(name), name))
     if force == "span_tension":  # what a contact takes is the drop from span to span
         pairs[0] = tuple(value[..., :-1] - value[..., 1:] for value in pairs[0])
     (force_before, force_after), (length_before, length_after) = pairs
     work = 0.5 * (force_before + force_after) * (length_after - length_before)
     return work if path.each_from_rest else np.cumsum(work, axis=0)
+
+
+def _before_and_after(
+    path: EquilibriumPath, after: np.ndarray, name: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return values before and after every step of a path."""
+    first = path.run.before(name)[None]
+    if path.each_from_rest:
+        return np.broadcast_to(first, after.shape), after
+    return np.concatenate([first, after[:-1]]), after
 
 
 def friction_front(

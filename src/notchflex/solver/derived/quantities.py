@@ -280,9 +280,7 @@ def bend_possible(state: SolvedState) -> Array:
 def stored_energy(state: SolvedState) -> Array:
     """Elastic energy held by flexures, lips that press and stretched tendons."""
     chain, base_tension = state.chain, state.solved.point.base_tension
-    strain = in_space(state.at.flexure.strain)
-    memory = state.solved.memory.material
-    density = jax.vmap(jax.vmap(chain.law.energy))(strain, chain.rods.section, memory)
+    density, _ = state.held
     in_gap, beside_body = state.tensions
     in_tendons = in_gap**2 * state.by_tendon("natural_gap")
     in_tendons = in_tendons + beside_body**2 * state.by_tendon("body_length")
@@ -298,6 +296,20 @@ def stored_energy(state: SolvedState) -> Array:
         + 0.5 * jnp.sum(in_tendons * state.by_tendon("visits") * state.compliance)
         + 0.5 * jnp.sum(base_tension**2 * chain.free_length / chain.axial_stiffness)
     )
+
+
+@Quantity("state", per=("notch", "row", "node"))
+def flattening(state: SolvedState) -> Array:
+    """Flattening at every node: its path X, transformed moment times length, and H times length.
+
+    Zero for materials without hysteresis; see `mechanics/material/flattening.py`.
+    """
+    chain, memory = state.chain, state.solved.memory.material
+    length = chain.rods.length
+    if isinstance(memory, tuple) or chain.rods.section.ends is None:
+        return jnp.zeros((len(length), 3, 1))
+    _, at = state.held
+    return jnp.stack([at.path, length * at.transformed, length * at.by_transformation], axis=1)
 
 
 def _reported(source: str) -> tuple[str, ...]:

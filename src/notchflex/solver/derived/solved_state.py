@@ -11,6 +11,7 @@ from notchflex._quantity import REGISTERED
 from notchflex.loads.applied import BodyLoads, body_wrench
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import FlexureState, in_space, relative_pose
+from notchflex.mechanics.material import Flattening
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
 from notchflex.solver.body_poses import body_poses
 from notchflex.solver.continuation import SolverState
@@ -69,6 +70,12 @@ class SolvedState:
     def curvature(self) -> Float[Array, "n nodes"]:
         """Curvature in the plane of every notch."""
         return in_space(self.at.flexure.strain)[..., 1]
+
+    @cached_property
+    def held(self) -> tuple[Float[Array, "n nodes"], Flattening]:
+        """Energy per length and flattening at every node of every notch."""
+        strain, memory = in_space(self.at.flexure.strain), self.solved.memory.material
+        return jax.vmap(jax.vmap(self.chain.law.held))(strain, self.chain.rods.section, memory)
 
     @cached_property
     def turning(self) -> tuple[Array, Array]:
