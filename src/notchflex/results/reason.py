@@ -10,6 +10,7 @@ from jaxtyping import Int
 
 from notchflex._jax import constant, jax
 from notchflex.errors import Failure
+from notchflex.robot import ArcNotch
 from notchflex.solver.actuation import closing_stroke
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import run
@@ -20,6 +21,8 @@ if TYPE_CHECKING:  # for the type only: a path tells its reasons
 # A stroke is followed up to the last good state before the last notch closes, which leaves it
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
+# Steps that come to where the edges of a tendon's channel meet end within this part of the height.
+_EDGES_MEET = 1e-2
 # Axial stiffnesses, in forces that close a notch, each ten times the one before. Where nothing but
 # stretch lets a tendon be drawn so far, the second step changes its tension about ten times as much
 # as the first; where the shape fixes the tension, a tenth as much.
@@ -50,6 +53,8 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
         return _said(Failure.STROKE_OUT_OF_REACH, last, tendon=held[0])
     if held:
         return _said(Failure.STROKES_CONTRADICT, last, tendons=" and ".join(held))
+    if (met := _edges_that_meet(path, step)) is not None:
+        return _said(Failure.TENDON_EDGES_MEET, last, tendon=met[0] + 1, notch=met[1] + 1)
     reached, left = 100.0 * float(path.run.reached[step]), float(path.residual[step])
     return _said(Failure.NO_EQUILIBRIUM, last, percent=reached, residual=left)
 
@@ -63,6 +68,32 @@ def _past_closing(path: EquilibriumPath, step: int) -> bool:
     reach = closing_stroke(path.chain)
     inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
     return bool((inextensible & (path.load.stroke[step] >= reach)).any())
+
+
+def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:
+    """Return a straight tendon and an arc notch, from 0, that leaves it no free length.
+
+    Lips that yield to their force let a notch close farther; a tendon away from the lips then comes
+    to where its span has no direction.
+    """
+    if path.chain.contact_flexibility is None:
+        return None
+    place, turn = path.body_position[step], path.body_rotation[step]
+    faces = np.asarray(path.chain.body_length)[:, None] * np.array([0.0, 0.0, 1.0])
+    notches = path.robot.notches
+    for number, tendon in enumerate(path.robot.tendon):
+        if tendon.path != "straight":
+            continue
+        side = np.radians(tendon.direction_deg)
+        channel = tendon.radius * np.array([np.cos(side), np.sin(side), 0.0])
+        enters = place + turn @ channel
+        leaves = place + np.einsum("bij,bj->bi", turn, faces + channel)
+        free = np.linalg.norm(enters[1:] - leaves[:-1], axis=1)
+        for notch in range(tendon.end_body or len(notches)):
+            one = notches[notch]
+            if isinstance(one, ArcNotch) and free[notch] < _EDGES_MEET * one.height:
+                return number, notch
+    return None
 
 
 def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:
