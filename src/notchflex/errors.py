@@ -61,8 +61,8 @@ class Failure(_Coded):
         "command other strokes, or a tension, or give the tendons a finite axial_stiffness",
     )
     TENDON_EDGES_MEET = (
-        "the edges of tendon {tendon}'s channel meet in notch {notch}, which is closed and pressed "
-        "together: the tendon has no free length left there, and the model does not go farther",
+        "the edges of tendon {tendon}'s channel meet in notch {notch}: the tendon has no free "
+        "length left there, and the model does not go farther",
         "take smaller loads, or a tendon nearer to the axis",
     )
     NO_EQUILIBRIUM = (

@@ -6,11 +6,14 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
+from numpy.linalg import norm
+from numpy.typing import ArrayLike
 
 from notchflex._jax import constant, jax
 from notchflex.errors import Failure
-from notchflex.robot import ArcNotch
+from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.tendon.straight import Straight
 from notchflex.solver.actuation import closing_stroke
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import run
@@ -21,8 +24,8 @@ if TYPE_CHECKING:  # for the type only: a path tells its reasons
 # A stroke is followed up to the last good state before the last notch closes, which leaves it
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
-# Steps that come to where the edges of a tendon's channel meet end within this part of the height.
-_EDGES_MEET = 1e-2
+# Steps that come to where the edges of a tendon's channel meet end within this part of its span.
+_EDGES_MEET = 5e-2
 # Axial stiffnesses, in forces that close a notch, each ten times the one before. Where nothing but
 # stretch lets a tendon be drawn so far, the second step changes its tension about ten times as much
 # as the first; where the shape fixes the tension, a tenth as much.
@@ -71,29 +74,33 @@ def _past_closing(path: EquilibriumPath, step: int) -> bool:
 
 
 def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:
-    """Return a straight tendon and an arc notch, from 0, that leaves it no free length.
+    """Return a straight tendon and a notch, from 0, whose faces leave it no free length.
 
-    Lips that yield to their force let a notch close farther; a tendon away from the lips then comes
-    to where its span has no direction.
+    Where the edges of its channel meet before the lips of the notch do, the span between them has
+    no direction, and beyond it would push. Yielding lips let a closed notch come there.
     """
-    if path.chain.contact_flexibility is None:
-        return None
+    chain = path.chain
     place, turn = path.body_position[step], path.body_rotation[step]
-    faces = np.asarray(path.chain.body_length)[:, None] * np.array([0.0, 0.0, 1.0])
-    notches = path.robot.notches
-    for number, tendon in enumerate(path.robot.tendon):
-        if tendon.path != "straight":
+    for group in chain.groups:
+        if not isinstance(group, Straight):
             continue
-        side = np.radians(tendon.direction_deg)
-        channel = tendon.radius * np.array([np.cos(side), np.sin(side), 0.0])
-        enters = place + turn @ channel
-        leaves = place + np.einsum("bij,bj->bi", turn, faces + channel)
-        free = np.linalg.norm(enters[1:] - leaves[:-1], axis=1)
-        for notch in range(tendon.end_body or len(notches)):
-            one = notches[notch]
-            if isinstance(one, ArcNotch) and free[notch] < _EDGES_MEET * one.height:
-                return number, notch
+        leaves, enters = (_in_space(chain, one) for one in (group.leaves, group.enters))
+        runs, natural = np.asarray(group.runs), np.asarray(group.natural_gap)
+        for (notch, one), before in np.ndenumerate(np.asarray(group.back)):
+            at, anchor = notch + 1, notch + 1 - int(before)
+            entered = place[at] + turn[at] @ enters[notch, one]
+            left = place[anchor] + turn[anchor] @ leaves[notch, one]
+            if runs[notch, one] and norm(entered - left) < _EDGES_MEET * natural[notch, one]:
+                return group.numbers[one], notch
     return None
+
+
+def _in_space(chain: Chain, points: ArrayLike) -> Float[np.ndarray, "n t 3"]:
+    """Points of the tendons in the frames of the bodies."""
+    points = np.asarray(points)
+    if chain.frame is None:
+        return points
+    return np.insert(points, 1, 0.0, axis=-1) @ np.asarray(chain.frame).T
 
 
 def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:
