@@ -1,4 +1,4 @@
-"""Random robots and random paths of loads: `draws(count, seed)`.
+"""Random robots and random paths of loads: `draw(number, seed, shape)`.
 
 Robots are drawn within what `nf.Robot` accepts, tubes of 0.5 to 10 mm, a tenth of the numbers from
 a wider range than is usual. Loads are sized by the robot (drawn_loads.py).
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from drawn_loads import Numbers, Size, drawn_loads
 from drawn_materials import drawn_material, softened
-from shapes import DRAWN, SHAPES, Rope, Shape
+from shapes import DRAWN, Rope, Shape
 
 import notchflex as nf
 
@@ -29,19 +29,6 @@ class Draw(NamedTuple):
     shape: Shape
     robot: nf.Robot
     loads: tuple[nf.Load, ...]
-
-
-def draws(count: int, seed: int, shapes: tuple[Shape, ...] = SHAPES) -> Iterator[Draw]:
-    """Draw robots with loads, the shapes in turn; number i is the same whatever the count.
-
-    Args:
-        count: How many robots.
-        seed: Of the random numbers.
-        shapes: The shapes to draw from, each as often as the others.
-    """
-    for number in range(count):
-        shape = shapes[number % len(shapes)]
-        yield draw(number, seed, shape)
 
 
 def draw(number: int, seed: int, shape: Shape) -> Draw:

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from acting import State
-from numpy.polynomial.legendre import leggauss
-from shells import outer_depth
+from shells import nodes, outer_depth
 
 import notchflex as nf
 
@@ -77,10 +76,10 @@ def _pieces(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places from the neutral axis and areas of many pieces of a section."""
     outer, inner, depth = tube.outer_radius, tube.inner_radius, outer_depth(notch, tube)
-    points, weights = leggauss(_FINE)
+    points, weights = nodes(_FINE)
     if notch.cut == "on-axis":
         half = np.arccos((depth - outer) / outer)
-        through, weighs = leggauss(12)
+        through, weighs = nodes(12)
         radius = 0.5 * (outer + inner) + 0.5 * (outer - inner) * through
         place = np.outer(radius, np.cos(0.5 * half * (1.0 + points))).ravel()
         size = np.outer(radius * weighs, weights).ravel()

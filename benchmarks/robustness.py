@@ -11,8 +11,9 @@ With `--drawn` the shapes are those of a drawing: elastic ends, fibres, memory o
 
 Draw i of a seed is the same whatever the count; `--first I --count 1` runs it alone if the shape
 is left to its number, and `--first I` goes on where a run was stopped. Exit code 1: something
-silent or wrong. The first robot of a shape compiles its program, which is no part of the times;
-putting a robot's arrays together is, in the first step.
+silent or wrong. Shapes are judged one after the other, and the robots of a shape share their
+programs. The first robot of a shape compiles one, which is no part of the times; putting a robot's
+arrays together is, in the first step.
 """
 
 from __future__ import annotations
@@ -27,11 +28,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from draw import Draw, draws
+from draw import Draw, draw
 from judge import plain, wrong
-from shapes import DRAWN, SHAPES
+from shapes import DRAWN, SHAPES, Shape
 
 import notchflex as nf
+from notchflex.analysis.solve import prepare_for
+from notchflex.loads.load_path import load_path
+from notchflex.mechanics.chain import Chain
+from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.programs.static_structure import StaticStructure
 
 # What a solved state must tell as finite numbers; gap and contact tables have NaN where nothing is.
 FINITE = (
@@ -105,6 +111,21 @@ def follow(one: Draw) -> Iterator[Outcome]:
         state = path.state
 
 
+def share_programs(every: list[Draw]) -> None:
+    """Let robots of a shape share programs, by constants that all of them have.
+
+    Otherwise the programs would know that a robot has no precurvature, or no base, and another
+    robot would need a program of its own.
+    """
+    chains: dict[PytreeLayout, list[Chain]] = {}
+    for one in every:
+        path = load_path(one.loads, one.robot.number_of_tendons)
+        long = prepare_for(one.robot, path).long
+        chains.setdefault(long.chain_layout, []).append(long.chain)
+    for layout, alike in chains.items():
+        StaticStructure.of(layout, alike, np.stack([layout.pack(chain) for chain in alike]))
+
+
 def warm(one: Draw) -> float:
     """Compile the program of a draw's shape; its time, s."""
     start = time.perf_counter()
@@ -150,13 +171,28 @@ def show(rows: Iterable[dict]) -> None:
             print(f"{one['shape']}: {count} x {reason}")
 
 
-def told(outcomes: list[Outcome], names: dict[int, str]) -> None:
+def judged(every: list[Draw], shape: Shape) -> tuple[list[Outcome], float]:
+    """Follow all draws of a shape; what came of them, and the time to compile, s."""
+    share_programs(every)
+    compiled = warm(every[0])
+    outcomes = []
+    for one in every:
+        found = list(follow(one))
+        outcomes += found
+        told(found, shape.name)  # at once: a run that is stopped loses nothing
+        print(f"\r{one.number:6}  {shape.name:24}", end="", file=sys.stderr)
+    show([row(shape.name, outcomes)])
+    sys.stdout.flush()
+    return outcomes, compiled
+
+
+def told(outcomes: list[Outcome], name: str) -> None:
     """Print every state that is silent, wrong or not solved, with what reproduces it."""
     for one in outcomes:
         what = [*one.silent, *one.wrong, *([one.reason] if one.reason else [])]
         if what:
             kind = "silent" if one.silent else "wrong" if one.wrong else "unsolved"
-            place = f"draw {one.number} ({names[one.number]}) step {one.step}"
+            place = f"draw {one.number} ({name}) step {one.step}"
             print(f"{kind}: {place}: {what[0]}", flush=True)
             for more in what[1:]:
                 print(f"    {more}", flush=True)
@@ -173,21 +209,14 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="write rows and every state that is not good")
     given = parser.parse_args()
     shapes = DRAWN if given.drawn else SHAPES
-    outcomes: dict[str, list[Outcome]] = {shape.name: [] for shape in shapes}
-    names: dict[int, str] = {}
+    outcomes: dict[str, list[Outcome]] = {}
     compiled: dict[str, float] = {}
     last = given.first + given.count
-    for one in draws(last, given.seed, shapes):
-        name = one.shape.name
-        if one.number < given.first or given.shape not in (None, name):
-            continue
-        if name not in compiled:
-            compiled[name] = warm(one)
-        names[one.number] = name
-        found = list(follow(one))
-        outcomes[name] += found
-        told(found, names)  # at once: a run that is stopped loses nothing
-        print(f"\r{one.number + 1} of {last}  {name:24}", end="", file=sys.stderr)
+    for number, shape in enumerate(shapes):
+        numbers = range(number, last, len(shapes))
+        every = [draw(one, given.seed, shape) for one in numbers if one >= given.first]
+        if every and given.shape in (None, shape.name):
+            outcomes[shape.name], compiled[shape.name] = judged(every, shape)
     print(file=sys.stderr)
     every = sorted((one for some in outcomes.values() for one in some), key=lambda o: o.number)
     rows = [row(name, some) for name, some in outcomes.items() if some]

@@ -59,6 +59,12 @@ class Ring(NamedTuple):
     length: float
 
 
+@lru_cache(maxsize=16)
+def nodes(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights of Gauss and Legendre, kept: several hundred take a fifth of a second."""
+    return leggauss(count)
+
+
 def rings(robot: nf.Robot, length: np.ndarray, i: int) -> tuple[Ring, Ring]:
     """The rings before and behind a notch, by the lengths of the bodies, mm."""
     last = i == len(robot.notches) - 1
@@ -142,9 +148,9 @@ def outer_depth(notch: nf.ArcNotch, tube: nf.Tube) -> float:
 
 def _edge_loads(radius: float, wall: float, half: float, arc: nf.Section) -> np.ndarray:
     """Harmonics of (N, −M) of bending, bending sideways and tension, (3, harmonics, 2)."""
-    points, weights = leggauss(200)
+    points, weights = nodes(200)
     at, of = half * points, half * weights
-    through, weighs = leggauss(3)
+    through, weighs = nodes(3)
     through, weighs = 0.5 * wall * through, 0.5 * wall * weighs
     stresses = (
         ((radius + through) * np.cos(at)[:, None] - float(arc.centroid))

@@ -118,3 +118,18 @@ def test_failures_have_a_code(wrist, tmp_path):
     assert caught.value.code is nf.Failure.NOT_TRIED
     nf.save_path(path, tmp_path / "path.json")
     assert nf.read_path(tmp_path / "path.json").reason_code == path.reason_code
+
+
+def test_a_tendon_without_free_length_is_named():
+    notch = nf.ArcNotch("on-axis", 1.6, 0.7, uncut_length=3.5, ends="shell", closing="elastic")
+    robot = nf.Robot(
+        name="pressed together",
+        tube=nf.Tube(3.5, 3.0),
+        notch=(notch,),
+        tendon=(nf.Tendon(1.44, path="straight"),),
+        material=nf.Linear(60000.0),
+        friction=nf.Capstan(0.1),
+    )
+    path = nf.simulate(robot, [nf.Load(tension=600.0), nf.Load(tension=3000.0)])
+    assert path.reason_code == ["", "TENDON_EDGES_MEET"]
+    assert "tendon 1's channel meet in notch 1" in path.reason[1]

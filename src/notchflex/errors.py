@@ -60,6 +60,11 @@ class Failure(_Coded):
         "tendons be drawn so far at once, so they fix no tension",
         "command other strokes, or a tension, or give the tendons a finite axial_stiffness",
     )
+    TENDON_EDGES_MEET = (
+        "the edges of tendon {tendon}'s channel meet in notch {notch}: the tendon has no free "
+        "length left there, and the model does not go farther",
+        "take smaller loads, or a tendon nearer to the axis",
+    )
     NO_EQUILIBRIUM = (
         "no equilibrium found beyond {percent:.3g} % of the way from the state before (imbalance "
         "{residual:.2g})",

@@ -77,6 +77,36 @@ def test_snaps_are_the_jumps_that_finer_steps_leave(friction):
     assert path.snap.any()
 
 
+def test_a_snap_just_before_closing_is_counted():
+    # Its limit point is 1.2 deg before the notch closes, the step 26 deg long.
+    robot = wrist(0.25452297579661787, plateau_stress=209.47417, plateau_modulus=2912.877286)
+    loads = [nf.Load(tension=one) for one in (0.42525, 0.85051, 1.27577)]
+    path = nf.simulate(robot, loads)
+    np.testing.assert_array_equal(path.snap, [[0] * 5, [0] * 5, [1, 0, 0, 0, 0]])
+    assert jumps(path, 2)[0]
+
+
+@pytest.mark.nightly
+def test_coarse_steps_that_end_elsewhere_are_warned_of():
+    random, parts = np.random.default_rng(5), 20
+    for number in range(300):
+        robot = random_wrist(random)
+        most, steps = random.uniform(1.0, 5.0), int(random.integers(3, 40))
+        way = np.linspace(0.0, most, steps)
+        way = np.append(way, way[-2::-1])
+        fine_way = np.interp(np.arange(parts * (len(way) - 1) + 1) / parts, range(len(way)), way)
+        coarse, fine = (
+            nf.simulate(robot, [nf.Load(tension=one) for one in some.tolist()])
+            for some in (way, fine_way)
+        )
+        assert coarse.converged.all()
+        assert fine.converged.all()
+        off = np.abs(np.degrees(coarse.notch_angle - fine.notch_angle[::parts])).max(axis=1)
+        # What a snap did to the friction stays. Below, friction is as fine as its steps.
+        warned = np.logical_or.accumulate((coarse.snap != 0).any(axis=1) | ~coarse.stable)
+        assert warned[off > 1.0].all(), number
+
+
 def test_snaps_are_kept_in_files(cycle, tmp_path):
     nf.save_path(cycle, tmp_path / "cycle.json")
     np.testing.assert_array_equal(nf.read_path(tmp_path / "cycle.json").snap, cycle.snap)

@@ -6,10 +6,14 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
+from numpy.linalg import norm
+from numpy.typing import ArrayLike
 
 from notchflex._jax import constant, jax
 from notchflex.errors import Failure
+from notchflex.mechanics.chain import Chain
+from notchflex.mechanics.tendon.straight import Straight
 from notchflex.solver.actuation import closing_stroke
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import run
@@ -20,6 +24,8 @@ if TYPE_CHECKING:  # for the type only: a path tells its reasons
 # A stroke is followed up to the last good state before the last notch closes, which leaves it
 # open by less than this part of its height.
 _NEARLY_CLOSED = 1e-3
+# Steps that come to where the edges of a tendon's channel meet end within this part of its span.
+_EDGES_MEET = 5e-2
 # Axial stiffnesses, in forces that close a notch, each ten times the one before. Where nothing but
 # stretch lets a tendon be drawn so far, the second step changes its tension about ten times as much
 # as the first; where the shape fixes the tension, a tenth as much.
@@ -50,6 +56,8 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
         return _said(Failure.STROKE_OUT_OF_REACH, last, tendon=held[0])
     if held:
         return _said(Failure.STROKES_CONTRADICT, last, tendons=" and ".join(held))
+    if (met := _edges_that_meet(path, step)) is not None:
+        return _said(Failure.TENDON_EDGES_MEET, last, tendon=met[0] + 1, notch=met[1] + 1)
     reached, left = 100.0 * float(path.run.reached[step]), float(path.residual[step])
     return _said(Failure.NO_EQUILIBRIUM, last, percent=reached, residual=left)
 
@@ -63,6 +71,36 @@ def _past_closing(path: EquilibriumPath, step: int) -> bool:
     reach = closing_stroke(path.chain)
     inextensible = np.isinf(np.asarray(path.chain.axial_stiffness))
     return bool((inextensible & (path.load.stroke[step] >= reach)).any())
+
+
+def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:
+    """Return a straight tendon and a notch, from 0, whose faces leave it no free length.
+
+    Where the edges of its channel meet before the lips of the notch do, the span between them has
+    no direction, and beyond it would push. Yielding lips let a closed notch come there.
+    """
+    chain = path.chain
+    place, turn = path.body_position[step], path.body_rotation[step]
+    for group in chain.groups:
+        if not isinstance(group, Straight):
+            continue
+        leaves, enters = (_in_space(chain, one) for one in (group.leaves, group.enters))
+        runs, natural = np.asarray(group.runs), np.asarray(group.natural_gap)
+        for (notch, one), before in np.ndenumerate(np.asarray(group.back)):
+            at, anchor = notch + 1, notch + 1 - int(before)
+            entered = place[at] + turn[at] @ enters[notch, one]
+            left = place[anchor] + turn[anchor] @ leaves[notch, one]
+            if runs[notch, one] and norm(entered - left) < _EDGES_MEET * natural[notch, one]:
+                return group.numbers[one], notch
+    return None
+
+
+def _in_space(chain: Chain, points: ArrayLike) -> Float[np.ndarray, "n t 3"]:
+    """Points of the tendons in the frames of the bodies."""
+    points = np.asarray(points)
+    if chain.frame is None:
+        return points
+    return np.insert(points, 1, 0.0, axis=-1) @ np.asarray(chain.frame).T
 
 
 def _drawn_by_stretch_alone(path: EquilibriumPath, step: int) -> Int[np.ndarray, " some"]:

@@ -57,7 +57,7 @@ def snapped_notches(chain: Chain, before: SolverState, after: SolverState) -> Fl
             apart = jnp.where(jnp.any(touches, axis=-1), 0.0, apart)
         return resists, drives, apart
 
-    parts = constant(np.linspace(0.0, 1.0, _SHAPES))
+    parts = constant(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _SHAPES)))
     none = jnp.zeros(())
     resists, drives, apart = jax.lax.scan(lambda _, part: (none, hold(part)), none, parts)[1]
     driven = jnp.abs(drives) > 0.0
