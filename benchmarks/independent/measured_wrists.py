@@ -1,12 +1,13 @@
 """The law of the tube on the measured wrists, written again: what moves eq. 17, and by how much.
 
-    python benchmarks/independent/measured_wrists.py FOLDER [--only NAME] [--left-out]
+    python benchmarks/independent/measured_wrists.py FOLDER [--only NAME] [--left-out] [--profile]
 
 Notch after notch from the base, without the solver: a table of the moment over the angle, the
 capstan law, and the smallest angle that holds the tension. FOLDER has the measured angles of
 Pacheco 2021. Five constants are fitted (material, friction, a factor of the force of wrist A) by
 a search without derivatives, once for every variant of the law. `--left-out` also predicts each
-wrist from a fit to the two others.
+wrist from a fit to the two others; `--profile` fits a factor for every wrist and prints the errors
+of the total by load and pull.
 Lengths of the ends and flattening are the library's; tests compare them with a reference.
 """
 
@@ -225,14 +226,35 @@ def search(
     return sum(float(np.linalg.norm(one)) for one in found.values()), best * scale, found
 
 
+def profile(folder: Path, data: Data) -> None:
+    """Print errors of the total angle by load, and their means by pull, with seven constants."""
+    variant = Variant()
+    value, constants, _ = search(variant, data, "ABC")
+    print(f"a factor for each wrist: eq. 17 {value:.3f} at {np.round(constants, 4)}")
+    for (wrist, (force, seen)), factor in zip(data.items(), constants[4:], strict=True):
+        with (folder / f"pacheco2021_wrist_{wrist}_measured.csv").open(encoding="utf-8") as lines:
+            pull = np.array([row["trial"] for row in csv.DictReader(lines)])
+        found = angles(notches(wrist, variant), variant, force, constants[:4], float(factor))
+        off, part = (found - seen)[:, -1], np.clip(force / force.max(), 0.0, 1.0)
+        for low in (0.0, 0.25, 0.5, 0.75):
+            here = (part >= low) & ((part < low + 0.25) | (low == 0.75))
+            means = [f"{np.mean(off[here & (pull == one)]):+.1f}" for one in np.unique(pull[here])]
+            rms = np.sqrt(np.mean(off[here] ** 2))
+            print(f"  {wrist}, from {low}: rms {rms:.1f} deg, pulls {', '.join(means)}", flush=True)
+
+
 def main() -> None:
     """Print eq. 17 and the wrists left out of every variant."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", choices=VARIANTS)
     parser.add_argument("--left-out", action="store_true")
+    parser.add_argument("--profile", action="store_true")
     given = parser.parse_args()
     data = read(given.folder)
+    if given.profile:
+        profile(given.folder, data)
+        return
     for name, variant in VARIANTS.items():
         if given.only not in (None, name):
             continue
