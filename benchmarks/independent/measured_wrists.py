@@ -30,8 +30,9 @@ WRISTS = {
     "B": ((1.40,) * 5, 0.5, 1.5),
     "C": ((1.36, 1.39, 1.42, 1.45), 1.0, 1.0),
 }
-SCALE = np.array([1e4, 100.0, 1e3, 0.1, 1.0, 1.0])
-START = np.array([3.06, 2.6, 8.5, 1.7, 1.07, 1.0])
+SCALE = np.array([1e4, 100.0, 1e3, 0.1])
+START = np.array([3.06, 2.6, 8.5, 1.7])
+FACTORS = {"A": 1.05, "B": 1.0, "C": 0.97}
 PRIOR = 0.05
 FACES = 0.086  # of the angle of the ends; the library's rule
 
@@ -207,7 +208,7 @@ def search(
             for wrist, (force, seen) in data.items()
         }
 
-    scale = SCALE[: 4 + len(factors)]
+    scale = np.append(SCALE, np.ones(len(factors)))
 
     def cost(scaled: np.ndarray) -> float:
         values = scaled * scale
@@ -218,7 +219,7 @@ def search(
             sizes += 0.01 * 0.5 * float(np.sum(((values[4:] - 1.0) / PRIOR) ** 2))
         return sizes
 
-    best = START[: len(scale)]
+    best = np.append(START, [FACTORS[wrist] for wrist in factors])
     for tries, fine in ((700, 1e-3), (500, 1e-4)):
         options = {"maxfev": tries, "xatol": fine, "fatol": 0.1 * fine, "adaptive": True}
         best = minimize(cost, best, method="Nelder-Mead", options=options).x
