@@ -113,7 +113,8 @@ def find_roots(
         precision: Relative precision of a root.
 
     Returns:
-        The roots, and whether each is known: to that precision, or to 1e-3 where the solver fails nearby.
+        The roots, and whether each is known: to that precision, or to 1e-3 where the solver
+        fails nearby.
     """
     searched = low < high
     at_low, at_high = overlap(low, searched), overlap(high, searched)
