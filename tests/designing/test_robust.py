@@ -133,9 +133,13 @@ def test_derivatives_of_quantiles_and_of_the_yield(holds):
 def test_a_robust_wrist_closes_tip_first():
     """The closings of all draws are found in one batch: one by one they took 50 s a round."""
     spec = tip_first() | {
-        "tolerance": {"notch.depth": {"sd": 0.001, "per_notch": True}},
+        "tolerance": {
+            "notch.depth": {"sd": 0.001, "per_notch": True},
+            "material.elastic_modulus": "0.5 %",
+            "friction.coefficient": {"plus": "5 %", "minus": "5 %"},
+        },
         "search": {"starts": 1},
-        "robust": {"wanted_yield": 0.9, "draws": 1000},
+        "robust": {"wanted_yield": 0.95},
     }
     order, limits, *others = spec["constraint"]
     limits = limits | {"lower": 1.3, "upper": 1.7}
@@ -148,12 +152,12 @@ def test_a_robust_wrist_closes_tip_first():
     assert process_time() - begin < 120.0
     assert made.converged, made.reason
     of_all = made.yields[0]
-    assert of_all.interval[0] >= 0.9 > 0.5 > of_all.plain
+    assert of_all.interval[0] >= 0.95 > 0.1 > of_all.plain
     # Other draws, each closed by itself.
     sources = sources_of(made.robot, made.robot.replace(tolerance=spec["tolerance"]).tolerance)
     drawn = VariedRobots(
         made.robot,
-        values_at(sources, np.random.default_rng(3).uniform(1e-6, 1.0 - 1e-6, (200, len(sources)))),
+        values_at(sources, np.random.default_rng(3).uniform(1e-6, 1.0 - 1e-6, (60, len(sources)))),
     )
     tension = np.array([nf.closing(one).tension for one in drawn])
     good = (np.diff(tension, axis=1) <= 0.0).all(axis=1) & (tension >= 1.3).all(axis=1)
