@@ -1,10 +1,11 @@
 """Tolerances of a wrist: gradients against draws, time of the draws, coverage of the interval.
 
-Prints a table; about two minutes on two cores. `python benchmarks/tolerances.py`
+Prints a table; 40 s of CPU. `python benchmarks/tolerances.py`
 """
 
 from __future__ import annotations
 
+import sys
 import time
 
 import numpy as np
@@ -29,7 +30,7 @@ SHOP = {
     "material.elastic_modulus": "5 %",
     "friction.coefficient": {"plus": "20 %", "minus": "20 %"},
 }
-REPETITIONS, EACH = 1600, 64
+REPETITIONS, EACH = 400, 64
 
 
 def study_of(tolerances: dict, *limits: nf.AcceptanceLimit) -> Study:
@@ -79,12 +80,12 @@ def coverage(study: Study) -> None:
     count = len(study.sources)
     parts = [study.at_levels(many.random((250_000, count))).accepted.mean() for _ in range(8)]
     truth = float(np.mean(parts))
-    held, width = 0, 0.0
-    for repetition in range(REPETITIONS):
-        levels = np.concatenate(list(replicates(count, EACH, 1000 + repetition)))
-        accepted = study.at_levels(levels).accepted.reshape(-1, EACH).sum(axis=1)
-        low, high = yield_interval(accepted, EACH)
-        held, width = held + (low <= truth <= high), width + (high - low)
+    # All repetitions in one batch: a call of its own for each costs more than its solves.
+    levels = [np.concatenate(list(replicates(count, EACH, 1000 + k))) for k in range(REPETITIONS)]
+    accepted = study.at_levels(np.concatenate(levels)).accepted.reshape(REPETITIONS, -1, EACH)
+    ends = np.array([yield_interval(one.sum(axis=1), EACH) for one in accepted])
+    held = int(np.sum((ends[:, 0] <= truth) & (truth <= ends[:, 1])))
+    width = float(np.sum(ends[:, 1] - ends[:, 0]))
     plain = 2.0 * 1.96 * np.sqrt(truth * (1.0 - truth) / (25 * EACH))
     print(
         f"yield {100 * truth:.2f} %; its interval of {25 * EACH} draws holds it in "
@@ -95,4 +96,5 @@ def coverage(study: Study) -> None:
 
 if __name__ == "__main__":
     against_draws()
+    sys.stdout.flush()
     coverage(time_of_draws())

@@ -7,6 +7,8 @@ import pytest
 
 import notchflex as nf
 from notchflex.analysis.closing_loads.search import closing_tensions
+from notchflex.analysis.closing_loads.varied import closing_tensions_of
+from notchflex.robot.varied import VariedRobots
 
 YORK = nf.load_robot("york2015")
 
@@ -36,7 +38,7 @@ def test_the_solver_passes_where_lips_just_meet(notch):
 def overlap_of(roots, failing):
     """Overlaps that rise through zero at given tensions, with a kink, and NaN where it fails."""
 
-    def overlap(tension):
+    def overlap(tension, _asked):
         rise = tension - roots
         value = np.where(rise > 0.0, 5.0 * rise, 0.2 * rise)
         bad = np.zeros(len(tension), bool)
@@ -68,7 +70,7 @@ def test_a_kink_where_false_position_crawls():
     """The overlap of a notch that closes falls back to a lower slope: 100 trials were too few."""
     root = np.array([1.2699152222578])
 
-    def overlap(tension):
+    def overlap(tension, _asked):
         steep, flat = 1.63 * (tension - root), 0.6 * (tension - root)
         return np.where(tension > root, flat, np.where(tension < 0.9, 0.97 * tension - 1.23, steep))
 
@@ -81,7 +83,7 @@ def test_a_kink_where_false_position_crawls():
 def test_closings_take_few_solves(slope):
     counts = []
 
-    def overlap(tension):
+    def overlap(tension, _asked):
         counts.append(1)
         return np.where(tension > 1.27, slope, 1.0) * (tension - 1.27)
 
@@ -93,9 +95,9 @@ def test_what_is_not_found_is_told_from_never():
     roots = np.array([1.0, 1000.0, 2.0, 1000.0])
     own = np.array([False, False, False, True])
 
-    def overlap(tension):
+    def overlap(tension, _asked):
         # The third fails around its root, the last from 20 N on.
-        value = overlap_of(roots, [])(tension)
+        value = overlap_of(roots, [])(tension, None)
         around = (np.abs(tension - 2.0) < 0.5) & (roots == 2.0)
         return np.where(around | (own & (tension > 20.0)), np.nan, value)
 
@@ -105,7 +107,7 @@ def test_what_is_not_found_is_told_from_never():
 
 
 def test_a_robot_whose_solver_always_fails_has_no_closing_found():
-    tension, status = closing_tensions(lambda tension: np.full(len(tension), np.nan), np.ones(2))
+    tension, status = closing_tensions(lambda tension, _: np.full(len(tension), np.nan), np.ones(2))
     assert list(status) == ["not found"] * 2
     assert np.isnan(tension).all()
 
@@ -124,7 +126,7 @@ def test_kinks_and_jumps_of_any_size_are_found():
     below, above = 10.0 ** random.uniform(-4.0, 4.0, (2, 500))
     jump = np.where(random.random(500) < 0.2, random.uniform(0.01, 2.0, 500), 0.0)
 
-    def overlap(tension):
+    def overlap(tension, _asked):
         rise = tension - roots
         return np.where(rise > 0.0, above * rise + jump, below * rise)
 
@@ -154,3 +156,22 @@ def test_every_notch_of_these_wrists_closes(depth, radius, tube):
     path = nf.solve_each(robot, [nf.Load(tension=float(one)) for one in beside.ravel()])
     closed = path.closed.reshape(5, 2, 5)
     assert [closed[number, :, number].tolist() for number in range(5)] == [[False, True]] * 5
+
+
+def test_closings_of_many_robots_are_those_of_each(wrist):
+    """A depth over which the first notch closes first or last."""
+    depth = wrist.notches[0].depth * np.linspace(0.985, 1.015, 300)
+    friction = 0.13 * (1.0 + 0.2 * np.sin(np.arange(300)))
+    numbers = {"notch[1].depth": depth, "friction.coefficient": friction}
+    robots = VariedRobots(wrist, numbers)
+    found = closing_tensions_of(robots)
+    for row in range(0, 300, 50):
+        assert found[row] == pytest.approx(nf.closing(robots[row]).tension, rel=1e-5)
+    assert (found.argmin(axis=1) != found[0].argmin()).any()
+
+
+def test_closings_of_robots_without_polynomials_are_found_one_by_one():
+    robots = VariedRobots(YORK, {"notch[1].depth": YORK.notches[0].depth * np.array([0.99, 1.0])})
+    found = closing_tensions_of(robots)
+    assert found[1] == pytest.approx(nf.closing(YORK).tension, rel=1e-9)
+    assert found[0, 0] > found[1, 0]

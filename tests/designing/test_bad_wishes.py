@@ -56,10 +56,37 @@ def test_bad_wishes(name, tmp_path, wording):
     wording(f"design: {name}", str(caught.value).replace(str(tmp_path), ""))
 
 
-@pytest.mark.parametrize(
-    "seeds", [range(40), pytest.param(range(40, 300), marks=pytest.mark.nightly)]
+ROBUST = (
+    TEXT.replace("# [robust]", "[robust]")
+    .replace("# wanted_yield = 0.95", "wanted_yield = 0.95")
+    .replace("# [tolerance]", "[tolerance]")
+    .replace("# notch.depth = {", "notch.depth = {")
+    .replace("# material.elastic_modulus", "material.elastic_modulus")
 )
-def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
+SECOND = '[[objective]]\nquantity = "total_angle"\nstate = "pulled"\ngoal = "maximise"\n\n'
+FRONT = TEXT.replace("# --- What must hold", f"{SECOND}# --- What must hold")
+KINDS = {
+    "plain": (TEXT, ()),
+    "robust": (ROBUST, ()),
+    "verb": (TEXT, ("--robust",)),
+    "front": (FRONT, ("--front",)),
+}
+NIGHTLY = pytest.mark.nightly
+
+
+@pytest.mark.parametrize(
+    ("kind", "seeds"),
+    [
+        ("plain", range(40)),
+        pytest.param("plain", range(40, 300), marks=NIGHTLY),
+        ("robust", range(10)),
+        pytest.param("robust", range(10, 300), marks=NIGHTLY),
+        pytest.param("verb", range(300, 400), marks=NIGHTLY),
+        ("front", range(10)),
+        pytest.param("front", range(10, 300), marks=NIGHTLY),
+    ],
+)
+def test_300_mutated_files(kind, seeds, tmp_path, monkeypatch, capsys):
     """Each is refused, or asks for a design; none ends in a traceback, and none writes a file."""
     monkeypatch.chdir(tmp_path)
 
@@ -70,11 +97,13 @@ def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
         raise ReachedError
 
     monkeypatch.setattr("notchflex.designing.design_robot.search", stop)
+    monkeypatch.setattr("notchflex.designing.front._spread", stop)
+    text, options = KINDS[kind]
     refused = 0
     for seed in seeds:
-        Path("wish.toml").write_text(mutated(TEXT, seed), encoding="utf-8")
+        Path("wish.toml").write_text(mutated(text, seed), encoding="utf-8")
         try:
-            code = run(["design", "wish.toml", "-o", "made"])
+            code = run(["design", "wish.toml", "-o", "made", *options])
         except ReachedError:
             continue
         out, err = capsys.readouterr()

@@ -14,6 +14,7 @@ from notchflex.export.simulators.joint_model import joint_model
 from notchflex.export.simulators.mjcf import mjcf
 from notchflex.export.simulators.mujoco_run import measure_errors
 from notchflex.export.simulators.options import SimulatorOptions
+from notchflex.export.simulators.springs import fit_spring
 from refusals import refused
 
 mujoco: Any = pytest.importorskip("mujoco", reason="needs the extra robotics")
@@ -101,6 +102,16 @@ def test_the_file_states_the_error_that_is_measured(written, wrist, loop):
     assert total < 2.0 * measured.total_angle + 0.002
     assert notch < 2.0 * measured.notch_angle + 0.004
     assert abs(area) < measured.loop_area + 0.01
+
+
+def test_equal_samples_of_two_pulls_do_not_spoil_a_spring():
+    """The export of the two-axis wrist ended with "SVD did not converge"."""
+    angle = np.repeat(np.linspace(0.0, 0.4, 20), 3)
+    rising = np.repeat([1.0, -1.0], 60)
+    angle = np.concatenate([angle, angle])
+    with np.errstate(all="raise", under="ignore"):
+        spring = fit_spring(angle, 2.0 * angle, rising, 2.0)
+    assert spring.moment(angle) == pytest.approx(2.0 * angle, abs=1e-9)
 
 
 @pytest.mark.nightly

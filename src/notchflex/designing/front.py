@@ -113,8 +113,8 @@ def design_front(
         )
     if asked.is_robust:
         raise InputError.UNSUPPORTED(
-            "a front is of robots as drawn: leave out `robust` and `wanted_yield`, and make the "
-            "point that you choose robust."
+            "a front is of robots as drawn: leave out `robust` and `wanted_yield`, then name the "
+            "point that you choose as `robot` of the design file and make that one robust."
         )
     if points < 2 or generations < 1:
         raise InputError.OUT_OF_RANGE("a front needs 2 points and 1 generation or more")

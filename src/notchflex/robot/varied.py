@@ -23,7 +23,9 @@ _MOST_CORNERS = 1024
 class VariedRobots(Sequence[Robot]):
     """Robots made of one robot and numbers of its own for each: a robot is made when asked for.
 
-    Batches take the numbers as arrays and make no robot for each row.
+    Batches take the numbers as arrays and make no robot for each row: their results differ from
+    those of the single robots by 1e-9 of the largest, and by 1e-5 with elastic ends and tolerances
+    of a quarter of the wall (1e-6 beyond 2,000 robots). Where that matters, give a list of robots.
 
     Example:
         >>> from notchflex.robot import load_robot

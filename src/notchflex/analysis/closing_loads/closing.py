@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from notchflex._summary import Displayed, Summary, short
 from notchflex.analysis.closing_loads.search import (
@@ -142,7 +142,7 @@ def _tensions(
     # Always as many rows as notches, whichever are searched: one compiled program.
     which, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 
-    def overlap(tension: Float[np.ndarray, " m"]) -> np.ndarray:
+    def overlap(tension: Float[np.ndarray, " m"], _: Bool[np.ndarray, " m"]) -> np.ndarray:
         value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[which]] = np.resize(tension, chain.flexures)
         force, gap, converged = solve_contacts(
@@ -196,7 +196,7 @@ def _by_one_tendon(
         return overlap[back, notches], angle[back, notches]
 
     low, high = (np.where(closes, steps[step], steps[-1]) for step in (after - 1, after))
-    tension, precise = find_roots(lambda tension: at(tension)[0], low, high)
+    tension, precise = find_roots(lambda tension, _: at(tension)[0], low, high)
     _, angle = at(tension)
     closed = closes & precise & np.isfinite(angle)
     failed = ~np.isfinite(overlap[:, notches]).all(axis=0)

@@ -13,8 +13,11 @@ from enum import StrEnum
 import numpy as np
 from jaxtyping import Bool, Float
 
-Overlap = Callable[[Float[np.ndarray, " m"]], Float[np.ndarray, " m"]]
-"""From one tension per notch to its overlap (mm); NaN where the solve did not converge."""
+Overlap = Callable[[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]], Float[np.ndarray, " m"]]
+"""From one tension per notch, and which notches are asked for, to their overlaps (mm).
+
+NaN where the solve did not converge. What it gives of the other notches is not read.
+"""
 
 
 class ClosingStatus(StrEnum):
@@ -35,7 +38,9 @@ class ClosingStatus(StrEnum):
 _DOUBLINGS = 6
 # Trials between a tension that leaves a notch open and one where the solver fails.
 _TRIALS = 12
-_PRECISION = 1e-11  # relative, of the tension
+PRECISION = 1e-11
+"""Relative precision of a tension."""
+
 # A notch that snaps shut has no root but a jump, next to which the solver need not converge.
 _AT_SNAP = 1e-3
 # Enough to bisect every fifth time, which is what a jump takes.
@@ -43,20 +48,21 @@ _ROUNDS = 200
 
 
 def closing_tensions(
-    overlap: Overlap, guess: Float[np.ndarray, " m"]
+    overlap: Overlap, guess: Float[np.ndarray, " m"], precision: float = PRECISION
 ) -> tuple[Float[np.ndarray, " m"], np.ndarray]:
     """Find the tension that closes each notch, and a status for each.
 
     Args:
         overlap: The overlap of all notches, each at its own tension.
         guess: Tensions to begin from, N; 2 ** 6 times that is the largest one tried.
+        precision: Relative precision of a tension.
 
     Returns:
         Tensions (N), NaN where none was found, and statuses (`ClosingStatus`).
     """
     low, high, failed = _bracket(overlap, guess)
     bracketed = np.isfinite(high)
-    tension, precise = find_roots(overlap, low, np.where(bracketed, high, low))
+    tension, precise = find_roots(overlap, low, np.where(bracketed, high, low), precision)
     closes = bracketed & precise
     return np.where(closes, tension, np.nan), statuses(closes, ~bracketed & ~failed)
 
@@ -80,7 +86,7 @@ def _bracket(
         searched = np.isnan(high) & (doubling | np.isfinite(failing))
         if not searched.any():
             break
-        value = overlap(trial)
+        value = overlap(trial, searched)
         high = np.where(searched & (value > 0.0), trial, high)
         low = np.where(searched & (value <= 0.0), trial, low)
         failing = np.where(searched & np.isnan(value), np.fmin(failing, trial), failing)
@@ -91,7 +97,10 @@ def _bracket(
 
 
 def find_roots(
-    overlap: Overlap, low: Float[np.ndarray, " m"], high: Float[np.ndarray, " m"]
+    overlap: Overlap,
+    low: Float[np.ndarray, " m"],
+    high: Float[np.ndarray, " m"],
+    precision: float = PRECISION,
 ) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
     """Find roots by false position, bisecting where that stalls.
 
@@ -101,15 +110,18 @@ def find_roots(
         overlap: The overlap of all notches, each at its own tension.
         low: Tensions (N) that leave the notches open; of one that is not searched, `high`.
         high: Tensions (N) that close them.
+        precision: Relative precision of a root.
 
     Returns:
-        The roots, and whether each is known: to 1e-11, or to 1e-3 where the solver fails nearby.
+        The roots, and whether each is known: to that precision, or to 1e-3 where the solver
+        fails nearby.
     """
-    at_low, at_high = overlap(low), overlap(high)
+    searched = low < high
+    at_low, at_high = overlap(low, searched), overlap(high, searched)
     width, misses = high - low, np.zeros(low.shape, int)
     side, slow = np.zeros(low.shape, int), np.zeros(low.shape, int)
     for _ in range(_ROUNDS):
-        open_still = (high - low > _PRECISION * high) & (misses < _TRIALS)
+        open_still = (high - low > precision * high) & (misses < _TRIALS)
         if not open_still.any():
             break
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -117,7 +129,7 @@ def find_roots(
         part = np.where((slow > 3) | ~((part > 0.0) & (part < 1.0)), 0.5, part)
         part = np.where(misses > 0, 0.6 ** np.maximum(misses, 1), part)
         trial = low + part * (high - low)
-        value = np.where(open_still, overlap(trial), np.nan)
+        value = np.where(open_still, overlap(trial, open_still), np.nan)
         up, down = value > 0.0, value <= 0.0
         # The end that stays a second time counts less, by what the other one has changed: a slope
         # that differs beyond the root does not keep it from being reached (Anderson, Björck).
@@ -132,5 +144,5 @@ def find_roots(
         misses = np.where(up | down, 0, misses + open_still)
         slow = np.where(high - low > 0.5 * width, slow + 1, 0)
         width = high - low
-    precision = np.where(misses >= _TRIALS, _AT_SNAP, _PRECISION)
-    return 0.5 * (low + high), high - low <= precision * high
+    reached = np.where(misses >= _TRIALS, _AT_SNAP, precision)
+    return 0.5 * (low + high), high - low <= reached * high

@@ -60,7 +60,10 @@ def design(
         terminal.use_compile_cache()
         import notchflex.designing as designing
     if front and robust:
-        raise InputError.CONFLICT("--front is of robots as drawn; leave out --robust.")
+        raise InputError.CONFLICT(
+            "--front is of robots as drawn: leave out --robust, name the point that you choose as "
+            "`robot` of the design file, and run it again with --robust and without --front."
+        )
     if front:
         return _front(spec, output, outputs)
     with terminal.bars("ranking robots") as progress:

@@ -30,6 +30,9 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import numbers_at
 
+CLOSINGS = "closing tensions"
+"""Under what a `Point` keeps closing tensions (N) that are known without it, for values only."""
+
 
 @dataclass(frozen=True, eq=False)
 class Point:
@@ -72,6 +75,8 @@ class Point:
 
     def closings(self) -> Reading:
         """Closing tensions, N; NaN for a notch that does not close."""
+        if CLOSINGS in self.kept:
+            return Reading(self.kept[CLOSINGS], None)
         table: Closing = self.once("closing", lambda: closing(self.robot))
         if self.slopes_of is None or not np.isfinite(table.tension).all():
             return Reading(table.tension, None)

@@ -7,9 +7,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from notchflex.analysis.closing_loads.varied import closing_tensions_of
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
 from notchflex.analysis.varied.sparse_polynomial import Wanted, fit_polynomial
-from notchflex.designing.model.point import Point, Solver
+from notchflex.designing.model.point import CLOSINGS, Point, Solver
+from notchflex.designing.model.quantities import CLOSING
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import Problem, Vector
 from notchflex.designing.search.rows import TOLERANCE, row_reading, row_sizes, rows_of, violations
@@ -75,12 +77,28 @@ def met_by(
         for column, (k, _) in enumerate(of_states):
             met[np.flatnonzero(valid)[converged], k] = rows[:, column]
         valid[valid] = converged
-    others = [one for one in every if one not in of_states]
-    if others:
-        rows = _of_robots([one for _, one in others], solver, x, drawn.take(valid))
-        for column, (k, _) in enumerate(others):
-            met[valid, k] = rows[:, column]
+    robots = drawn.take(valid)
+    closings = [one for one in every if one[1].asked.quantity == CLOSING]
+    others = [one for one in every if one not in of_states and one not in closings]
+    for part, reader in ((closings, _of_closings), (others, _of_robots)):
+        if part:
+            rows = reader([one for _, one in part], solver, x, robots)
+            met[np.ix_(valid, [k for k, _ in part])] = rows
     return met
+
+
+def _of_closings(
+    wishes: Sequence[Wish], solver: Solver, x: Vector, robots: VariedRobots
+) -> Bool[np.ndarray, "robots k"]:
+    """Tell which robots meet constraints of closing tensions."""
+    if not len(robots):
+        return np.zeros((0, len(wishes)), bool)
+
+    def at(tensions: Float[np.ndarray, " n"]) -> Point:
+        known = {CLOSINGS: tensions}
+        return Point(solver.variables, x, robots.robot, solver.paths, {}, kept=known)
+
+    return _rows(wishes, map(at, closing_tensions_of(robots)))
 
 
 def _depends_on_states(wish: Wish) -> bool:
@@ -90,9 +108,9 @@ def _depends_on_states(wish: Wish) -> bool:
 def _of_robots(
     wishes: Sequence[Wish], solver: Solver, x: Vector, robots: VariedRobots
 ) -> Bool[np.ndarray, "robots k"]:
-    """Tell which robots meet constraints that need no state, by a polynomial where there is one.
+    """Tell which robots meet other constraints that need no state.
 
-    The closing of one robot takes as long as hundreds of states in a batch.
+    By a polynomial where there is one, as assembling a robot takes long.
     """
 
     def values_of(robot: Robot) -> Float[np.ndarray, " m"]:

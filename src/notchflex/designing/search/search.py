@@ -25,6 +25,8 @@ from notchflex.errors import InputError
 
 # A robot that misses by less than this part is searched from once more.
 _NEAR = 1e-3
+# Searches end at the same robot where none of its scaled variables differ by more.
+_SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +89,11 @@ def search(
     told: Progress = progress or (lambda stage, done, total: None)
     try:
         starts = _starts(problems, options, told)
+        each = {number: [one for one, _ in starts].count(number) for number, _ in starts}
         for done, (number, z) in enumerate(starts):
             told("searching", done, len(starts))
+            if _agreed(searches, number, max(2, (each[number] + 1) // 2)):
+                continue
             found = search_from(problems[number], z, options.iterations)
             if found.evaluation is not None:
                 searches.outcomes.append(Outcome(problems[number], number, z, found))
@@ -110,6 +115,16 @@ def search(
     if not searches.outcomes:
         raise _nothing(problems)
     return searches
+
+
+def _agreed(searches: Searches, number: int, count: int) -> bool:
+    """Tell whether so many searches of a form have settled at the best robot that it has."""
+    own = [one for one in searches.outcomes if one.number == number]
+    best = min(own, key=lambda one: one.merit, default=None)
+    if best is None or best.merit[0] > 0.0:
+        return False
+    near = [one for one in own if np.abs(one.found.z - best.found.z).max(initial=0.0) < _SAME]
+    return sum(one.found.stationary for one in near) >= count
 
 
 def _starts(

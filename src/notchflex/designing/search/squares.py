@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -81,22 +83,29 @@ def nearest_squares(
     settled = problem.count == 0 or first.total <= enough
     if not settled:
         try:
-            result = least_squares(
-                residuals,
-                np.clip(z, _INSIDE, 1.0 - _INSIDE),
-                jacobian,  # pyright: ignore[reportArgumentType]
-                (np.zeros(problem.count), np.ones(problem.count)),
-                ftol=_PRECISION,
-                xtol=_PRECISION,
-                gtol=1e-12,
-                max_nfev=_EVALUATIONS,
-            )
-            settled = int(result.status) > 0
+            settled = _least(residuals, jacobian, z)
         except _Enough:
             settled = True
     vector, one = best[0]
     full = problem.with_slopes(one, vector)
     return (z, first, False) if full is None else (vector, full, settled)
+
+
+def _least(
+    residuals: Callable[[Vector], np.ndarray], jacobian: Callable[[Vector], np.ndarray], z: Vector
+) -> bool:
+    """Run SciPy's search between 0 and 1; return whether it settled."""
+    result = least_squares(
+        residuals,
+        np.clip(z, _INSIDE, 1.0 - _INSIDE),
+        jacobian,  # pyright: ignore[reportArgumentType]
+        (np.zeros(len(z)), np.ones(len(z))),
+        ftol=_PRECISION,
+        xtol=_PRECISION,
+        gtol=1e-12,
+        max_nfev=_EVALUATIONS,
+    )
+    return int(result.status) > 0
 
 
 def is_followed(problem: Problem, total: float) -> bool:

@@ -26,6 +26,8 @@ _NODES = np.array(
     ]
 )[:, [1, 0, 2]]
 
+_REMEDY = "export the solid with --step and mesh it by gmsh, with second-order tetrahedra"
+
 
 @dataclass(frozen=True)
 class HalfTube:
@@ -77,7 +79,7 @@ def check_shape(robot: Robot) -> list[ArcNotch]:
         if not isinstance(notch, ArcNotch):
             raise InputError.UNSUPPORTED(
                 f"notch {number} of {robot.name} is of kind {notch.kind!r}: a deck of finite "
-                'elements is made of notches of kind "arc" only'
+                f'elements is made of notches of kind "arc" only; {_REMEDY}'
             )
         if abs(notch.precurvature_deg) > 0.0:
             raise InputError.UNSUPPORTED(
@@ -87,7 +89,7 @@ def check_shape(robot: Robot) -> list[ArcNotch]:
         if (notch.direction_deg - robot.notches[0].direction_deg) % 360.0:
             raise InputError.UNSUPPORTED(
                 f"notch {number} of {robot.name} opens to another side than notch 1: half of the "
-                "tube is meshed, so that all must open to one side"
+                f"tube is meshed, so that all must open to one side; {_REMEDY}"
             )
         tube = robot.tube
         if notch.cut == "off-axis" and notch.depth - tube.outer_radius >= tube.inner_radius:

@@ -152,7 +152,9 @@ def _weights(
             rows = rows[np.argsort(moment[rows], kind="stable")]
             change = np.abs(np.gradient(moment[rows]))
             step = np.abs(np.gradient(angle[rows]))
-            weight[rows] = step / np.maximum(change, stiffness * step / _SOFTEST)
+            moves = change > 0.0  # two pulls may turn a hinge by the same to the last digit
+            ratio = np.divide(step, change, out=weight[rows], where=moves)
+            weight[rows] = np.minimum(ratio, _SOFTEST / stiffness)
     return weight
 
 
