@@ -152,20 +152,10 @@ def find_anyhow(
         solves += other.solves
         best = min(best, other, key=_quality)
     others = [(best.drive, True), *_other_starts(problem, before, start)]
-    nearest = first
-    for other_start, _ in others if best.failure is not None else ():
-        other = meet(problem, before, other_start, goal)
+    if best.failure is not None:
+        other = _meet_from(problem, before, [drive for drive, _ in others], goal, first, best.error)
         solves += other.solves
-        if other.failure is None:
-            return other._replace(solves=solves)
-        if (other.drive >= problem.low).all() and (other.drive <= problem.high).all():
-            nearest = min(nearest, other, key=_quality)
-    for go_on in (meet, _find_within) if nearest.error < best.error else ():
-        # It had come near when its rounds were over.
-        other = go_on(problem, before, nearest.drive, goal)
-        solves += other.solves
-        if other.failure is None:
-            return other._replace(solves=solves)
+        best = other if other.failure is None else best
     for other_start, over_bands in others[1:]:
         if best.failure is None:
             return best._replace(solves=solves)
@@ -185,6 +175,41 @@ def find_anyhow(
         best = _settled(problem, before, best, goal)
         solves += best.solves
     return best._replace(solves=solves)
+
+
+def _meet_from(
+    problem: Problem,
+    before: np.ndarray,
+    starts: list[np.ndarray],
+    goal: np.ndarray,
+    nearest: Attempt,
+    error: float,
+) -> Attempt:
+    """Meet a target from one of some drives, or go on from the nearest that this came to.
+
+    Args:
+        problem: What is aimed at, and the limits.
+        before: The state before, packed.
+        starts: The drives.
+        goal: The target.
+        nearest: What came nearest so far.
+        error: What it must be nearer than, to go on from it.
+    """
+    solves = 0
+    for start in starts:
+        other = meet(problem, before, start, goal)
+        solves += other.solves
+        if other.failure is None:
+            return other._replace(solves=solves)
+        if (other.drive >= problem.low).all() and (other.drive <= problem.high).all():
+            nearest = min(nearest, other, key=_quality)
+    for go_on in (meet, _find_within) if nearest.error < error else ():
+        # It had come near when its rounds were over.
+        nearest = go_on(problem, before, nearest.drive, goal)
+        solves += nearest.solves
+        if nearest.failure is None:
+            break
+    return nearest._replace(solves=solves)
 
 
 def _find_within(
