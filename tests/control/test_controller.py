@@ -166,3 +166,15 @@ def test_a_huge_target_is_refused_without_a_warning(target, recwarn):
     with refused("OUT_OF_RANGE"):
         nf.reach(WRIST, {"total_angle": target})
     assert not [one for one in recwarn if issubclass(one.category, RuntimeWarning)]
+
+
+@pytest.mark.parametrize("top", [1.66183818, 1.71])
+def test_a_reversal_with_closed_notches_takes_few_solves(top):
+    # Let go, the first contact slips at 0.87 of the tension; closed notches hold on to 0.84 of it.
+    pulled = path(WRIST, [0.5, 1.0, 1.4, top])
+    goal = nf.solve(WRIST, nf.Load(tension=1.4046), from_state=pulled.state).tip_position
+    controller = nf.Controller(WRIST, state=pulled.state)
+    command = controller.step(goal)
+    assert controller.status.reached
+    assert controller.status.solves <= 8
+    assert command[0] == pytest.approx(1.4046, abs=1e-5)

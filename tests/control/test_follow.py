@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from refusals import refused
 
 WRIST = nf.load_robot("pacheco2021-a")
 TWO_AXES = nf.load_robot("two-axis-wrist")
@@ -150,3 +151,17 @@ def test_known_loads_count():
     found = nf.reach(WRIST, goal.tip_position, load=load, approach="direct")
     assert found.reached
     assert found.tension[0] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_target_out_of_reach_is_given_up_within_few_solves():
+    found = nf.reach(nf.load_robot("pacheco2021-a"), (30.0, 0.0, 0.0), approach="direct")
+    assert found.code == "TARGET_OUT_OF_REACH"
+    assert found.error == pytest.approx(23.120518, abs=1e-6)
+    assert found.following.solves[0] <= 400
+
+
+@pytest.mark.parametrize("weight", [1e300, 1e-300, 1e10])
+def test_a_weight_beside_which_nothing_counts_is_refused(weight):
+    target = {"total_angle": 1.0, "tip_position": (None, None, 9.0)}
+    with refused("OUT_OF_RANGE"):
+        nf.reach(nf.load_robot("pacheco2021-a"), target, weights={"total_angle": weight})

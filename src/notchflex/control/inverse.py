@@ -141,11 +141,12 @@ def _follow(
     for goal in aim.goals:
         near = limit_rate(problem, present, rate)
         way = approach_target(near, before, present, goal, approach, known)
-        attempt = way.last._replace(solves=way.solves)
+        attempt, solves = way.last._replace(solves=0), way.solves
         if way.via is None:
             attempt = cross_dead_bands(problem, rate, before, present, goal, attempt, known)
         else:
             drives.append(way.via)
+        attempt = attempt._replace(solves=solves + attempt.solves)
         drives.append(attempt.drive)
         last.append(len(drives) - 1)
         attempts.append(attempt)

@@ -20,6 +20,9 @@ DIRECTION = "tip_direction"
 LARGEST_TARGET = 1e9
 """Numbers beyond this (mm, N, rad) are refused: squares of their distances have no end."""
 
+LARGEST_WEIGHT = 1e9
+"""Weights beyond this, or below its inverse, are refused: one quantity alone would count."""
+
 # Rows of a rotation may miss those of a true one by so much.
 _ROTATION_ERROR = 1e-6
 _FORMS = "x, y, z of the tip in mm, or names of quantities with their values"
@@ -76,7 +79,7 @@ def aim_at(
         weights: By quantity, what an error of one unit (mm, N, rad) counts; 1 where not given.
 
     Raises:
-        InputError: A weight of what is no target, or not positive.
+        InputError: A weight of what is no target, not positive, or beyond `LARGEST_WEIGHT`.
     """
     weights = _check_weights(weights, targets)
     index: list[np.ndarray] = []
@@ -103,9 +106,10 @@ def _check_weights(weights: Mapping[str, float] | None, targets: Targets) -> dic
                 f"there is a weight of {name}, but the targets are {', '.join(targets.values)}"
             )
         checked[name] = check_number(weight, f"the weight of {name}")
-        if not 0.0 < checked[name] < np.inf:
+        if not 1.0 / LARGEST_WEIGHT <= checked[name] <= LARGEST_WEIGHT:
             raise InputError.OUT_OF_RANGE(
-                f"the weight of {name} must be positive and finite; got {weight:g}"
+                f"the weight of {name} must be from {1.0 / LARGEST_WEIGHT:g} to "
+                f"{LARGEST_WEIGHT:g}; got {checked[name]:g}"
             )
     return checked
 

@@ -7,13 +7,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.analysis.solve import simulate
-from notchflex.control import Limits, TargetSearch, reach
+from notchflex.control import Controller, Limits, TargetSearch
 from notchflex.errors import InputError
 from notchflex.learning.environments import RobotEnv
-from notchflex.loads import Load
 from notchflex.loads.validation import short_repr
-from notchflex.results.state import State
 from notchflex.robot import Frictionless
 
 _TOLERANCE, _SOLVES = 1e-4, 20  # mm; loads solved in a step
@@ -52,12 +49,15 @@ class ScriptedPolicy:
         self._settings = unwrapped.settings
         robot = self._settings.model
         self._robot = robot if friction else robot.replace(friction=Frictionless())
-        self._limits = Limits(tension=(0.0, self._settings.largest.tolist()))
+        # A step goes as far as the rate lets it, and the history of the model with it.
+        largest = self._settings.largest.tolist()
+        self._limits = Limits(tension=(0.0, largest), rate=self._settings.change)
         self.reset()
 
     def reset(self) -> None:
         """Begin with the robot at rest, as every episode does."""
-        self._state: State | None = None
+        search = TargetSearch(tolerance=_TOLERANCE, solves=_SOLVES)
+        self._controller = Controller(self._robot, limits=self._limits, search=search)
 
     def __call__(self, observation: Float[np.ndarray, " size"]) -> Float[np.ndarray, " t"]:
         """Return the action for an observation.
@@ -65,20 +65,10 @@ class ScriptedPolicy:
         Args:
             observation: As the environment returned it.
         """
-        settings, robot = self._settings, self._robot
+        settings = self._settings
         tension = observation[: len(settings.largest)] * settings.largest
-        target = observation[-3:] * settings.length
-        limits, search = self._limits, TargetSearch(tolerance=_TOLERANCE, solves=_SOLVES)
-        found = reach(
-            robot, target, state=self._state, limits=limits, approach="direct", search=search
-        )
-        change = (found.tension - tension) / settings.change
-        action = np.clip(change, -1.0, 1.0)
-        # The model goes as far as the robot does: what the rate leaves is no history yet.
-        next_tension = np.clip(tension + settings.change * action, 0.0, settings.largest)
-        load = Load(tension=tuple(next_tension))
-        self._state = simulate(robot, load, from_state=self._state).state
-        return action
+        command = self._controller.step(observation[-3:] * settings.length)
+        return np.clip((command - tension) / settings.change, -1.0, 1.0)
 
 
 __all__ = ["ScriptedPolicy"]

@@ -51,6 +51,9 @@ _SOLVED = 100.0
 # A tendon sticks where its slopes, squared, are `NO_SLOPE` of those with which it last slid,
 # and, beside others, stays where it is if it must slide by less than this part of its dead band.
 _SMALL_LEAP = 1e-3
+# Where it still sticks beyond its dead band, the next step is this part of the way from the present
+# drive.
+_ONWARD = 0.5
 # Corrections go on while each leaves this part of the error at most, or the target is this multiple
 # of its tolerance away.
 _LEAST_FALL, _NEAR = 0.5, 100.0
@@ -190,8 +193,13 @@ class _Search:
         low, high = dead_band(there, ratio, bound, by_stroke)
         up, down = jnp.maximum(high - drive, 0.0), jnp.minimum(low - drive, 0.0)
         leap = jnp.where(change > 0.0, up, down)
-        leap = jnp.where(stuck & (change != 0.0), leap, 0.0)
         several = jnp.sum(self.task.driven) > 1.0
+        # Beyond the band a notch that is pressed together may hold on: the way so far tells how far
+        # it can be.
+        onward = jnp.sign(change) * _ONWARD * jnp.abs(drive - self.task.present)
+        held = (jnp.abs(leap) <= SLACK * self.task.unit) & ~several
+        leap = jnp.where(jnp.where(by_stroke, False, held), onward, leap)
+        leap = jnp.where(stuck & (change != 0.0), leap, 0.0)
         small = several & (jnp.abs(change) <= _SMALL_LEAP * jnp.abs(leap))
         return _within(self.task, drive + jnp.where(small, 0.0, change + leap))
 

@@ -33,7 +33,10 @@ _STARTS = (0.5, 0.1, 0.0)
 _ALONE = 0.15
 # and from the best that it found without the drives that are smaller than this part of the largest,
 _SMALL = 0.2
-# and follows the target from the present values in so many parts.
+# A target is out of reach where one of so many last searches brings less than this part of the
+# error.
+_LAST_SEARCHES, _NO_NEARER = 3, 1e-6
+# The search also follows the target from the present values in so many parts.
 _PARTS = 6
 
 
@@ -133,7 +136,7 @@ def find_anyhow(
     """
     # Where other tendons move, a tendon slides within its dead band too.
     alone = bool(np.count_nonzero(start[problem.driven]) < 2)
-    best = meet(problem, before, start, goal, known)
+    best = first = meet(problem, before, start, goal, known)
     solves = best.solves
     taut = problem.driven & (start > 0.0)
     if best.failure is not None and 0 < taut.sum() < problem.driven.sum():
@@ -142,22 +145,21 @@ def find_anyhow(
         solves += best.solves
     if best.failure is None:
         return best._replace(solves=solves)
-    best = find(problem, before, start, goal, known, over_bands=alone)
+    best = find(problem, before, start, goal, known, over_bands=alone, patient=False)
     solves += best.solves
     if best.failure is not None:
-        other = find(problem, before, start, goal, known, over_bands=not alone)
+        other = find(problem, before, start, goal, known, over_bands=not alone, patient=False)
         solves += other.solves
         best = min(best, other, key=_quality)
     others = [(best.drive, True), *_other_starts(problem, before, start)]
-    for other_start, _ in others if best.failure is not None else ():
-        other = meet(problem, before, other_start, goal)
+    if best.failure is not None:
+        other = _meet_from(problem, before, [drive for drive, _ in others], goal, first, best.error)
         solves += other.solves
-        if other.failure is None:
-            return other._replace(solves=solves)
+        best = other if other.failure is None else best
     for other_start, over_bands in others[1:]:
         if best.failure is None:
             return best._replace(solves=solves)
-        other = find(problem, before, other_start, goal, over_bands=over_bands)
+        other = find(problem, before, other_start, goal, over_bands=over_bands, patient=False)
         solves += other.solves
         best = min(best, other, key=_quality)
     if best.failure is not None:
@@ -166,9 +168,70 @@ def find_anyhow(
         best = min(best, other, key=_quality)
     if best.failure is not None and problem.driven.sum() > 1:
         few = np.where(best.drive < _SMALL * best.drive.max(), problem.low, best.drive)
-        other = find(problem, before, few, goal)
+        other = find(problem, before, few, goal, patient=False)
         solves += other.solves
         best = min(best, other, key=_quality)
+    if best.failure is Failure.SEARCH_STOPPED:
+        best = _settled(problem, before, best, goal)
+        solves += best.solves
+    return best._replace(solves=solves)
+
+
+def _meet_from(
+    problem: Problem,
+    before: np.ndarray,
+    starts: list[np.ndarray],
+    goal: np.ndarray,
+    nearest: Attempt,
+    error: float,
+) -> Attempt:
+    """Meet a target from one of some drives, or go on from the nearest that this came to.
+
+    Args:
+        problem: What is aimed at, and the limits.
+        before: The state before, packed.
+        starts: The drives.
+        goal: The target.
+        nearest: What came nearest so far.
+        error: What it must be nearer than, to go on from it.
+    """
+    solves = 0
+    for start in starts:
+        other = meet(problem, before, start, goal)
+        solves += other.solves
+        if other.failure is None:
+            return other._replace(solves=solves)
+        if (other.drive >= problem.low).all() and (other.drive <= problem.high).all():
+            nearest = min(nearest, other, key=_quality)
+    for go_on in (meet, _find_within) if nearest.error < error else ():
+        # It had come near when its rounds were over.
+        nearest = go_on(problem, before, nearest.drive, goal)
+        solves += nearest.solves
+        if nearest.failure is None:
+            break
+    return nearest._replace(solves=solves)
+
+
+def _find_within(
+    problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray
+) -> Attempt:
+    """Search with dead bands, from drives that are near the target."""
+    return find(problem, before, start, goal, over_bands=False)
+
+
+def _settled(problem: Problem, before: np.ndarray, best: Attempt, goal: np.ndarray) -> Attempt:
+    """Search on from where all searches ended, until that brings the target no nearer."""
+    solves = 0
+    for _ in range(_LAST_SEARCHES):
+        other = _find_within(problem, before, best.drive, goal)
+        solves += other.solves
+        nearer = other.error < (1.0 - _NO_NEARER) * best.error
+        if nearer or other.failure is None:  # else it stays where it is: drives may be stuck
+            best = min(best, other, key=_quality)
+        if best.failure is Failure.SEARCH_STOPPED and not nearer and _keeps_limits(best):
+            best = best._replace(failure=Failure.TARGET_OUT_OF_REACH)
+        if best.failure is not Failure.SEARCH_STOPPED:
+            break
     return best._replace(solves=solves)
 
 
@@ -217,6 +280,6 @@ def _by_parts(problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.
     for part in range(1, _PARTS + 1):
         aim = problem if part == _PARTS else loose
         towards = values + part / _PARTS * (goal - values)
-        attempt = find(aim, before, attempt.drive, towards)
+        attempt = find(aim, before, attempt.drive, towards, patient=False)
         solves += attempt.solves
     return attempt._replace(solves=solves)

@@ -29,6 +29,8 @@ _ASIDE = (1e-6, -1e-6)
 _ROUNDS = 6
 # A step that changes drives by less than this part of them is none.
 _NO_STEP = 1e-11
+# A search ends where so many solves leave this part of the squared error.
+_IMPATIENT, _PATIENT = (8, 0.98), (16, 1.0 - 1e-8)
 # Drives that are redundant are made smaller in so many rounds of so many corrections, while a round
 # changes them and their size by more than these parts.
 _MOST_RELAXATIONS, _CORRECTIONS, _SMALL_RELAXATION, _SMALL_GAIN = 6, 5, 1e-3, 1e-4
@@ -42,6 +44,7 @@ def find(
     known: Response | None = None,
     *,
     over_bands: bool = True,
+    patient: bool = True,
 ) -> Attempt:
     """Search drives that meet a target.
 
@@ -52,6 +55,7 @@ def find(
         goal: The target; NaN where an entry is free.
         known: Values and slopes at `start`, where they are known.
         over_bands: Whether dead bands of the drives are left out.
+        patient: Whether it goes on where it hardly comes nearer, until the budget is spent.
 
     Returns:
         The best that was found within the budget.
@@ -61,7 +65,14 @@ def find(
     search = DampedSearch(problem, before, *aim, over_bands)
     search.begin(start, known)
     damping, budget = 0.0, problem.search.solves
+    checked, merit = search.solves, search.point.merit
+    every, slow = _PATIENT if patient else _IMPATIENT
     while not search.done and search.solves < budget:
+        if search.solves >= checked + every:
+            if search.point.merit > slow * merit:
+                search.settled = patient
+                break
+            checked, merit = search.solves, search.point.merit
         step = search.step(damping)
         if np.abs(step).max() <= _NO_STEP * search.scale or damping > _MOST_DAMPING:
             search.settled = True
