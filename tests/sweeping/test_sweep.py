@@ -17,8 +17,8 @@ import tomlkit
 
 import notchflex as nf
 from notchflex.cli import run
-from notchflex.sweeping.engine import piece as pieces
-from notchflex.sweeping.engine.folder import locked
+from notchflex.pieces import piece as pieces
+from notchflex.pieces.folder import locked
 from swept import TABLE, digests, plan
 
 
@@ -127,7 +127,7 @@ def test_a_stopped_sweep_goes_on(whole, tmp_path, monkeypatch):
     worked = []
     make = pieces.make_piece
     monkeypatch.setattr(
-        "notchflex.sweeping.engine.running.make_piece",
+        "notchflex.pieces.running.make_piece",
         lambda *args: worked.append(args[2]) or make(*args),
     )
     nf.sweep(plan(), folder)
@@ -141,7 +141,7 @@ def test_another_plan_version_or_robot_is_refused(whole, tmp_path, monkeypatch, 
     other = plan(sampling={"points": 100, "seed": 5})
     refused("CONFLICT", "another seed", other, whole)
     refused("CONFLICT", "another robot", plan(robot="pacheco2021-b"), whole)
-    monkeypatch.setattr("notchflex.sweeping.engine.manifest.__version__", "0.0.1")
+    monkeypatch.setattr("notchflex.pieces.manifest.__version__", "0.0.1")
     refused("CONFLICT", "another version", plan(), whole)
     assert digests(whole) == before
 

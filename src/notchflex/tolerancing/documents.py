@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from notchflex.pieces.codes import CODES
 from notchflex.results.files.json import document_head
 from notchflex.tolerancing.linear import WORST_SD
 from notchflex.tolerancing.result import ToleranceAnalysis
-from notchflex.tolerancing.study import CODES
 
 PERCENTILES = (2.5, 50.0, 97.5)
 

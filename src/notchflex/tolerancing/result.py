@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._summary import Displayed, Summary, short
+from notchflex.pieces.codes import CODES, FAILED, INVALID
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
@@ -17,7 +18,7 @@ from notchflex.tolerancing.control import Control
 from notchflex.tolerancing.criteria import Criterion
 from notchflex.tolerancing.linear import LinearEffects
 from notchflex.tolerancing.sensitivity import SobolIndices
-from notchflex.tolerancing.study import CODES, FAILED, INVALID, Outcomes
+from notchflex.tolerancing.study import Outcomes
 from notchflex.tolerancing.yields import REPLICATES, yield_interval
 
 

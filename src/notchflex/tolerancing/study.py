@@ -15,6 +15,7 @@ from notchflex.analysis.batch import simulate_batch
 from notchflex.analysis.outputs import Batch
 from notchflex.analysis.uncertainty.draws import Source, sources_of, values_at
 from notchflex.loads import LoadPath
+from notchflex.pieces.codes import ACCEPTED, FAILED, INVALID, REJECTED
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
@@ -22,14 +23,9 @@ from notchflex.robot.varied import VariedRobots
 from notchflex.solver.newton import Settings
 from notchflex.tolerancing.criteria import Criterion
 
-CODES = ("accepted", "rejected", "NOT_CONVERGED", "INVALID_ROBOT")
-"""What becomes of a drawn robot; the last two meet no limit and count as rejected."""
-
 TAIL = 1e-6
 """What a normal distribution has beyond its end is drawn at the end: 1e-6 on either side, 4.8
 standard deviations."""
-
-ACCEPTED, REJECTED, FAILED, INVALID = range(len(CODES))
 
 
 class Outcomes(NamedTuple):
