@@ -61,6 +61,7 @@ def test_draws_in_pieces_are_those_in_memory(wrist, tolerances):
     assert pieces.drawn.histogram(0, 20)[1].sum() == pieces.draws
 
 
+@pytest.mark.nightly
 def test_lost_pieces_are_made_again(wrist, tolerances):
     before = digests(tolerances)
     (tolerances / "pieces" / "piece-000000003.parquet").unlink()
@@ -69,6 +70,7 @@ def test_lost_pieces_are_made_again(wrist, tolerances):
     assert digests(tolerances) == before
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("change", [{"seed": 1}, {"draws": 1600}])
 def test_other_draws_are_refused(wrist, tolerances, change):
     before = digests(tolerances)
@@ -78,6 +80,7 @@ def test_other_draws_are_refused(wrist, tolerances, change):
     assert digests(tolerances) == before
 
 
+@pytest.mark.nightly
 def test_another_version_is_refused(wrist, tolerances, monkeypatch):
     monkeypatch.setattr("notchflex.pieces.manifest.__version__", "0.0.1")
     with pytest.raises(nf.InputError) as caught:
@@ -103,6 +106,7 @@ def test_states_in_pieces(tmp_path):
     assert float(np.nanmax(pieces.hysteresis)) == pytest.approx(most, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_states_of_one_piece_keep_hull_and_hysteresis(wrist, tmp_path):
     """A piece that holds all rays solves those in memory."""
     whole, pieces = explored(wrist, states=3200), explored(wrist, tmp_path / "x", states=3200)
@@ -126,6 +130,7 @@ def fitted(wrist, folder: Any = None) -> dict[str, Any]:
     return document
 
 
+@pytest.mark.nightly
 def test_searches_in_pieces_find_the_same(wrist, tmp_path):
     whole = fitted(wrist)
     assert fitted(wrist, tmp_path / "x") == whole
@@ -161,7 +166,6 @@ REFUSED = [
     "tolerance {file} --folder no/such/folder",
     "tolerance {file} --folder full",
     "tolerance {file} --folder /proc/none",
-    "tolerance {file} --folder broken",
     "workspace --states 50000000",
     "workspace --folder x --beside pacheco2021-b",
     "workspace --workers 2",
@@ -175,8 +179,6 @@ def test_options_that_are_refused(call, tmp_path, monkeypatch, capsys, wording):
     Path("limits.toml").write_text(TOLERANCES, encoding="utf-8")
     Path("full").mkdir()
     Path("full", "thesis.tex").write_text("x", encoding="utf-8")
-    Path("broken").mkdir()
-    Path("broken", "tolerance.json").write_text("{}", encoding="utf-8")
     verb, *words = call.format(file="limits.toml").split()
     assert run([verb, "pacheco2021-a", *words]) == 2
     told = capsys.readouterr().err
@@ -185,6 +187,7 @@ def test_options_that_are_refused(call, tmp_path, monkeypatch, capsys, wording):
     wording(f"pieces: {call}", told)
 
 
+@pytest.mark.nightly
 def test_the_command_line(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("limits.toml").write_text(TOLERANCES, encoding="utf-8")

@@ -19,6 +19,7 @@ import notchflex as nf
 from notchflex.cli import run
 from notchflex.pieces import piece as pieces
 from notchflex.pieces.folder import locked
+from notchflex.plotting.sweeps.columns import _label
 from swept import TABLE, digests, plan
 
 
@@ -323,3 +324,14 @@ def test_command_line(tmp_path, monkeypatch, capsys):
     ):
         assert run(arguments) == 2, arguments
     assert not Path("x").exists()
+
+
+def test_labels_of_a_picture_are_those_of_quantities(whole):
+    found = nf.read_sweep(whole)
+    texts = [_label(found, one) for one in ("notch.depth", *found.columns, "row")]
+    assert texts == [
+        "notch.depth [mm]",
+        r"total bending angle $\theta$ [deg]",
+        r"angle of notch 2 $\theta_2$ [deg]",
+        "row",
+    ]
