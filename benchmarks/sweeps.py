@@ -78,7 +78,8 @@ def throughput(rows: int, workers: int, clock: Any) -> None:
     base = bare(min(rows, 4 * CHUNK), workers, clock) / min(rows, 4 * CHUNK)
     print(f"bare batch on {workers} cores: {1e6 * base:.3f} µs a row")
     print(
-        "rows  time [s]  more for each further row [µs]  part of the bare throughput  MiB a worker  GB"
+        "rows  time [s]  more for each further row [µs]  part of the bare throughput  "
+        "MiB a worker  GB"
     )
     sizes = [CHUNK * 10**power for power in range(4) if CHUNK * 10**power < rows]
     before: tuple[int, float] | None = None
