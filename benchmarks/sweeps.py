@@ -2,7 +2,8 @@
 
 `python benchmarks/sweeps.py throughput 1e8 --workers 2` solves so many wrists (two variables, code
 and two quantities: five columns), and before it fewer, to show the growth; the bare batch solves
-the same wrists in pieces of 1e6 and keeps nothing. `--processor` compares the time of processors,
+the same wrists in pieces of 1e6 and keeps nothing. The folder (32 bytes a row at most) is deleted
+after each size; `TMPDIR` says where it is. `--processor` compares the time of processors,
 where others work on the same machine.
 
 `python benchmarks/sweeps.py kills 30` starts a scheduler of dask, two workers and a client on the
@@ -77,7 +78,8 @@ def throughput(rows: int, workers: int, clock: Any) -> None:
     base = bare(min(rows, 4 * CHUNK), workers, clock) / min(rows, 4 * CHUNK)
     print(f"bare batch on {workers} cores: {1e6 * base:.3f} µs a row")
     print(
-        "rows  time [s]  more for each further row [µs]  part of the bare throughput  MiB a worker"
+        "rows  time [s]  more for each further row [µs]  part of the bare throughput  "
+        "MiB a worker  GB"
     )
     sizes = [CHUNK * 10**power for power in range(4) if CHUNK * 10**power < rows]
     before: tuple[int, float] | None = None
@@ -92,6 +94,7 @@ def throughput(rows: int, workers: int, clock: Any) -> None:
                 progress=lambda done, *_, marks=marks: marks.append((done, clock())),
             )
             taken = clock() - begun
+            disk = sum(one.stat().st_size for one in Path(folder).rglob("*") if one.is_file())
             per_row = taken / size
             if before is not None:  # without the start of processes, which takes the same time
                 per_row = (taken - before[1]) / (size - before[0])
@@ -102,7 +105,8 @@ def throughput(rows: int, workers: int, clock: Any) -> None:
                 per_row = (now - then) / (last - first)
             most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024.0
             print(
-                f"{size:.0e}  {taken:.1f}  {1e6 * per_row:.3f}  {base / per_row:.3f}  {most:.0f}",
+                f"{size:.0e}  {taken:.1f}  {1e6 * per_row:.3f}  {base / per_row:.3f}  {most:.0f}  "
+                f"{disk / 1e9:.3f}",
                 flush=True,
             )
 

@@ -21,6 +21,7 @@ ORDER = (
     "solver",
     "results",
     "analysis",
+    "pieces",
     "fit",
     "comparison",
     "tolerancing",

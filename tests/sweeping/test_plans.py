@@ -15,7 +15,7 @@ from scipy.stats import qmc
 import notchflex as nf
 from mutations import mutated
 from notchflex.cli import run
-from notchflex.sweeping.engine.sketch import Scale, Sketch
+from notchflex.pieces.sketch import Scale, Sketch
 from notchflex.sweeping.points import Points
 
 TEMPLATE = Path(nf.__file__).parent / "sweeping" / "plan" / "template.toml"
@@ -147,7 +147,7 @@ def test_300_mutated_files(seeds, tmp_path, monkeypatch, capsys):
     def stop(*_: Any) -> None:
         raise ReachedError
 
-    monkeypatch.setattr(sys.modules["notchflex.sweeping.sweep"], "prepare_folder", stop)
+    monkeypatch.setattr(sys.modules["notchflex.sweeping.sweep"], "open_folder", stop)
     refused = 0
     for seed in seeds:
         Path("plan.toml").write_text(mutated(TEXT, seed), encoding="utf-8")

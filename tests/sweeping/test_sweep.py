@@ -17,8 +17,9 @@ import tomlkit
 
 import notchflex as nf
 from notchflex.cli import run
-from notchflex.sweeping.engine import piece as pieces
-from notchflex.sweeping.engine.folder import locked
+from notchflex.pieces import piece as pieces
+from notchflex.pieces.folder import locked
+from notchflex.plotting.sweeps.columns import _label
 from swept import TABLE, digests, plan
 
 
@@ -127,7 +128,7 @@ def test_a_stopped_sweep_goes_on(whole, tmp_path, monkeypatch):
     worked = []
     make = pieces.make_piece
     monkeypatch.setattr(
-        "notchflex.sweeping.engine.running.make_piece",
+        "notchflex.pieces.running.make_piece",
         lambda *args: worked.append(args[2]) or make(*args),
     )
     nf.sweep(plan(), folder)
@@ -141,7 +142,7 @@ def test_another_plan_version_or_robot_is_refused(whole, tmp_path, monkeypatch, 
     other = plan(sampling={"points": 100, "seed": 5})
     refused("CONFLICT", "another seed", other, whole)
     refused("CONFLICT", "another robot", plan(robot="pacheco2021-b"), whole)
-    monkeypatch.setattr("notchflex.sweeping.engine.manifest.__version__", "0.0.1")
+    monkeypatch.setattr("notchflex.pieces.manifest.__version__", "0.0.1")
     refused("CONFLICT", "another version", plan(), whole)
     assert digests(whole) == before
 
@@ -323,3 +324,14 @@ def test_command_line(tmp_path, monkeypatch, capsys):
     ):
         assert run(arguments) == 2, arguments
     assert not Path("x").exists()
+
+
+def test_labels_of_a_picture_are_those_of_quantities(whole):
+    found = nf.read_sweep(whole)
+    texts = [_label(found, one) for one in ("notch.depth", *found.columns, "row")]
+    assert texts == [
+        "notch.depth [mm]",
+        r"total bending angle $\theta$ [deg]",
+        r"angle of notch 2 $\theta_2$ [deg]",
+        "row",
+    ]

@@ -17,10 +17,11 @@ import pytest
 import tomlkit
 
 import notchflex as nf
-from notchflex.sweeping.engine import connection
-from notchflex.sweeping.engine.connection import scheduler_at
-from notchflex.sweeping.engine.folder import manifest_in
-from notchflex.sweeping.engine.running import on_cluster
+from notchflex.pieces import connection
+from notchflex.pieces.connection import scheduler_at
+from notchflex.pieces.folder import manifest_in
+from notchflex.pieces.running import on_cluster
+from notchflex.sweeping.worker import sweep_worker
 from swept import TABLE, digests, plan
 
 pytest.importorskip("distributed")
@@ -104,7 +105,14 @@ def test_a_piece_handed_over_while_the_scheduler_dies(many, tmp_path, start):
 
     def work() -> None:
         with scheduler_at(address) as client:
-            list(on_cluster(client, manifest_in(many).text, str(tmp_path), pieces(client)))
+            list(
+                on_cluster(
+                    client,
+                    sweep_worker(manifest_in(many, "sweep").text),
+                    str(tmp_path),
+                    pieces(client),
+                )
+            )
 
     with pytest.raises(nf.InputError) as caught:
         work()
@@ -160,7 +168,7 @@ import threading
 
 import numpy as np
 
-from notchflex.sweeping.engine.running import keep_memory
+from notchflex.pieces.running import keep_memory
 
 def work():
     keep_memory()

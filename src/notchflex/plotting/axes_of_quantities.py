@@ -27,7 +27,7 @@ from notchflex.plotting.path import robot_shape, state_shape
 from notchflex.plotting.renderers.with_matplotlib import draw_panel
 from notchflex.plotting.sheet import BESIDE, INSIDE, Curve, Mark, Panel
 from notchflex.plotting.style import house_style, sequence_colours
-from notchflex.results.files.csv import Entry, entries_of, is_listed
+from notchflex.results.files.csv import entries_of, is_listed
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 
@@ -128,7 +128,7 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
     headers = {one.header: (one, of) for of in known for one in entries_of(path, of) if one.header}
     if name in headers:
         entry, quantity = headers[name]
-        label = _label(quantity, entry)
+        label = entry_label(quantity, entry.name)
         return Series(label, [""], [name], np.asarray(entry.values, float)[:, None])
     if name in QUANTITIES:
         raise InputError.UNSUPPORTED(
@@ -140,9 +140,13 @@ def series_of(path: EquilibriumPath, name: str) -> Series:
     raise InputError.UNKNOWN_NAME(f"there is no quantity {name!r} to draw; {meant}")
 
 
-def _label(quantity: Quantity, entry: Entry) -> str:
-    """Return the label of one entry: "angle of notch 3", "tip position x"."""
-    name = entry.name
+def entry_label(quantity: Quantity, name: str) -> str:
+    """Return the label of one entry: "angle of notch 3", "tip position x".
+
+    Args:
+        quantity: The quantity.
+        name: Name of the entry, such as "notch 3" or "x"; "" for a single value.
+    """
     if not name:
         return quantity.label
     if quantity.per == ("axis",):

@@ -8,13 +8,14 @@ import time
 from typing import NamedTuple
 
 from notchflex._extras import need
+from notchflex.pieces.codes import FAILED
+from notchflex.pieces.piece import encoded
 from notchflex.solver.programs.threads import number_of_cores
-from notchflex.sweeping.engine.manifest import Manifest
-from notchflex.sweeping.engine.piece import Worker, encoded
+from notchflex.sweeping.manifest import SweepManifest
 from notchflex.sweeping.model import model_of
 from notchflex.sweeping.plan import SweepPlan
 from notchflex.sweeping.sweep import plan_and_robot
-from notchflex.tolerancing.study import FAILED
+from notchflex.sweeping.worker import SweepWorker
 
 _LONG = 1.0
 """Seconds: a shorter piece is timed once more, without what the first one prepares."""
@@ -60,27 +61,22 @@ def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = 
     need("polars", "data", "sweep")
     chosen, robot = plan_and_robot(plan)
     model = model_of(chosen, robot)
-    manifest = Manifest.of(chosen, robot, model)
-    worker = Worker(manifest, model)
-    assert worker.scales
+    manifest = SweepManifest.of(chosen, robot, model)
+    worker = SweepWorker(manifest, model)
+    worker.prepare()
     start = time.perf_counter()
-    data, head = _piece(worker)
+    data, head = encoded(worker, 0)
     taken = time.perf_counter() - start
     if taken < _LONG:
         start = time.perf_counter()
-        data, head = _piece(worker)
+        data, head = encoded(worker, 0)
         taken = time.perf_counter() - start
     solved = manifest.between(0)[1]
     cores = min(workers or number_of_cores(), manifest.pieces)
     each = taken / solved
-    size = data * (manifest.rows / solved if chosen.output.rows else manifest.pieces)
+    size = len(data) * (manifest.rows / solved if chosen.output.rows else manifest.pieces)
     return Estimate(
         manifest.rows, manifest.pieces, manifest.document["piece"], cores, each,
         each * manifest.rows / cores, size, shutil.disk_usage(".").free, solved,
         sum(head["codes"][FAILED:]), model.one_by_one,
     )  # fmt: skip
-
-
-def _piece(worker: Worker) -> tuple[int, dict[str, list[int]]]:
-    frame, head = worker.piece(0)
-    return len(encoded(frame, head)), head

@@ -9,50 +9,31 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
-
-import numpy as np
-from jaxtyping import Float
 
 from notchflex._quantity import REGISTERED
-from notchflex.analysis.batch import Batch, simulate_batch, simulate_varied
 from notchflex.analysis.solve import simulate
-from notchflex.analysis.varied.varied_chains import VariedChains, varied_chains
 from notchflex.errors import ErrorCode, InputError
-from notchflex.loads import LoadPath
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest
 from notchflex.robot.value_names import number_at
-from notchflex.robot.varied import VariedRobots
 from notchflex.sweeping.plan.parts import KeptQuantity, SweepPlan
 from notchflex.sweeping.points import Points, limits_of
 from notchflex.tolerancing.criteria import AXES, FIRST, Criterion, entries_of
+from notchflex.tolerancing.piece_study import SAMPLE, PieceStudy
 from notchflex.tolerancing.reading import read_load
 from notchflex.tolerancing.spec import INDICES, LIMITED
-from notchflex.tolerancing.study import CODES, Outcomes, Study
-
-SAMPLE = 4096
-"""Rows that polynomials of chains are made and checked with, from all over the sweep."""
-
-
-_EACH = 1024
-"""Robots that are assembled each by itself are so many at a time: a chain takes much memory."""
 
 
 @dataclass(frozen=True, eq=False)
-class SweepModel(Study):
-    """A study whose robots lie between limits, with polynomials that depend on the plan alone.
+class SweepModel(PieceStudy):
+    """A study whose robots lie between limits.
 
     Attributes:
         between: The limits, by name.
-        sample: Numbers of some rows from all over the sweep.
     """
 
     between: Mapping[str, tuple[float, float]] = dataclasses.field(
         default_factory=dict[str, tuple[float, float]]
-    )
-    sample: Mapping[str, Float[np.ndarray, " k"]] = dataclasses.field(
-        default_factory=dict[str, np.ndarray]
     )
 
     @cached_property
@@ -61,51 +42,10 @@ class SweepModel(Study):
         return dict(self.between)
 
     @cached_property
-    def chains(self) -> dict[str, VariedChains | None]:
-        """Chains of varied robots under every load; None where each is assembled by itself."""
-        robots = VariedRobots(self.exact, self.sample, self.ranges)
-        if not robots.valid().all():
-            return dict.fromkeys(self.loads)
-        return {
-            name: varied_chains(robots, load, self.refinement, known=False)
-            for name, load in self.loads.items()
-        }
-
-    @property
-    def one_by_one(self) -> bool:
-        """Whether robots are assembled one by one, under any load."""
-        return None in self.chains.values()
-
-    @cached_property
     def columns(self) -> dict[str, Criterion]:
         """The kept numbers by the names of their columns."""
         named = len(self.paths) > 1
         return {column_name(one, named): one for one in self.criteria}
-
-    def follow(
-        self, robots: VariedRobots, name: str, load: LoadPath, outputs: tuple[str, ...], part: Any
-    ) -> Batch:
-        """Follow a load with all robots, in the calling thread."""
-        del part
-        chains = self.chains[name]
-        options: dict[str, Any] = {"outputs": outputs, "settings": self.settings}
-        if chains is not None and chains.polynomial.covers(robots.table):
-            return simulate_varied(dataclasses.replace(chains, numbers=robots.table), **options)
-        parts = [
-            simulate_batch(
-                list(robots[start : start + _EACH]),
-                load, refinement=self.refinement, cores=1, **options,
-            )
-            for start in range(0, len(robots), _EACH)
-        ]  # fmt: skip
-        return Batch({key: np.concatenate([one[key] for one in parts]) for key in parts[0]})
-
-    def at(self, numbers: Mapping[str, Float[np.ndarray, " k"]]) -> Outcomes:
-        """Solve robots: kept numbers in the units of files, NaN where there is no result."""
-        count = len(next(iter(numbers.values())))
-        found = self.solved(numbers, count)
-        scale = np.array([one.quantity.scale for one in self.criteria])
-        return Outcomes(found.values * scale, found.codes)
 
 
 def model_of(plan: SweepPlan, robot: Robot) -> SweepModel:
@@ -204,6 +144,3 @@ def column_name(one: Criterion, named: bool) -> str:
         ]
         if part
     )
-
-
-__all__ = ["CODES", "SweepModel", "column_name", "model_of"]

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.stats import qmc
 
 from notchflex.errors import InputError
+from notchflex.pieces.sobol import SobolPart
 from notchflex.sweeping.plan.parts import Sampling, SweepPlan, SweepVariable
 
 _MOST_LATIN = 20_000_000
 """A Latin hypercube is made whole: so many numbers fit into memory beside all else."""
-
-_BITS_30 = 2**30
-"""SciPy's Sobol sequence has so many points, or 2^64 if it is asked for them beforehand."""
-
-_FORWARD = 2**31
-"""SciPy counts the steps forward with 32 bits."""
 
 
 def axis_values(variable: SweepVariable) -> Float[np.ndarray, " k"]:
@@ -56,7 +50,6 @@ class Points:
     """
 
     plan: SweepPlan
-    _sobol: Any = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         """Check what does not fit into memory."""
@@ -123,32 +116,19 @@ class Points:
         if sampling.method == "latin-hypercube":
             return _latin(sampling, dimension)[points]
         if self._each <= len(places):  # all points, more than once
-            return self._between(0, self._each)[points]
+            return self._sobol.between(0, self._each)[points]
         turns = np.flatnonzero(np.diff(points) < 0) + 1  # where the sequence begins anew
         parts = np.split(points, turns)
-        return np.concatenate([self._between(int(one[0]), int(one[-1]) + 1) for one in parts])
+        return np.concatenate([self._sobol.between(int(one[0]), int(one[-1]) + 1) for one in parts])
 
-    def _between(self, start: int, stop: int) -> Float[np.ndarray, "k d"]:
-        """Return points of the Sobol sequence; going on is quick, going back starts anew."""
-        sampling, engine = self.plan.sampling, self._sobol
+    @cached_property
+    def _sobol(self) -> SobolPart:
+        sampling = self.plan.sampling
         assert sampling is not None
-        if engine is None or engine.num_generated > start:
-            bits = 30 if sampling.points <= _BITS_30 else 64
-            random = np.random.default_rng(sampling.seed)
-            engine = qmc.Sobol(len(self.plan.sampled), scramble=True, bits=bits, rng=random)  # pyright: ignore
-        while start > engine.num_generated:
-            engine.fast_forward(min(start - engine.num_generated, _FORWARD))
-        self._sobol = engine
-        return _drawn(engine, stop - start)
-
-
-def _drawn(engine: qmc.Sobol, count: int) -> Float[np.ndarray, "k d"]:
-    """Draw points; SciPy warns where the first draw of a sequence is no power of two."""
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        return engine.random(count)
+        seed = sampling.seed
+        return SobolPart(
+            len(self.plan.sampled), lambda: np.random.default_rng(seed), sampling.points
+        )
 
 
 @lru_cache(maxsize=1)

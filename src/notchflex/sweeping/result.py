@@ -15,14 +15,14 @@ from jaxtyping import Int
 from notchflex._extras import need
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
+from notchflex.pieces.codes import CODES
+from notchflex.pieces.folder import head_of, manifest_in
+from notchflex.pieces.piece import piece_file
+from notchflex.pieces.sketch import Scale, Sketch
 from notchflex.results.files.json import write_json
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest
-from notchflex.sweeping.engine.folder import head_of, manifest_in
-from notchflex.sweeping.engine.manifest import Manifest
-from notchflex.sweeping.engine.piece import piece_file
-from notchflex.sweeping.engine.sketch import Scale, Sketch
-from notchflex.sweeping.model import CODES
+from notchflex.sweeping.manifest import KIND, SweepManifest
 from notchflex.sweeping.plan.parts import SweepPlan
 from notchflex.sweeping.points import axis_values
 
@@ -49,7 +49,7 @@ class Sweep(Displayed):
     """
 
     directory: Path
-    manifest: Manifest
+    manifest: SweepManifest
     pieces: tuple[int, ...]
     counts: dict[str, int]
     failures: list[int]
@@ -267,7 +267,7 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
         InputError: It is no folder of a sweep, or polars is not installed.
     """
     need("polars", "data", "read_sweep")
-    manifest = manifest_in(directory)
+    manifest = SweepManifest(manifest_in(directory, KIND).document)
     output = manifest.plan.output
     pieces: list[int] = []
     codes = np.zeros(len(CODES), int)

@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from notchflex._extras import need
-from notchflex.errors import ErrorCode, InputError
+from notchflex.errors import InputError
 from notchflex.loads.validation import check_integer, short_repr
+from notchflex.pieces.folder import check_target
+from notchflex.pieces.run import Progress, check_workers, open_folder, run_pieces
 from notchflex.robot import Robot, load_robot
-from notchflex.sweeping.engine.connection import check_address, local_cluster, scheduler_at
-from notchflex.sweeping.engine.folder import (
-    check_target,
-    done_piece,
-    locked,
-    prepare_folder,
-    tidy,
-)
-from notchflex.sweeping.engine.manifest import Manifest
-from notchflex.sweeping.engine.piece import Done, Worker
-from notchflex.sweeping.engine.running import in_threads, on_cluster
+from notchflex.sweeping.manifest import KIND, SweepManifest
 from notchflex.sweeping.model import model_of
 from notchflex.sweeping.plan import SweepPlan, read_plan
 from notchflex.sweeping.plan.reading import plan_from_table
 from notchflex.sweeping.result import Sweep, read_sweep, write_summary
-
-Progress = Callable[[int, int, int, int], None]
-"""Called with rows done, rows in all, rows without a result, and rows done by earlier calls."""
+from notchflex.sweeping.worker import SweepWorker
 
 
 def sweep(
@@ -77,58 +65,28 @@ def sweep(
         ...     nf.sweep(table, folder).rows
         7
     """
-    need("polars", "data", "sweep")
-    if workers is not None and scheduler is not None:
-        raise InputError.CONFLICT("workers and a scheduler exclude each other; give one of them.")
-    if workers is not None and not 1 <= check_integer(workers, "workers") <= 1024:
-        raise InputError.OUT_OF_RANGE(f"workers must be 1 to 1024; got {workers}")
-    if workers is not None or scheduler is not None:
-        need("distributed", "cluster", "workers")
-    if scheduler is not None:
-        check_address(scheduler)
+    check_workers(workers, scheduler)
     first, count = check_part(part)
     chosen, robot = plan_and_robot(plan)
-    inputs = [plan] if isinstance(plan, str | os.PathLike) else []
-    check_target(directory, [Path(one) for one in inputs])
-    # Products of matrices by several threads may have other last digits.
-    with threadpool_limits(1):
+    inputs = [Path(plan)] if isinstance(plan, str | os.PathLike) else []
+    check_target(directory, KIND, "-o", inputs)
+    with threadpool_limits(1):  # more threads may give other last digits
         model = model_of(chosen, robot)
-        manifest = Manifest.of(chosen, robot, model)
-        pieces = range((first - 1) * manifest.pieces // count, first * manifest.pieces // count)
-        prepare_folder(directory, manifest)
-        if pieces:
-            with locked(directory, pieces.start, pieces.stop):
-                worker = Worker(manifest, model)
-                _work_on(worker, os.path.abspath(directory), pieces, workers, scheduler, progress)
+        worker = SweepWorker(SweepManifest.of(chosen, robot, model), model)
+    open_folder(worker, directory, "-o", inputs)
+    number = worker.manifest.pieces
+    run_pieces(
+        worker,
+        directory,
+        pieces=range((first - 1) * number // count, first * number // count),
+        workers=workers,
+        scheduler=scheduler,
+        progress=progress,
+    )
     result = read_sweep(directory)
     if result.finished:
         write_summary(result)
     return result
-
-
-def _work_on(
-    worker: Worker,
-    folder: str,
-    pieces: range,
-    workers: int | None,
-    scheduler: str | None,
-    progress: Progress | None,
-) -> None:
-    """Work on those of the pieces that are not there."""
-    manifest = worker.manifest
-    tidy(folder, pieces.start, pieces.stop)
-    found = [done_piece(folder, manifest, piece) for piece in pieces]
-    there = [one for one in found if one is not None]
-    left = [piece for piece, one in zip(pieces, found, strict=True) if one is None]
-    try:
-        with _running(worker, folder, left, workers, scheduler) as running:
-            _watch(running, there, manifest, pieces, progress)
-    except InputError as problem:
-        if problem.code is not ErrorCode.FILE_UNWRITABLE:
-            raise
-        message = f"{problem} All finished pieces are kept: make room, and call again."
-        raise InputError.FILE_UNWRITABLE(message) from None
-    tidy(folder, pieces.start, pieces.stop)
 
 
 def plan_and_robot(
@@ -162,42 +120,3 @@ def check_part(part: tuple[int, int]) -> tuple[int, int]:
     if not 1 <= first <= count <= 10**9:
         raise InputError.OUT_OF_RANGE(f"part {first} of {count}: give one from 1 to {count}.")
     return first, count
-
-
-@contextlib.contextmanager
-def _running(
-    worker: Worker, folder: str, pieces: list[int], workers: int | None, scheduler: str | None
-) -> Generator[Iterator[Done]]:
-    """Work on pieces; yields what becomes of them, as they are finished."""
-    if not pieces:
-        yield iter(())
-    elif workers is None and scheduler is None:
-        assert worker.scales  # in the calling thread: all threads need the same preparations
-        assert worker.model.chains
-        with contextlib.closing(in_threads(worker, folder, pieces)) as running:
-            yield running
-    else:
-        cluster = local_cluster(workers) if workers else scheduler_at(scheduler or "")
-        text = worker.manifest.text
-        with (
-            cluster as client,
-            contextlib.closing(on_cluster(client, text, folder, pieces)) as running,
-        ):
-            yield running
-
-
-def _watch(
-    running: Iterable[Done],
-    there: list[Done],
-    manifest: Manifest,
-    pieces: range,
-    progress: Progress | None,
-) -> None:
-    """Count what is done."""
-    before = done = sum(one.rows for one in there)
-    unsolved = sum(one.unsolved for one in there)
-    total = manifest.between(pieces.stop - 1)[1] - manifest.between(pieces.start)[0]
-    for one in running:
-        done, unsolved = done + one.rows, unsolved + one.unsolved
-        if progress is not None:
-            progress(done, total, unsolved, before)

@@ -8,25 +8,29 @@ from functools import partial
 
 import numpy as np
 
-from notchflex.analysis.solve import simulate
 from notchflex.analysis.uncertainty.assumed import tolerances_of
 from notchflex.errors import InputError
 from notchflex.loads.validation import check_integer, check_is_robot, short_repr
+from notchflex.pieces.options import PieceFolder
+from notchflex.pieces.run import Progress
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
 from notchflex.solver.newton import Settings
 from notchflex.tolerancing.control import control
-from notchflex.tolerancing.criteria import criteria_of
+from notchflex.tolerancing.drawn import DrawnRobots
+from notchflex.tolerancing.draws_in_pieces import draw_in_pieces
 from notchflex.tolerancing.linear import linear_effects
 from notchflex.tolerancing.reading import read_tolerance_spec
-from notchflex.tolerancing.result import DrawnRobots, ToleranceAnalysis
+from notchflex.tolerancing.result import ToleranceAnalysis
 from notchflex.tolerancing.sensitivity import sobol
 from notchflex.tolerancing.spec import ToleranceSpec
-from notchflex.tolerancing.study import Outcomes, Study
+from notchflex.tolerancing.study import Outcomes, Study, study_of
 from notchflex.tolerancing.yields import REPLICATES, points_of_each, replicates
 
 DRAWS = 100_000
 LEAST_DRAWS = 2 * REPLICATES
+MOST_DRAWS, MOST_IN_PIECES = 10_000_000, 10_000_000_000
+"""Draws in memory at most, and in pieces."""
 
 Stage = Callable[[str, int, int], None]
 """Called with what is computed, how much of it is done, and how much there is."""
@@ -42,6 +46,7 @@ def tolerance_analysis(
     refinement: int = 0,
     cores: int | None = None,
     progress: Stage | None = None,
+    folder: PieceFolder | str | os.PathLike[str] | None = None,
 ) -> ToleranceAnalysis:
     """Find out what tolerances do to a robot that must meet acceptance limits.
 
@@ -55,6 +60,8 @@ def tolerance_analysis(
         refinement: More strain modes, as for `simulate`.
         cores: As for `simulate_batch`.
         progress: Called with what is computed, how much of it is done, and how much there is.
+        folder: Draw in pieces, which this folder keeps: for more draws than fit into memory, by
+            many processes (`PieceFolder`), gone on with by the same call.
 
     Returns:
         Worst case and root sum of squares, yield, Sobol indices, and what each tolerance does.
@@ -74,28 +81,26 @@ def tolerance_analysis(
     check_is_robot(robot)
     if check_integer(draws, "draws") < LEAST_DRAWS:
         raise InputError.OUT_OF_RANGE(f"draws must be {LEAST_DRAWS} or more; got {draws}")
+    folder = None if folder is None else PieceFolder.of(folder)
+    if draws > (MOST_DRAWS if folder is None else MOST_IN_PIECES):
+        more = "; give a folder, which draws in pieces" if folder is None else ""
+        most = MOST_DRAWS if folder is None else MOST_IN_PIECES
+        raise InputError.OUT_OF_RANGE(f"draws must be at most {most:,}{more}; got {draws}")
     asked = _spec(spec, robot)
     chosen, assumed = tolerances_for(robot, asked)
-    paths = {}
-    for name, load in asked.loads.items():
-        paths[name] = simulate(robot, load, settings=settings, refinement=refinement)
-        if not paths[name].converged.all():
-            step = int(np.argmin(paths[name].converged))
-            raise InputError.NOT_CONVERGED(
-                f"load {name}: the robot of the drawing has no result at step {step + 1}: "
-                f"{paths[name].reason[step]}."
-            )
-    criteria = tuple(criteria_of(asked, paths))
-    study = Study(robot, chosen, paths, criteria, settings, refinement, cores)
+    study = study_of(robot, asked, chosen, settings, refinement, cores)
     if not study.sources:
         raise InputError.NO_DATA("nothing deviates: all tolerances are 0; give one that is not.")
     effects = linear_effects(study)
     told = {name: _told(progress, name) for name in ("drawing", "sensitivity", "tolerances")}
-    drawn = _draw(study, draws, seed, told["drawing"])
+    if folder is None:
+        drawn = _draw(study, draws, seed, told["drawing"])
+    else:
+        drawn = draw_in_pieces(study, asked, draws, seed, folder, _of_pieces(told["drawing"]))
     return ToleranceAnalysis(
         robot=robot,
-        paths=paths,
-        criteria=criteria,
+        paths=study.paths,
+        criteria=tuple(study.criteria),
         tolerances=chosen,
         assumed=assumed,
         sources=tuple(one.name for one in study.sources),
@@ -134,6 +139,10 @@ def tolerances_for(
 
 def _told(progress: Stage | None, stage: str) -> Callable[[int, int], None] | None:
     return None if progress is None else partial(progress, stage)
+
+
+def _of_pieces(told: Callable[[int, int], None] | None) -> Progress | None:
+    return None if told is None else lambda done, count, *_: told(done, count)
 
 
 def _draw(

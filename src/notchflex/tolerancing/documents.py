@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from notchflex.errors import InputError
+from notchflex.pieces.codes import CODES
 from notchflex.results.files.json import document_head
+from notchflex.tolerancing.drawn import DrawnPieces
 from notchflex.tolerancing.linear import WORST_SD
 from notchflex.tolerancing.result import ToleranceAnalysis
-from notchflex.tolerancing.study import CODES
 
 PERCENTILES = (2.5, 50.0, 97.5)
 
@@ -108,7 +110,14 @@ def tolerance_columns(found: ToleranceAnalysis) -> dict[str, Sequence[Any]]:
         `robot` from 1, the numbers that deviate by name (mm, N, MPa, deg), the numbers that have
         limits with their unit, empty where there is no result, and `outcome`: accepted, rejected,
         NOT_CONVERGED or INVALID_ROBOT.
+
+    Raises:
+        InputError: They were drawn in pieces.
     """
+    if isinstance(found.drawn, DrawnPieces):
+        raise InputError.UNSUPPORTED(
+            f"the drawn robots are rows of the files in {found.drawn.directory}; read those."
+        )
     outcomes = found.drawn.outcomes
     columns: dict[str, Sequence[Any]] = {"robot": range(1, found.draws + 1)}
     columns |= {name: values.tolist() for name, values in found.drawn.numbers.items()}

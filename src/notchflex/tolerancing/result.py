@@ -4,33 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._summary import Displayed, Summary, short
+from notchflex.pieces.codes import ACCEPTED, CODES, FAILED, INVALID
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
 from notchflex.tolerancing.control import Control
 from notchflex.tolerancing.criteria import Criterion
+from notchflex.tolerancing.drawn import DrawnPieces, DrawnRobots
 from notchflex.tolerancing.linear import LinearEffects
 from notchflex.tolerancing.sensitivity import SobolIndices
-from notchflex.tolerancing.study import CODES, FAILED, INVALID, Outcomes
 from notchflex.tolerancing.yields import REPLICATES, yield_interval
-
-
-class DrawnRobots(NamedTuple):
-    """The robots that were drawn within the tolerances.
-
-    Attributes:
-        numbers: Their numbers by name, (draws,).
-        outcomes: What became of them.
-    """
-
-    numbers: Mapping[str, Float[np.ndarray, " draws"]]
-    outcomes: Outcomes
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,7 +33,7 @@ class ToleranceAnalysis(Displayed):
         assumed: Names of the values whose tolerance the robot does not give.
         sources: Names of what deviates by itself, such as `notch[3].depth`.
         linear: Worst case and root sum of squares, by gradients.
-        drawn: The robots that were drawn.
+        drawn: The robots that were drawn, or what is summed up of those in pieces.
         sobol: Sobol indices.
         control: What each tolerance alone does to the yield.
         wanted_yield: The part of robots that should be accepted; None where not given.
@@ -59,7 +47,7 @@ class ToleranceAnalysis(Displayed):
     assumed: tuple[str, ...]
     sources: tuple[str, ...]
     linear: LinearEffects
-    drawn: DrawnRobots
+    drawn: DrawnRobots | DrawnPieces
     sobol: SobolIndices
     control: Control
     wanted_yield: float | None
@@ -68,36 +56,32 @@ class ToleranceAnalysis(Displayed):
     @property
     def draws(self) -> int:
         """How many robots were drawn."""
-        return len(self.drawn.outcomes.codes)
+        return int(self.drawn.codes.sum())
 
     @property
     def accepted_fraction(self) -> float:
         """The yield: the part of drawn robots that meet all limits, failed ones counted."""
-        return float(self.drawn.outcomes.accepted.mean())
+        return int(self.drawn.codes[ACCEPTED]) / self.draws
 
     @property
     def interval(self) -> tuple[float, float]:
         """The 95 % interval of the yield, from independent replicates of the draws."""
-        accepted = self.drawn.outcomes.accepted.reshape(REPLICATES, -1)
-        return yield_interval(accepted.sum(axis=1), accepted.shape[1])
+        return yield_interval(self.drawn.accepted, self.draws // REPLICATES)
 
     @property
     def counts(self) -> dict[str, int]:
         """How many robots were accepted, rejected, did not converge, and are no valid robots."""
-        codes = self.drawn.outcomes.codes
-        return {name: int((codes == code).sum()) for code, name in enumerate(CODES)}
+        return dict(zip(CODES, self.drawn.codes.tolist(), strict=True))
 
     @property
     def below(self) -> Float[np.ndarray, " k"]:
         """Part of the drawn robots below the lower limit of each number."""
-        lower = np.array([one.lower for one in self.criteria])
-        return (self.drawn.outcomes.values < lower).mean(axis=0)
+        return self.drawn.beyond(self.criteria)[0] / self.draws
 
     @property
     def above(self) -> Float[np.ndarray, " k"]:
         """Part of the drawn robots above the upper limit of each number."""
-        upper = np.array([one.upper for one in self.criteria])
-        return (self.drawn.outcomes.values > upper).mean(axis=0)
+        return self.drawn.beyond(self.criteria)[1] / self.draws
 
     def percentile(self, part: float) -> Float[np.ndarray, " k"]:
         """Return the value of each number that a part of the drawn robots stays below.
@@ -105,13 +89,7 @@ class ToleranceAnalysis(Displayed):
         Args:
             part: Between 0 and 1. Robots without a result are left out.
         """
-        values = self.drawn.outcomes.values
-        values = values[np.isfinite(values).all(axis=1)]
-        return (
-            np.quantile(values, part, axis=0)
-            if len(values)
-            else np.full(len(self.criteria), np.nan)
-        )
+        return self.drawn.percentile(part)
 
     @property
     def order(self) -> Int[np.ndarray, " d"]:

@@ -13,23 +13,22 @@ from jaxtyping import Bool, Float, Int
 from notchflex._quantity import REGISTERED
 from notchflex.analysis.batch import simulate_batch
 from notchflex.analysis.outputs import Batch
+from notchflex.analysis.solve import simulate
 from notchflex.analysis.uncertainty.draws import Source, sources_of, values_at
+from notchflex.errors import InputError
 from notchflex.loads import LoadPath
+from notchflex.pieces.codes import ACCEPTED, FAILED, INVALID, REJECTED
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
 from notchflex.robot.varied import VariedRobots
 from notchflex.solver.newton import Settings
-from notchflex.tolerancing.criteria import Criterion
-
-CODES = ("accepted", "rejected", "NOT_CONVERGED", "INVALID_ROBOT")
-"""What becomes of a drawn robot; the last two meet no limit and count as rejected."""
+from notchflex.tolerancing.criteria import Criterion, criteria_of
+from notchflex.tolerancing.spec import ToleranceSpec
 
 TAIL = 1e-6
 """What a normal distribution has beyond its end is drawn at the end: 1e-6 on either side, 4.8
 standard deviations."""
-
-ACCEPTED, REJECTED, FAILED, INVALID = range(len(CODES))
 
 
 class Outcomes(NamedTuple):
@@ -177,6 +176,40 @@ class Study:
             np.array([getattr(one, end) for one in self.criteria]) for end in ("lower", "upper")
         )
         return (values >= lower) & (values <= upper)
+
+
+def study_of(
+    robot: Robot,
+    spec: ToleranceSpec,
+    tolerances: tuple[Tolerance, ...],
+    settings: Settings | None,
+    refinement: int,
+    cores: int | None = None,
+) -> Study:
+    """Make the study of a robot; the other arguments are those of `Study`.
+
+    Args:
+        robot: The robot of the drawing.
+        spec: Loads and limits.
+        tolerances: What deviates.
+        settings: Tolerance and limits of the solver.
+        refinement: More strain modes.
+        cores: How many cores to use.
+
+    Raises:
+        InputError: The robot of the drawing does not converge under a load.
+    """
+    paths: dict[str, EquilibriumPath] = {}
+    for name, load in spec.loads.items():
+        paths[name] = simulate(robot, load, settings=settings, refinement=refinement)
+        if not paths[name].converged.all():
+            step = int(np.argmin(paths[name].converged))
+            raise InputError.NOT_CONVERGED(
+                f"load {name}: the robot of the drawing has no result at step {step + 1}: "
+                f"{paths[name].reason[step]}."
+            )
+    criteria = tuple(criteria_of(spec, paths))
+    return Study(robot, tolerances, paths, criteria, settings, refinement, cores)
 
 
 def _ends(source: Source) -> list[float]:

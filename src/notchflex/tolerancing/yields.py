@@ -14,8 +14,9 @@ from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.stats import qmc
 from scipy.stats import t as student_t
+
+from notchflex.pieces.sobol import SobolPart
 
 REPLICATES = 25
 """Independent sets of points: the quantile of t is 5 % above that of infinitely many."""
@@ -41,8 +42,20 @@ def replicates(sources: int, each: int, seed: int) -> Iterator[Float[np.ndarray,
         each: Points of a set, a power of two.
         seed: The same seed makes the same points.
     """
-    for random in np.random.default_rng(seed).spawn(REPLICATES):
-        yield qmc.Sobol(sources, scramble=True, rng=random).random(each)
+    for number in range(REPLICATES):
+        yield replicate(sources, each, seed, number).between(0, each)
+
+
+def replicate(sources: int, each: int, seed: int, number: int) -> SobolPart:
+    """Return one set of levels, any part of which can be made.
+
+    Args:
+        sources: How many numbers are drawn.
+        each: Points of a set, a power of two.
+        seed: The same seed makes the same points.
+        number: Which of the sets, from 0.
+    """
+    return SobolPart(sources, lambda: np.random.default_rng(seed).spawn(REPLICATES)[number], each)
 
 
 def yield_interval(accepted: Int[np.ndarray, " replicates"], each: int) -> tuple[float, float]:

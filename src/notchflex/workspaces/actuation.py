@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from notchflex.analysis.closing_loads.closing import closing
 from notchflex.errors import InputError
 from notchflex.loads.validation import short_repr
+from notchflex.pieces.sobol import SobolPart
 from notchflex.robot import Robot
 
 
@@ -81,11 +81,36 @@ def rays(
         pretension: Tension that every tendon has at least, N.
         seed: Of the sequence.
     """
-    groups = _groups(robot, largest)
-    sequence = qmc.Sobol(2 * len(groups) + 2, rng=seed)  # pyright: ignore[reportCallIssue]
-    drawn = sequence.random(2 ** int(np.ceil(np.log2(count))))
+    drawn = ray_sequence(robot, largest, count, seed).between(0, count)
+    return rays_at(robot, largest, drawn, levels, pretension)
+
+
+def ray_sequence(
+    robot: Robot, largest: Float[np.ndarray, " t"], count: int, seed: int
+) -> SobolPart:
+    """Return the sequence that rays are drawn from; arguments as for `rays`."""
+    dimension = 2 * len(_groups(robot, largest)) + 2
+    return SobolPart(dimension, lambda: np.random.default_rng(seed), count)
+
+
+def rays_at(
+    robot: Robot,
+    largest: Float[np.ndarray, " t"],
+    drawn: Float[np.ndarray, "r d"],
+    levels: int,
+    pretension: float,
+) -> Float[np.ndarray, "r s t"]:
+    """Return the rays of points of the sequence.
+
+    Args:
+        robot: The robot.
+        largest: Largest tension of every tendon, N.
+        drawn: Points of `ray_sequence`.
+        levels: Levels of tension on each way.
+        pretension: Tension that every tendon has at least, N.
+    """
+    groups, count = _groups(robot, largest), len(drawn)
     # Rays side by side take as many iterations as the hardest of them: alike ones together.
-    drawn = drawn[:count]
     drawn = drawn[np.argsort(drawn[:, 0], kind="stable")]
     directions = np.zeros((count, robot.number_of_tendons))
     for number, group in enumerate(groups):

@@ -55,7 +55,7 @@ def voxel_map(
     cells = np.floor(points / size).astype(np.int64)
     found, of_state, states = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
     of_state = of_state.reshape(-1)
-    reached = np.unique(of_state * DIRECTIONS + _nearest(directions))
+    reached = np.unique(of_state * DIRECTIONS + nearest_directions(directions))
     dexterity = np.bincount(reached // DIRECTIONS, minlength=len(found)) / DIRECTIONS
     maps: dict[str, np.ndarray] = {}
     for name, one in values.items():
@@ -81,8 +81,12 @@ def sphere_directions() -> Float[np.ndarray, "directions 3"]:
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
 
 
-def _nearest(directions: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    """Return the nearest of the directions of the dexterity, piece by piece."""
+def nearest_directions(directions: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+    """Return the nearest of the directions of the dexterity, piece by piece.
+
+    Args:
+        directions: Unit vectors.
+    """
     sphere = sphere_directions().T
     pieces = [directions[start : start + 65536] for start in range(0, len(directions), 65536)]
     return np.concatenate([(one @ sphere).argmax(axis=1) for one in pieces])

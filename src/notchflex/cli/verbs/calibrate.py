@@ -16,6 +16,7 @@ from notchflex.cli.arguments.fit import (
     ParameterSpec,
     Sources,
 )
+from notchflex.cli.arguments.pieces import InPieces
 from notchflex.cli.arguments.robots import MeasuredAs, OnePath, Settings, read_data
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile
 from notchflex.cli.terminal import BAD_INPUT, DONE, NOT_CONVERGED
@@ -33,6 +34,7 @@ def calibrate(
     measured: MeasuredAs = "ring",
     beyond: BeyondFit = BeyondFit(),  # noqa: B008 - frozen
     settings: Settings = (),
+    pieces: InPieces = InPieces(),  # noqa: B008 - frozen
     output: Annotated[
         str | None,
         Parameter(
@@ -56,6 +58,7 @@ def calibrate(
     beyond.check(sources, search.objective)
     outputs = Outputs(sources.files, files=_fitted_files(sources, output), json=json, plot=plot)
     robots = sources.load(settings)
+    folder = pieces.chosen("calibration", sources.files)
     candidates = None
     if beyond.next:
         robot = robots[beyond.next_robot or next(iter(robots))]
@@ -79,6 +82,7 @@ def calibrate(
             objective=search.fit_objective(),
             seed=search.seed,
             progress=progress,
+            folder=folder,
         )
         analyses, problems = _analyse(fit, beyond, candidates, search.seed, progress)
     if output is not None:

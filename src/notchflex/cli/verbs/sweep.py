@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from notchflex._load_words import whole
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, flag
+from notchflex.cli.arguments.pieces import Scheduler, Workers
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
@@ -65,22 +66,8 @@ def sweep(
     dry_run: Annotated[
         bool, flag("Solve some rows, tell how long the sweep takes and how large it is, and end.")
     ] = False,
-    workers: Annotated[
-        int | None,
-        converted(whole(1, 1024), "N"),
-        Parameter(
-            help="Work in so many processes of this machine (extra `cluster`); by default in "
-            "threads of one process."
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        Parameter(
-            metavar="ADDRESS",
-            help="Work with the workers of a dask scheduler, such as tcp://10.0.0.1:8786; all see "
-            "the same folder (extra `cluster`).",
-        ),
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     part: Annotated[
         tuple[int, int],
         converted(_part, "K/N"),

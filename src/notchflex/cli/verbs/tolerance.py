@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from notchflex._load_words import whole
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted
+from notchflex.cli.arguments.pieces import InPieces
 from notchflex.cli.arguments.robots import (
     RobotName,
     Settings,
@@ -17,6 +18,7 @@ from notchflex.cli.arguments.robots import (
     robot_files,
 )
 from notchflex.cli.outputs import CsvFile, JsonFile, Outputs, PlotFile, Quiet
+from notchflex.errors import InputError
 
 if TYPE_CHECKING:
     from notchflex.tolerancing import ToleranceAnalysis
@@ -38,10 +40,10 @@ def tolerance(
     *,
     draws: Annotated[
         int,
-        converted(whole(50, 10_000_000), "N"),
+        converted(whole(50, 10_000_000_000), "N"),
         Parameter(
             help="About how many robots are drawn: 25 independent sets of scrambled Sobol points, "
-            "each as large as the nearest power of two."
+            "each as large as the nearest power of two. More than 10 000 000 need `--folder`."
         ),
     ] = 100_000,
     seed: Annotated[int, converted(whole(0), "N"), Parameter(help="Seed of the draws.")] = 0,
@@ -51,6 +53,7 @@ def tolerance(
         Parameter(help="0 to 3: more strain modes in every notch, to check the accuracy."),
     ] = 0,
     settings: Settings = (),
+    pieces: InPieces = InPieces(),  # noqa: B008 - frozen
     json: JsonFile = None,
     csv: CsvFile = None,
     plot: PlotFile = None,
@@ -65,13 +68,24 @@ def tolerance(
     """
     outputs = Outputs([*robot_files(robot), tolerances], quiet=quiet, json=json, csv=csv, plot=plot)
     chosen = chosen_robot(robot, settings)
+    folder = pieces.chosen("tolerance", [*robot_files(robot), tolerances])
+    if folder is None and draws > 10_000_000:
+        raise InputError.OUT_OF_RANGE(
+            f"--draws {draws}: more than 10000000 draws need --folder DIR, which keeps them in "
+            "pieces."
+        )
+    if folder is not None and csv is not None:
+        raise InputError.CONFLICT(
+            "--csv and --folder exclude each other: the rows are the files in the folder."
+        )
     with terminal.bars(f"reading {tolerances}") as show:
         terminal.use_compile_cache()
         from notchflex.tolerancing import tolerance_analysis
 
         found = tolerance_analysis(
-            chosen, tolerances, draws=draws, seed=seed, refinement=refinement, progress=show
-        )
+            chosen, tolerances, draws=draws, seed=seed, refinement=refinement, progress=show,
+            folder=folder,
+        )  # fmt: skip
     _write(found, outputs)
     for sentence in found.warnings():
         terminal.warn(sentence)

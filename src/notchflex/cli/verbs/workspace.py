@@ -12,6 +12,7 @@ from notchflex._load_words import number, whole
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, texts
 from notchflex.cli.arguments.loads import ExternalLoads
+from notchflex.cli.arguments.pieces import InPieces
 from notchflex.cli.arguments.robots import (
     RobotName,
     Settings,
@@ -71,8 +72,11 @@ def workspace(
     ] = None,
     states: Annotated[
         int,
-        converted(whole(32, 20_000_000), "N"),
-        Parameter(help="How many states are solved, half of them while the tendons are let go."),
+        converted(whole(32, 20_000_000_000), "N"),
+        Parameter(
+            help="How many states are solved, half of them while the tendons are let go. More than "
+            "20 000 000 need `--folder`, which keeps one state of each small voxel and direction."
+        ),
     ] = 100_000,
     pretension: Annotated[
         float,
@@ -96,6 +100,7 @@ def workspace(
     ] = (),
     external: ExternalLoads = ExternalLoads(),  # noqa: B008 - frozen
     settings: Settings = (),
+    pieces: InPieces = InPieces(),  # noqa: B008 - frozen
     json: JsonFile = None,
     nc: Annotated[
         str | None,
@@ -117,6 +122,14 @@ def workspace(
     inputs = [*robot_files(robot), *beside_files(beside)]
     outputs = Outputs(inputs, quiet=quiet, json=json, nc=nc, plot=plot)
     robots = beside_robots(chosen_robot(robot, settings), robot, beside)
+    if pieces.folder is not None and beside:
+        raise InputError.CONFLICT("--folder takes one robot; leave --beside out.")
+    folder = pieces.chosen("workspace", inputs)
+    if folder is None and states > 20_000_000:
+        raise InputError.OUT_OF_RANGE(
+            f"--states {states}: more than 20000000 states need --folder DIR, which keeps them in "
+            "pieces."
+        )
     found: dict[str, Workspace] = {}
     with terminal.bars("exploring") as show:
         terminal.use_compile_cache()
@@ -136,6 +149,7 @@ def workspace(
                 load=load,
                 stiffness=stiffness,
                 progress=None if show is None else partial(show, label),
+                folder=folder,
             )
     _write(found, outputs)
     return _report(found)

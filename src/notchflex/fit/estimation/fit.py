@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -14,9 +15,11 @@ from notchflex.fit.estimation.minimise import Cost, Minimum
 from notchflex.fit.estimation.noise import noise_left
 from notchflex.fit.estimation.objective import FitObjective, LeastSquares
 from notchflex.fit.estimation.problem import Problem, Progress, search
+from notchflex.fit.estimation.searches_in_pieces import search_in_pieces
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.model.constants import Constant, unknowns
 from notchflex.fit.model.samples import Samples
+from notchflex.pieces.options import PieceFolder
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
 
@@ -37,6 +40,7 @@ def calibrate(
     intervals: bool = True,
     settings: Settings | None = None,
     progress: Progress | None = None,
+    folder: PieceFolder | str | os.PathLike[str] | None = None,
 ) -> Calibration:
     """Fit constants of robots to measurements.
 
@@ -55,6 +59,8 @@ def calibrate(
         intervals: Whether to find 95 % intervals too (profile likelihood; of `LeastSquares` only).
         settings: Settings of the solver.
         progress: Called with the name of the task, how much of it is done, and how much there is.
+        folder: Search from every start as a piece that this folder keeps: by many processes
+            (`PieceFolder`), gone on with by the same call. The result is the same.
 
     Returns:
         The fitted robots, and how far to trust their constants.
@@ -79,9 +85,11 @@ def calibrate(
     named = by_label(robots)
     data = _of_robots(named, measurements)
     samples = Samples.of(named, data, unknowns(named, fit), settings)
-    return fitted(
-        named, Problem(samples, objective or LeastSquares()), starts, seed, intervals, progress
-    )
+    problem = Problem(samples, objective or LeastSquares())
+    searches = None
+    if folder is not None:
+        searches = search_in_pieces(problem, starts, seed, PieceFolder.of(folder), progress)
+    return fitted(named, problem, starts, seed, intervals, progress, searches)
 
 
 def check_search(starts: object, seed: object) -> None:
@@ -146,13 +154,16 @@ def fitted(
     seed: int,
     intervals: bool,
     progress: Progress | None = None,
+    searches: tuple[Minimum, ...] | None = None,
 ) -> Calibration:
     """Fit a problem, its noise if unknown, and intervals; arguments as for `calibrate`.
+
+    `searches` are what the starts led to, if that is known.
 
     Raises:
         InputError: The model has no solution at any start.
     """
-    searches = search(problem, starts, seed, progress)
+    searches = searches or search(problem, starts, seed, progress)
     costs = [np.inf if one.cost is None else one.cost.value for one in searches]
     if np.isinf(costs).all():
         raise _no_start(problem.samples)

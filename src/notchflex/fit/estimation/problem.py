@@ -87,9 +87,8 @@ def search(
 ) -> tuple[Minimum, ...]:
     """Search from several starts; another one replaces a start without a solution."""
     minima: list[Minimum] = []
-    hops = _HOPS if starts > 1 else 0
-    for point in _starting_points(problem, starts, seed):
-        minimum = _lowest_nearby(problem, point, hops, seed + len(minima))
+    for number, point in enumerate(starting_points(problem, starts, seed)):
+        minimum = search_from(problem, point, number, starts, seed)
         if minimum.cost is None and minima:
             continue
         minima.append(minimum)
@@ -100,8 +99,27 @@ def search(
     return tuple(minima)
 
 
-def _starting_points(problem: Problem, starts: int, seed: int) -> Float[np.ndarray, "s k"]:
-    """The robots as they are and, for several starts, candidates of Sobol's sequence."""
+def search_from(problem: Problem, point: Vector, number: int, starts: int, seed: int) -> Minimum:
+    """Search from one starting point; what it finds does not depend on the other searches.
+
+    Args:
+        problem: The objective.
+        point: The starting point.
+        number: Its number, from 0.
+        starts: Number of starts of the fit.
+        seed: Seed of the starting points.
+    """
+    return _lowest_nearby(problem, point, _HOPS if starts > 1 else 0, seed + number)
+
+
+def starting_points(problem: Problem, starts: int, seed: int) -> Float[np.ndarray, "s k"]:
+    """Return the robots as they are and, for several starts, candidates of Sobol's sequence.
+
+    Args:
+        problem: The objective.
+        starts: Number of starts.
+        seed: Seed of the sequence.
+    """
     here = np.array([[one.start for one in problem.unknowns]])
     if starts <= 1:
         return here

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from notchflex._quantity import REGISTERED
 from notchflex.errors import InputError
+from notchflex.plotting.axes_of_quantities import entry_label
 from notchflex.plotting.output import Picture
 from notchflex.plotting.sheet import BESIDE, Area, Curve, Mark, Panel, dots, grid
 from notchflex.plotting.style import BLUE, ORANGE, VERMILLION
@@ -97,9 +99,23 @@ def _band(both: np.ndarray) -> list[Mark]:
 
 
 def _label(found: Sweep, name: str) -> str:
-    """Return the label of an axis, with the unit of a variable."""
+    """Return the label of an axis, with its unit."""
     variables: list[Any] = [one.value for one in found.plan.variable]
-    if name not in variables:
+    if name in variables:
+        unit = described_at(found.robot, name).unit
+        return f"{name} [{unit}]" if unit else name
+    kept = {one.quantity for one in found.plan.keep}
+    fitting = [one for one in kept if f"{name}_".startswith(f"{one}_")]
+    if not fitting:
         return name
-    unit = described_at(found.robot, name).unit
-    return f"{name} [{unit}]" if unit else name
+    quantity = REGISTERED[max(fitting, key=len)]
+    words = name.removeprefix(quantity.name).strip("_").split("_")
+    entry = " ".join(
+        word if axis == "axis" else f"{axis} {word}"
+        for axis, word in zip(quantity.per, words, strict=False)
+    )
+    loads = found.plan.load if len(found.plan.load) > 1 else ()
+    at = [f"at {one}" for one in loads if f"_at_{one}" in name]
+    step = name.rpartition("_step_")[2] if "_step_" in name else ""
+    at += [f"step {step}"] if step.isdecimal() else []
+    return ", ".join([entry_label(quantity, entry), *at])

@@ -74,12 +74,11 @@ def _histogram(found: ToleranceAnalysis, index: int) -> Panel:
     one = found.criteria[index]
     scale = one.quantity.scale
     unit = f" [{one.quantity.unit}]" if one.quantity.unit else ""
-    values = found.drawn.outcomes.values[:, index] * scale
-    values = values[np.isfinite(values)]
+    edges, count = found.drawn.histogram(index, _BINS)
+    edges = edges * scale
     label = f"{one.name.replace('_', ' ')}{unit}"
-    if not len(values):
+    if not len(count):
         return Panel([Note("no robot has a result")], label, "robots [%]")
-    count, edges = np.histogram(values, _BINS)
     tops = 100.0 * count / found.draws
     lower, upper = one.lower * scale, one.upper * scale
     inside = (edges[:-1] >= lower) & (edges[1:] <= upper)

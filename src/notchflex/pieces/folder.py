@@ -1,4 +1,4 @@
-"""The folder of a sweep: its manifest, its lock, and which pieces are there."""
+"""A folder of pieces: its manifest, its lock, and which pieces are there."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from notchflex.errors import InputError
+from notchflex.pieces.manifest import Manifest
+from notchflex.pieces.piece import KEY, Done, done_of, piece_file
 from notchflex.results.files.writing import check_folder, read_text, write_text
-from notchflex.sweeping.engine.manifest import Manifest
-from notchflex.sweeping.engine.piece import KEY, Done, piece_file
-from notchflex.tolerancing.study import FAILED
 
-MANIFEST, PIECES, LOCK = "sweep.json", "pieces", ".lock"
+PIECES, LOCK = "pieces", ".lock"
 
 _OF_MANIFEST = 2**40
 """The byte of the lock that stands for the manifest, behind those of all pieces."""
@@ -28,64 +27,73 @@ class _Held:
     ranges: list[tuple[Path, int, int]] = []  # noqa: RUF012 - one for the process
 
 
-def manifest_in(folder: str | os.PathLike[str]) -> Manifest:
+def manifest_file(folder: str | os.PathLike[str], kind: str) -> Path:
+    """Return the file of the manifest, such as "sweep.json"."""
+    return Path(folder) / f"{kind}.json"
+
+
+def manifest_in(folder: str | os.PathLike[str], kind: str) -> Manifest:
     """Read the manifest of a folder.
 
     Raises:
         InputError: There is none, or it cannot be read.
     """
-    file = Path(folder) / MANIFEST
+    file, what = manifest_file(folder, kind), f"{folder} is no folder of a {kind}"
     if not Path(folder).is_dir():
-        raise InputError.FILE_NOT_FOUND(
-            f"{folder} is no folder of a sweep: there is no such folder."
-        )
+        raise InputError.FILE_NOT_FOUND(f"{what}: there is no such folder.")
     if not file.exists():
-        raise InputError.FILE_NOT_FOUND(f"{folder} is no folder of a sweep: it has no {MANIFEST}.")
-    return Manifest.read(read_text(file, "manifest"), str(file))
+        raise InputError.FILE_NOT_FOUND(f"{what}: it has no {file.name}.")
+    return Manifest.read(read_text(file, "manifest"), str(file), kind)
 
 
-def check_target(folder: str | os.PathLike[str], inputs: Iterable[str | Path] = ()) -> None:
-    """Raise if a sweep cannot be written into a folder; nothing is changed.
+def check_target(
+    folder: str | os.PathLike[str], kind: str, option: str, inputs: Iterable[str | Path] = ()
+) -> None:
+    """Raise if pieces cannot be written into a folder; nothing is changed.
 
     Args:
-        folder: The folder; it may be missing, empty, or that of a sweep.
+        folder: The folder; it may be missing, empty, or hold pieces.
+        kind: What is computed, as in the manifest.
+        option: What messages call the folder.
         inputs: Files that are read.
 
     Raises:
         InputError: It cannot be written, or it holds other files.
     """
-    check_folder(os.fspath(folder), (MANIFEST, LOCK), "-o", inputs=inputs)
+    file = manifest_file(folder, kind)
+    check_folder(os.fspath(folder), (file.name, LOCK), option, inputs=inputs)
     path = Path(folder)
-    if path.is_dir() and not (path / MANIFEST).exists():
+    if path.is_dir() and not file.exists():
         others = sorted(one.name for one in path.iterdir() if one.name not in (PIECES, LOCK))
         if others:
             raise InputError.FILE_UNWRITABLE(
-                f"-o {folder} holds other files, such as {others[0]}; give an empty folder, or one "
-                "that is not there."
+                f"{option} {folder} holds other files, such as {others[0]}; give an empty "
+                "folder, or one that is not there."
             )
 
 
 def prepare_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
-    """Make the folder of a sweep, or check that it is that of this one.
+    """Make the folder of pieces, or check that it is that of these.
 
     Raises:
-        InputError: It holds another sweep, or cannot be made.
+        InputError: It holds others, or cannot be made.
     """
-    path = Path(folder)
-    if (path / MANIFEST).exists():
-        manifest.check_same(manifest_in(path), str(folder))
+    path, kind = Path(folder), manifest.kind
+    file = manifest_file(folder, kind)
+    if file.exists():
+        manifest.check_same(manifest_in(path, kind), str(folder))
     try:
         (path / PIECES).mkdir(parents=True, exist_ok=True)
         lock = open(path / LOCK, "ab")  # noqa: SIM115 - held below
     except OSError as problem:
         words = problem.strerror or problem
-        raise InputError.FILE_UNWRITABLE(f"-o {folder} cannot be made: {words}.") from None
+        raise InputError.FILE_UNWRITABLE(f"{folder} cannot be made: {words}.") from None
     with lock:  # of two clients that begin at once the second finds the manifest of the first
         _lock(lock, _OF_MANIFEST, 1, wait=True)
-        if (path / MANIFEST).exists():
-            manifest.check_same(manifest_in(path), str(folder))
+        if file.exists():
+            manifest.check_same(manifest_in(path, kind), str(folder))
         else:
-            write_text(path / MANIFEST, manifest.text)
+            write_text(file, manifest.text)
 
 
 @contextlib.contextmanager
@@ -99,7 +107,7 @@ def locked(folder: str | os.PathLike[str], first: int, last: int) -> Generator[N
     """
     path = Path(os.path.realpath(folder))
     taken = InputError.CONFLICT(
-        f"{folder} is being written by another sweep; wait for its end, or take another folder."
+        f"{folder} is being written by another process; wait for its end, or take another folder."
     )
     if any(p == path and first < b and a < last for p, a, b in _Held.ranges):
         raise taken
@@ -137,13 +145,13 @@ def _lock(file: Any, first: int, count: int, *, wait: bool = False) -> None:
     fcntl.lockf(file.fileno(), how, count, first)
 
 
-def tidy(folder: str | os.PathLike[str], first: int, last: int) -> None:
+def tidy(folder: str | os.PathLike[str], kind: str, first: int, last: int) -> None:
     """Remove what killed processes left of pieces half written."""
     for file in (Path(folder) / PIECES).glob(".piece-*"):
         number = file.name.split("-")[1]
         if number.isdecimal() and first <= int(number) < last:
             file.unlink(missing_ok=True)
-    for pattern in (".sweep-*.json", ".summary-*.json"):
+    for pattern in (f".{kind}-*.json", ".summary-*.json"):
         for file in Path(folder).glob(pattern):
             file.unlink(missing_ok=True)
 
@@ -168,5 +176,4 @@ def done_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -
     head = head_of(file, manifest, piece)
     if head is None:
         return None
-    start, stop = manifest.between(piece)
-    return Done(piece, stop - start, sum(head["codes"][FAILED:]), file.stat().st_size)
+    return done_of(manifest, head, file.stat().st_size)

@@ -17,9 +17,9 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from notchflex.errors import InputError
+from notchflex.pieces.connection import ClusterConnection, scheduler_gone
+from notchflex.pieces.piece import Done, Recipe, Task, make_piece, task_of
 from notchflex.solver.programs.threads import number_of_cores, on_cores
-from notchflex.sweeping.engine.connection import ClusterConnection, scheduler_gone
-from notchflex.sweeping.engine.piece import Done, Worker, make_piece, worker_of
 
 _TRIM_THRESHOLD, _TOP_PAD, _MMAP_THRESHOLD = -1, -2, -3
 """Numbers of the options in <malloc.h>."""
@@ -39,11 +39,11 @@ _BEAT, _FETCH = 1.0, 10.0
 
 
 def in_threads(
-    worker: Worker, folder: str, pieces: Iterable[int], cores: int | None = None
+    task: Task, folder: str, pieces: Iterable[int], cores: int | None = None
 ) -> Generator[Done]:
     """Work on pieces in threads of this process; each piece keeps to one of them."""
     cores = cores or number_of_cores()
-    work = partial(make_piece, worker, folder)
+    work = partial(make_piece, task, folder)
     if cores == 1:
         yield from map(work, pieces)
         return
@@ -51,12 +51,12 @@ def in_threads(
         yield from found
 
 
-def on_cluster(client: Any, text: str, folder: str, pieces: Iterable[int]) -> Generator[Done]:
+def on_cluster(client: Any, task: Task, folder: str, pieces: Iterable[int]) -> Generator[Done]:
     """Work on pieces with the workers of a client of dask.
 
     Args:
         client: The client.
-        text: Text of the manifest.
+        task: What is worked on.
         folder: Path of the folder, the same for all workers.
         pieces: Numbers of the pieces.
 
@@ -66,6 +66,7 @@ def on_cluster(client: Any, text: str, folder: str, pieces: Iterable[int]) -> Ge
     import distributed
 
     connection = ClusterConnection(client)
+    recipe, text = task.recipe, task.manifest.text
     lost: Counter[int] = Counter()
     waiting = iter(pieces)
     running: dict[Any, int] = {}
@@ -74,7 +75,7 @@ def on_cluster(client: Any, text: str, folder: str, pieces: Iterable[int]) -> Ge
     def submit(numbers: Iterable[int]) -> None:
         for piece in numbers:
             # A piece is no pure function: its file may be gone while its result is remembered.
-            future = client.submit(_work, text, folder, piece, pure=False)
+            future = client.submit(_work, recipe, text, folder, piece, pure=False)
             running[future] = piece
             future.add_done_callback(finished.put)
 
@@ -128,7 +129,7 @@ def _result_of(future: Any, connection: ClusterConnection) -> Done:
             connection.check()
 
 
-def _work(text: str, folder: str, piece: int) -> Done:
+def _work(recipe: Recipe, text: str, folder: str, piece: int) -> Done:
     """Work on one piece, in a process of dask."""
     if not os.path.isdir(folder):
         raise InputError.FILE_NOT_FOUND(
@@ -136,7 +137,7 @@ def _work(text: str, folder: str, piece: int) -> Done:
         )
     keep_memory()
     with threadpool_limits(1):
-        return make_piece(worker_of(text), folder, piece)
+        return make_piece(task_of(recipe, text), folder, piece)
 
 
 @lru_cache(maxsize=1)

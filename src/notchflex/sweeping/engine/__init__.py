@@ -1,1 +1,0 @@
-"""The engine of sweeps: manifest, folder, pieces, and who works on them."""
