@@ -35,6 +35,7 @@ def measure(
     *,
     loads: str | os.PathLike[str] | None = None,
     pattern: str | None = None,
+    exif: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> MeasuredPhotographs:
     """Measure the angle of every notch in photographs of a robot from the side.
@@ -50,6 +51,8 @@ def measure(
             `tendon_force_N`.
         pattern: What the names of the files look like, with `{tension}` for the pull in N and
             `{pull}` for a label of the pull: `"wrist_{pull}_{tension}N.jpg"`.
+        exif: Whether UserComment or ImageDescription in the EXIF of each photograph gives the
+            tension: `tension=1.2 N`, and a label of the pull if wanted: `tension=1.2 N; pull=2`.
         progress: Called with the stage, how many photographs are done, and how many there are.
 
     Returns:
@@ -69,7 +72,7 @@ def measure(
     if not names:
         raise InputError.NO_DATA("there is no photograph to measure; name one or more")
     table = chain_table(robot)
-    given = loads_of(names, robot, loads, pattern)
+    given = loads_of(names, robot, loads, pattern, exif)
     measured: list[MeasuredPhotograph] = []
     for number, name in enumerate(names):
         measured.append(measure_picture(read_photograph(name), table, name))

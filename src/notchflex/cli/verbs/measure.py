@@ -50,6 +50,10 @@ def measure(
             "`{pull}` for a label of the pull."
         ),
     ] = None,
+    exif: Annotated[
+        bool,
+        flag("Read the tension from the EXIF of each photograph: a comment `tension=1.2 N`."),
+    ] = False,
     overlays: Annotated[
         str | None,
         Parameter(
@@ -89,7 +93,7 @@ def measure(
     The outline of the robot file is fitted to the edges of each photograph. A photograph in which
     anything is doubtful is refused with its reason (exit code 1); look at the overlays.
     """
-    _check_options(cut, turn, write_robot, loads, pattern)
+    _check_options(cut, turn, write_robot, exif or loads is not None or pattern is not None)
     inputs = [*photographs, *robot_files(robot), *([] if loads is None else [loads])]
     folder = overlays
     if folder is None and output not in (None, "-"):
@@ -117,17 +121,17 @@ def measure(
         if cut:
             as_cut = measure_cut(photographs, chosen, turn_deg=turn, progress=progress)
             return write_cut(as_cut, outputs, output, write_robot, files)
-        found = measured(photographs, chosen, loads=loads, pattern=pattern, progress=progress)
+        found = measured(
+            photographs, chosen, loads=loads, pattern=pattern, exif=exif, progress=progress
+        )
     _write(found, outputs, output, files)
     return DONE if not found.refused else NOT_CONVERGED
 
 
-def _check_options(
-    cut: bool, turn: tuple[float, ...], robot: str | None, loads: str | None, pattern: str | None
-) -> None:
-    if cut and (loads is not None or pattern is not None):
+def _check_options(cut: bool, turn: tuple[float, ...], robot: str | None, loaded: bool) -> None:
+    if cut and loaded:
         raise InputError.CONFLICT(
-            "--cut: straight robots have no loads; leave out --loads, --pattern"
+            "--cut: straight robots have no loads; leave out --loads, --pattern and --exif"
         )
     if not cut and (turn or robot is not None):
         raise InputError.MISSING_VALUE("--turn and --write-robot need --cut")
@@ -154,7 +158,7 @@ def _write(
     if output is not None and not found.measured:
         terminal.error(f"no photograph was measured; {output} is not written.")
     elif output is not None and not found.loads:
-        terminal.note("calibrate needs loads too: give --loads or --pattern.")
+        terminal.note("calibrate needs loads too: give --loads, --pattern or --exif.")
 
 
 def _print(found: MeasuredPhotographs) -> None:

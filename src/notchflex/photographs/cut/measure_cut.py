@@ -16,7 +16,7 @@ from notchflex.photographs.cut.measured_cut import LENGTHS, MeasuredCut
 from notchflex.photographs.cut.straight import StraightFit, fit_straight
 from notchflex.photographs.measured import MeasuredPhotograph
 from notchflex.photographs.reading import read_photograph
-from notchflex.robot import Robot
+from notchflex.robot import ArcNotch, Robot
 
 MOST_TURN_DEG = 40.0
 """Most that the robot is turned between photographs, deg: all are taken from the side."""
@@ -110,7 +110,7 @@ def combined(table: ChainTable, fits: Sequence[StraightFit], turns: Numbers) -> 
     if apart > _APART:
         return _cut(table, seen, turns, "the photographs contradict each other; check the turns")
     n = table.notches
-    depth = np.array([notch.depth for notch in table.robot.notches], float)
+    depth = np.array([notch.depth for notch in table.robot.notches if isinstance(notch, ArcNotch)])
     beyond = table.depth - table.outer  # depths may count from elsewhere than the outer surface
     slope = np.where(np.abs(beyond) > 1e-6, (depth - table.outer) / (beyond + 1e-300), 1.0)
     values = {

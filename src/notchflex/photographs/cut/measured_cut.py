@@ -55,7 +55,7 @@ class MeasuredCut:
 
     def columns(self) -> dict[str, Numbers]:
         """Return the columns of the CSV table: one row a notch."""
-        columns: dict[str, Numbers] = {"notch": np.arange(1, len(self.height) + 1)}
+        columns: dict[str, Numbers] = {"notch": np.arange(1.0, len(self.height) + 1)}
         for name in LENGTHS:
             columns[f"{name}_mm"] = getattr(self, name)
             columns[f"{name}_sd_mm"] = getattr(self, f"{name}_deviation")
@@ -68,8 +68,9 @@ class MeasuredCut:
             InputError: The file cannot be written.
         """
         table = self.columns()
-        rows = zip(*(column.tolist() for column in table.values()), strict=True)
-        write_csv(target, list(table), rows)
+        columns = [column.tolist() for column in table.values()]
+        columns[0] = [int(notch) for notch in columns[0]]
+        write_csv(target, list(table), zip(*columns, strict=True))
 
     def as_cut(self) -> Robot:
         """Return the robot with the measured heights, depths and uncut lengths.

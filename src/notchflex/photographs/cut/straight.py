@@ -29,6 +29,7 @@ _WIDTH = 300.0  # of the tube beyond which a photograph is made smaller, px
 _REACH, _LAST = 0.08, 4.0  # of the width of the tube, and px, within which edges are looked for
 _ROUNDS = 30
 _CORNER = 0.35  # outer radii: blurred corners beside spines shift ends
+_BENT = "the robot is bent; photograph it straight"
 _MOST_ANGLE = math.radians(12.0)
 _EDGE_NOISE = 0.08  # px
 _STEP = 1e-5  # mm, rad
@@ -59,9 +60,9 @@ def fit_straight(picture: NDArray[np.uint8], table: ChainTable, name: str) -> St
     whole = contrast(picture)
     located = locate(table, whole)
     if located is None:
-        none = np.full(n, np.nan)
-        refused = refused_photograph(name, table, NO_TUBE)
-        return StraightFit(refused, np.tile(none, 2), np.zeros((0, 0)), none, np.zeros((0, 0)))
+        return _refused(refused_photograph(name, table, NO_TUBE), n)
+    if np.abs(located.fit.numbers[NUMBERS:]).max() > 1.5 * _MOST_ANGLE:
+        return _refused(refused_photograph(name, table, _BENT), n)
     numbers = np.concatenate([located.fit.numbers, np.zeros(3 * n + 1)])
     wide = 2.0 * table.outer * math.exp(numbers[3]) / located.factor
     fine = min(1.0, _WIDTH / wide)
@@ -82,7 +83,7 @@ def fit_straight(picture: NDArray[np.uint8], table: ChainTable, name: str) -> St
     deviation = np.sqrt(np.maximum(np.diag(both)[angles], 0.0))
     reason = doubt(found, deviation, noise)
     if not reason and np.abs(fit.numbers[angles]).max() > _MOST_ANGLE:
-        reason = "the robot is bent; photograph it straight"
+        reason = _BENT
     judged = (reason, noise, factor * fine)
     photograph = judged_photograph(name, found, both[angles, angles], judged, middle)
     rows, slopes = _lengths(n, len(numbers)), _edge_slopes(table, fit.numbers)
@@ -93,6 +94,11 @@ def fit_straight(picture: NDArray[np.uint8], table: ChainTable, name: str) -> St
         _edges(table, fit.numbers),
         slopes @ both @ slopes.T,
     )
+
+
+def _refused(photograph: MeasuredPhotograph, n: int) -> StraightFit:
+    none, spread = np.full(n, np.nan), np.zeros((0, 0))
+    return StraightFit(photograph, np.tile(none, 2), spread, none, spread)
 
 
 def _tilted(table: ChainTable, numbers: Numbers) -> list[Numbers]:
