@@ -17,11 +17,11 @@ from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_t
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import covariance
 from notchflex.photographs.judging import doubt
-from notchflex.photographs.loads import loads_of
 from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.missing import NEAR
 from notchflex.photographs.reading import read_photograph
+from notchflex.photographs.taken.loads import loads_of
 from notchflex.robot import Robot
 
 NO_TUBE = "no tube of the proportions of the robot is seen"

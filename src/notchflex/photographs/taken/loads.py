@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from notchflex.errors import InputError
-from notchflex.photographs.exif import exif_texts
 from notchflex.photographs.measured import PHOTOGRAPH
 from notchflex.photographs.reading import photograph_bytes
+from notchflex.photographs.taken.exif import exif_texts
 from notchflex.results.files.csv_reading import read_table
 from notchflex.robot import Robot
 
