@@ -38,7 +38,7 @@ NAMES = [
     "DeckOptions", "Exported", "PatternOptions", "SimulatorOptions",
     "SolidOptions", "export_robot",
     "write_fitted", "calibrate", "compare", "Comparison", "Specimen", "update_specimen",
-    "MeasuredPhotograph", "MeasuredPhotographs", "measure",
+    "MeasuredPhotograph", "MeasuredPhotographs", "measure", "measure_cut", "MeasuredCut",
     "SensedForce", "SensorNoise", "sense", "Workspace", "workspace",
     "AcceptanceLimit", "ToleranceSpec", "ToleranceAnalysis", "tolerance_analysis",
     "read_tolerance_spec",

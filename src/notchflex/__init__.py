@@ -153,9 +153,11 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "MeasuredCut",
             "MeasuredPhotograph",
             "MeasuredPhotographs",
             "measure",
+            "measure_cut",
         ),
         "notchflex.photographs",
     ),

@@ -81,9 +81,11 @@ from notchflex.mechanics.flexure import modulus_from_single_notch as modulus_fro
 from notchflex.mechanics.section import Section as Section
 from notchflex.mechanics.section import annular_sector as annular_sector
 from notchflex.mechanics.section import annular_segment as annular_segment
+from notchflex.photographs import MeasuredCut as MeasuredCut
 from notchflex.photographs import MeasuredPhotograph as MeasuredPhotograph
 from notchflex.photographs import MeasuredPhotographs as MeasuredPhotographs
 from notchflex.photographs import measure as measure
+from notchflex.photographs import measure_cut as measure_cut
 from notchflex.results import Equilibrium as Equilibrium
 from notchflex.results import EquilibriumPath as EquilibriumPath
 from notchflex.results import State as State

@@ -96,9 +96,11 @@ VERBS = {
         "        --fit material.elastic_modulus,friction.coefficient --plot fit.png",
     ),
     "measure": (
-        "Measure the angle of every notch in photographs of a bent robot.",
+        "Measure the angle of every notch in photographs of a bent robot, or its notches as cut.",
         "notchflex measure pull_0.5N.jpg pull_1N.jpg --robot pacheco2021-a \\\n"
-        '        --pattern "pull_{tension}N" -o measured.csv',
+        '        --pattern "pull_{tension}N" -o measured.csv\n'
+        "    notchflex measure straight.jpg turned.jpg --robot pacheco2021-a --cut --turn 20 \\\n"
+        "        -o cut.csv --write-robot as-cut.toml",
     ),
     "tolerance": (
         "Find out what tolerances do: worst case, yield, which dimension to control.",

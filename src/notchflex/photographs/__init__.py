@@ -1,6 +1,8 @@
-"""Photographs of bent robots: the angle of every notch, with standard deviations."""
+"""Photographs: the notch angles of bent robots, the notches of straight ones, with deviations."""
 
+from notchflex.photographs.cut.measure_cut import measure_cut
+from notchflex.photographs.cut.measured_cut import MeasuredCut
 from notchflex.photographs.measure import measure
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 
-__all__ = ["MeasuredPhotograph", "MeasuredPhotographs", "measure"]
+__all__ = ["MeasuredCut", "MeasuredPhotograph", "MeasuredPhotographs", "measure", "measure_cut"]

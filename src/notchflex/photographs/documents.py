@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from notchflex.photographs.cut.measured_cut import MeasuredCut
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.results.files.json import document_head
 
@@ -20,6 +21,17 @@ def measured_document(found: MeasuredPhotographs) -> dict[str, Any]:
     return {**document_head(found.robot), "photographs": photographs}
 
 
+def cut_document(found: MeasuredCut) -> dict[str, Any]:
+    """Return the JSON document of notches that were measured: why not, if they were refused."""
+    photographs = [
+        {"photograph": one.source, "turn_deg": math.degrees(turn), **_view(one)}
+        for one, turn in zip(found.photographs, found.turns, strict=True)
+    ]
+    told: dict[str, Any] = {"measured": found.measured, "photographs": photographs}
+    told |= found.columns() if found.measured else {"reason": found.reason}
+    return {**document_head(found.robot), **told}
+
+
 def _entry(one: MeasuredPhotograph) -> dict[str, Any]:
     entry: dict[str, Any] = {"photograph": one.source, "measured": one.measured}
     if not one.measured:
@@ -30,6 +42,12 @@ def _entry(one: MeasuredPhotograph) -> dict[str, Any]:
         "notch_angle_sd_deg": np.degrees(one.notch_angle_deviation),
         "tip_position_mm": one.tip_position,
         "tip_position_sd_mm": one.tip_deviation,
+        **_view(one),
+    }
+
+
+def _view(one: MeasuredPhotograph) -> dict[str, Any]:
+    return {
         "scale_px_mm": one.scale,
         "roll_deg": math.degrees(one.roll),
         "tilt_deg": math.degrees(one.tilt),

@@ -16,6 +16,8 @@ from notchflex.photographs.lines import Lines, lines_of
 
 _PRIOR_ROLL, _PRIOR_TILT = math.radians(10.0), math.radians(8.0)
 _PRIOR_KERF, _PRIOR_CUT = 0.01, 0.006  # of the outer diameter: how well notches are made
+_PRIOR_OWN, _MOST_OWN = 0.1, 0.2  # of the outer diameter: how far a notch may be off by itself
+_PRIOR_ANY = 1.0  # of the outer diameter: roll and depth are told apart by other photographs
 _PRIOR_NEAR, _NEAR = 0.006, 0.006  # inverse distance of the camera, per outer diameter
 _EDGE = 0.25  # px: noise of an edge in quick rounds
 _LEAST_NOISE = 0.05  # px
@@ -149,7 +151,8 @@ def _stepped(
             break
         free[:count] &= ~beyond  # numbers at a bound stay there, the others are solved again
     moved = step[:count]
-    moved = moved * min(1.0, _MOST_TURN / max(float(np.abs(moved[NUMBERS:]).max()), 1e-12))
+    turned = moved[NUMBERS : NUMBERS + model.table.notches]
+    moved = moved * min(1.0, _MOST_TURN / max(float(np.abs(turned).max()), 1e-12))
     return np.clip(numbers + moved, low, high)
 
 
@@ -175,6 +178,9 @@ def priors(model: OutlineModel, numbers: Numbers) -> tuple[Numbers, Numbers]:
     spread[5] = _PRIOR_TILT
     centre[6], spread[6] = _NEAR / outer, _PRIOR_NEAR / outer
     spread[7], spread[8] = _PRIOR_KERF * outer, _PRIOR_CUT * outer
+    n = model.table.notches
+    spread[NUMBERS + n :] = _PRIOR_OWN * outer
+    spread[NUMBERS + 2 * n : NUMBERS + 3 * n] = _PRIOR_ANY * outer
     return centre, spread
 
 
@@ -187,19 +193,22 @@ def _bounds(model: OutlineModel, numbers: Numbers) -> tuple[Numbers, Numbers]:
     low[6], high[6] = 0.0, 0.03 / outer
     low[7], high[7] = -0.08 * outer, 0.08 * outer
     low[8], high[8] = -0.08 * outer, 0.08 * outer
-    low[NUMBERS:], high[NUMBERS:] = -0.6, 1.9
+    angles = slice(NUMBERS, NUMBERS + model.table.notches)
+    low[angles], high[angles] = -0.6, 1.9
+    low[angles.stop :], high[angles.stop :] = -_MOST_OWN * outer, _MOST_OWN * outer
     return low, high
 
 
 def _scales(model: OutlineModel, numbers: Numbers) -> Numbers:
     scale = math.exp(numbers[3])
     view = [1.0, 1.0, 0.01, 0.01, 0.05, 0.05, 0.003, 1.0 / scale, 1.0 / scale]
-    return np.array([*view, *[0.01] * model.table.notches])
+    own = len(numbers) - NUMBERS - model.table.notches
+    return np.array([*view, *[0.01] * model.table.notches, *[1.0 / scale] * own])
 
 
 def _jacobian(model: OutlineModel, numbers: Numbers, normal: Numbers) -> Numbers:
     """Return derivatives of where the outline lies along fixed normals, (N, numbers)."""
-    steps = np.concatenate([_STEPS, np.full(model.table.notches, 1e-4)])
+    steps = np.concatenate([_STEPS, np.full(len(numbers) - NUMBERS, 1e-4)])
     both = np.vstack([numbers, numbers + np.diag(steps)])
     seen = np.einsum("bnk,nk->bn", model.outline(both).point, normal)
     return ((seen[1:] - seen[0]) / steps[:, None]).T

@@ -17,13 +17,14 @@ from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_t
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import covariance
 from notchflex.photographs.judging import doubt
-from notchflex.photographs.loads import loads_of
 from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.missing import NEAR
 from notchflex.photographs.reading import read_photograph
+from notchflex.photographs.taken.loads import loads_of
 from notchflex.robot import Robot
 
+NO_TUBE = "no tube of the proportions of the robot is seen"
 WORKED_ON = 8.0e6
 """Pixels of a photograph beyond which it is made smaller before it is measured."""
 
@@ -34,6 +35,7 @@ def measure(
     *,
     loads: str | os.PathLike[str] | None = None,
     pattern: str | None = None,
+    exif: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> MeasuredPhotographs:
     """Measure the angle of every notch in photographs of a robot from the side.
@@ -49,6 +51,8 @@ def measure(
             `tendon_force_N`.
         pattern: What the names of the files look like, with `{tension}` for the pull in N and
             `{pull}` for a label of the pull: `"wrist_{pull}_{tension}N.jpg"`.
+        exif: Whether UserComment or ImageDescription in the EXIF of each photograph gives the
+            tension: `tension=1.2 N`, and a label of the pull if wanted: `tension=1.2 N; pull=2`.
         progress: Called with the stage, how many photographs are done, and how many there are.
 
     Returns:
@@ -68,7 +72,7 @@ def measure(
     if not names:
         raise InputError.NO_DATA("there is no photograph to measure; name one or more")
     table = chain_table(robot)
-    given = loads_of(names, robot, loads, pattern)
+    given = loads_of(names, robot, loads, pattern, exif)
     measured: list[MeasuredPhotograph] = []
     for number, name in enumerate(names):
         measured.append(measure_picture(read_photograph(name), table, name))
@@ -85,34 +89,50 @@ def measure_picture(picture: NDArray[np.uint8], table: ChainTable, name: str) ->
         table: The robot.
         name: What the photograph is called.
     """
+    picture, factor = smaller(picture)
+    located = locate(table, contrast(picture))
+    if located is None:
+        return refused_photograph(name, table, NO_TUBE)
+    factor *= located.factor
+    both, noise = covariance(located.fit, located.model)
+    angles = slice(NUMBERS, NUMBERS + table.notches)
+    deviation = np.sqrt(np.maximum(np.diag(both)[angles], 0.0))
+    reason = doubt(located, deviation, noise)
+    middle = (np.array([picture.shape[1], picture.shape[0]]) * located.factor - 1.0) / 2.0
+    return judged_photograph(name, located, both[angles, angles], (reason, noise, factor), middle)
+
+
+def smaller(picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
+    """Return a photograph of `WORKED_ON` pixels at most, and by how much it was made smaller."""
     import cv2
 
     factor = min(1.0, math.sqrt(WORKED_ON / (picture.shape[0] * picture.shape[1])))
-    if factor < 1.0:
-        smaller: Any = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-        picture = smaller
-    located = locate(table, contrast(picture))
-    if located is None:
-        return _refused(name, table, "no tube of the proportions of the robot is seen")
-    factor *= located.factor
-    both, noise = covariance(located.fit, located.model)
-    deviation = np.sqrt(np.maximum(np.diag(both)[NUMBERS:], 0.0))
-    reason = doubt(located, deviation, noise)
-    middle = (np.array([picture.shape[1], picture.shape[0]]) * located.factor - 1.0) / 2.0
-    spread = both[NUMBERS:, NUMBERS:]
-    return _measured(name, located, spread, (reason, noise, factor), middle)
+    if factor == 1.0:
+        return picture, factor
+    made: Any = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+    return made, factor
 
 
-def _measured(
+def judged_photograph(
     name: str,
     located: Located,
     spread: Numbers,
     judged: tuple[str, float, float],
     middle: Numbers,
 ) -> MeasuredPhotograph:
+    """Return what a fit says about a photograph.
+
+    Args:
+        name: What the photograph is called.
+        located: The fit.
+        spread: Covariance of the angles, rad^2, (n, n).
+        judged: Why the photograph is refused ("" if not), noise of the edges (px), and by how much
+            the photograph was made smaller.
+        middle: Middle of the photograph that was made smaller, px.
+    """
     reason, noise, factor = judged
     fit, table = located.fit, located.model.table
-    angles = fit.numbers[NUMBERS:]
+    angles = fit.numbers[NUMBERS : NUMBERS + table.notches]
     outline = (fit.outline.point[0] + middle + 0.5) / factor - 0.5
     view: dict[str, Any] = {
         "scale": math.exp(fit.numbers[3]) / factor,
@@ -124,7 +144,7 @@ def _measured(
         "seen": np.abs(fit.residual) < NEAR,
     }
     if reason:
-        return _refused(name, table, reason, **view)
+        return refused_photograph(name, table, reason, **view)
     steps = 1e-4 * np.vstack([np.zeros(len(angles)), np.eye(len(angles))])
     tips, _ = tip_from_angles(table.robot, angles + steps)
     slopes = (tips[1:] - tips[0]).T / 1e-4
@@ -135,6 +155,9 @@ def _measured(
     )
 
 
-def _refused(name: str, table: ChainTable, reason: str, **view: Any) -> MeasuredPhotograph:
+def refused_photograph(
+    name: str, table: ChainTable, reason: str, **view: Any
+) -> MeasuredPhotograph:
+    """Return a photograph of which nothing is reported, with the reason."""
     nothing, nowhere = np.full(table.notches, np.nan), np.full(3, np.nan)
     return MeasuredPhotograph(name, reason, nothing, nothing, nowhere, nowhere, **view)

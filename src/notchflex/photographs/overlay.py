@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex.photographs.cut.measured_cut import MeasuredCut
 from notchflex.photographs.measured import MeasuredPhotograph
 from notchflex.results.files.writing import replacing
 
@@ -35,11 +36,20 @@ def overlay_names(sources: Sequence[str]) -> list[str]:
 
 
 def write_overlay(
-    target: str | Path, picture: NDArray[np.uint8], found: MeasuredPhotograph
+    target: str | Path,
+    picture: NDArray[np.uint8],
+    found: MeasuredPhotograph,
+    lines: Sequence[str] = (),
 ) -> None:
     """Draw the fitted outline and the angles over a photograph, and write it as PNG.
 
     Green points lie on an edge, orange ones on none. The photograph is made smaller.
+
+    Args:
+        target: The file.
+        picture: The photograph, (height, width, 3).
+        found: What was measured in it.
+        lines: What is written instead of the angles.
 
     Raises:
         InputError: The file cannot be written.
@@ -55,7 +65,7 @@ def write_overlay(
             at = (round(16 * float(point[0])), round(16 * float(point[1])))
             colour = _FOUND if seen else _MISSED
             cv2.circle(small, at, round(16 * 1.3 * size), colour, -1, cv2.LINE_AA, 4)
-    lines = [f"refused: {found.reason}"] if found.reason else _lines(found)
+    lines = [f"refused: {found.reason}"] if found.reason else lines or _lines(found)
     colour = _REFUSED if found.reason else (255, 255, 255)
     height = round(26 * size)
     for number, text in enumerate(lines, 1):
@@ -72,6 +82,18 @@ def write_overlay(
     assert done
     with replacing(target) as path:
         path.write_bytes(data.tobytes())
+
+
+def cut_lines(found: MeasuredCut) -> list[str]:
+    """Return what is written over photographs of a straight robot."""
+    if found.reason:
+        return [f"refused: {found.reason}"]
+    columns = (found.height, found.height_deviation, found.depth, found.depth_deviation)
+    return [
+        f"notch {number}: height {height:.3f} +- {of_height:.3f}, "
+        f"depth {depth:.3f} +- {of_depth:.3f} mm"
+        for number, (height, of_height, depth, of_depth) in enumerate(zip(*columns, strict=True), 1)
+    ]
 
 
 def _lines(found: MeasuredPhotograph) -> list[str]:

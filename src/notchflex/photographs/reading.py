@@ -25,7 +25,7 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """
     need("cv2", "photographs", "measuring photographs")
     name = os.fspath(source)
-    data = _bytes(name)
+    data = photograph_bytes(name)
     _check_size(name, *_size_in_head(data))
     image = _decoded(data)
     if image is None or image.ndim != 3:
@@ -51,7 +51,12 @@ def _decoded(data: bytes) -> Any:
             logging.setLogLevel(level)
 
 
-def _bytes(name: str) -> bytes:
+def photograph_bytes(name: str) -> bytes:
+    """Return the bytes of a file that may be a photograph.
+
+    Raises:
+        InputError: There is no such file, it cannot be read, or it is too large.
+    """
     try:
         path = Path(name)
         is_folder, size = path.is_dir(), path.stat().st_size

@@ -7,14 +7,22 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from notchflex._load_words import number
 from notchflex.cli import terminal
+from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.arguments.robots import Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet, output_file
+from notchflex.cli.tables.measured_cut import write_cut
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
-from notchflex.results.files.writing import check_folder
+from notchflex.errors import InputError
+from notchflex.results.files.writing import check_folder, check_output
 
 if TYPE_CHECKING:
     from notchflex.photographs import MeasuredPhotographs
+
+
+def _angle(text: str) -> float:
+    return number(text, "an angle in deg, such as 20")
 
 
 def measure(
@@ -42,6 +50,10 @@ def measure(
             "`{pull}` for a label of the pull."
         ),
     ] = None,
+    exif: Annotated[
+        bool,
+        flag("Read the tension from the EXIF of each photograph: a comment `tension=1.2 N`."),
+    ] = False,
     overlays: Annotated[
         str | None,
         Parameter(
@@ -50,6 +62,27 @@ def measure(
             help="Write each photograph with its fitted outline as PNG into this folder; with `-o "
             "NAME.csv` NAME-overlays by default.",
         ),
+    ] = None,
+    cut: Annotated[
+        bool,
+        flag(
+            "Measure height, depth and uncut length of every notch instead, in photographs of the "
+            "straight robot."
+        ),
+    ] = False,
+    turn: Annotated[
+        tuple[float, ...],
+        converted(
+            _angle,
+            "DEG",
+            several=True,
+            help="With `--cut`: by how much the robot was turned about its axis for each "
+            "photograph after the first, from the first on [deg].",
+        ),
+    ] = (),
+    write_robot: Annotated[
+        str | None,
+        output_file("--write-robot", "With `--cut`: write the robot as it was cut to this file."),
     ] = None,
     settings: Settings = (),
     json: JsonFile = None,
@@ -60,6 +93,7 @@ def measure(
     The outline of the robot file is fitted to the edges of each photograph. A photograph in which
     anything is doubtful is refused with its reason (exit code 1); look at the overlays.
     """
+    _check_options(cut, turn, write_robot, exif or loads is not None or pattern is not None)
     inputs = [*photographs, *robot_files(robot), *([] if loads is None else [loads])]
     folder = overlays
     if folder is None and output not in (None, "-"):
@@ -72,19 +106,35 @@ def measure(
     named = {f"--overlays ({file.name})": str(file) for file in files}
     if output is not None:
         named = {"-o": output, **named}
+    if write_robot is not None:
+        named["--write-robot"] = write_robot
     outputs = Outputs(inputs, quiet=quiet, files=named, json=json)
-    if output is not None:
-        from notchflex.results.files.writing import check_output
-
-        check_output(output, "-o", inputs=inputs)
+    for option, target in (("-o", output), ("--write-robot", write_robot)):
+        if target is not None:
+            check_output(target, option, inputs=inputs)
     chosen = chosen_robot(robot, settings)
     with terminal.bars("measuring") as progress:
         terminal.use_compile_cache()
         from notchflex.photographs import measure as measured
+        from notchflex.photographs import measure_cut
 
-        found = measured(photographs, chosen, loads=loads, pattern=pattern, progress=progress)
+        if cut:
+            as_cut = measure_cut(photographs, chosen, turn_deg=turn, progress=progress)
+            return write_cut(as_cut, outputs, output, write_robot, files)
+        found = measured(
+            photographs, chosen, loads=loads, pattern=pattern, exif=exif, progress=progress
+        )
     _write(found, outputs, output, files)
     return DONE if not found.refused else NOT_CONVERGED
+
+
+def _check_options(cut: bool, turn: tuple[float, ...], robot: str | None, loaded: bool) -> None:
+    if cut and loaded:
+        raise InputError.CONFLICT(
+            "--cut: straight robots have no loads; leave out --loads, --pattern and --exif"
+        )
+    if not cut and (turn or robot is not None):
+        raise InputError.MISSING_VALUE("--turn and --write-robot need --cut")
 
 
 def _write(
@@ -108,7 +158,7 @@ def _write(
     if output is not None and not found.measured:
         terminal.error(f"no photograph was measured; {output} is not written.")
     elif output is not None and not found.loads:
-        terminal.note("calibrate needs loads too: give --loads or --pattern.")
+        terminal.note("calibrate needs loads too: give --loads, --pattern or --exif.")
 
 
 def _print(found: MeasuredPhotographs) -> None:

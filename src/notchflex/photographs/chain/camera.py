@@ -11,20 +11,26 @@ VIEW = ("x", "y", "direction", "log_scale", "roll", "tilt", "perspective", "kerf
 """Numbers of a view, before the angles: place of the start of the first notch from the middle of
 the photograph (px), direction of the base (rad), logarithm of the scale (px/mm), roll about the
 tube axis and tilt out of the photograph (rad), inverse distance of the camera (1/mm), and what the
-notches are higher and deeper than in the robot file (mm)."""
+notches are higher and deeper than in the robot file (mm). The angles of the n notches follow (rad).
+Where every notch is measured too, 3 n + 1 lengths follow these (mm): what each is higher and deeper
+than the others, how far each lies nearer to the tip than in the robot file, and the tip."""
 NUMBERS = len(VIEW)
 
 
 class View:
-    """The numbers of b views."""
+    """The numbers of b views of a robot of n notches."""
 
-    def __init__(self, numbers: Numbers) -> None:
+    def __init__(self, numbers: Numbers, notches: int) -> None:
         one = dict(zip(VIEW, numbers.T, strict=False))
-        self.angles = numbers[:, NUMBERS:]
+        self.angles = numbers[:, NUMBERS : NUMBERS + notches]
+        own = numbers[:, NUMBERS + notches :]
+        if not own.size:
+            own = np.zeros((len(numbers), 3 * notches + 1))
+        kerf, cut, self.moved = np.split(own, [notches, 2 * notches], axis=1)
         self.scale = np.exp(one["log_scale"])
         self.place = numbers[:, :2]
         self.perspective = one["perspective"]
-        self.kerf, self.cut = one["kerf"][:, None], one["cut"][:, None]
+        self.kerf, self.cut = one["kerf"][:, None] + kerf, one["cut"][:, None] + cut
         rotation = _rotation(one["direction"], one["roll"], one["tilt"])
         self.x, self.y, self.z = rotation[..., 0], rotation[..., 1], rotation[..., 2]
 

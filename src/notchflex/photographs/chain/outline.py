@@ -52,12 +52,14 @@ class OutlineModel:
         per_side: Points on each side of a ring.
         per_face: Points on each end of a ring.
         base: Length of the straight tube before the first notch that is looked at, mm.
+        corner: Part of an end next to the spine that is not used, outer radii.
     """
 
     table: ChainTable
     per_side: int = 24
     per_face: int = 16
     base: float = 1.0
+    corner: float = 0.12
 
     def __post_init__(self) -> None:
         """Number all points: kind, ring or notch, side or end, place along it."""
@@ -92,9 +94,10 @@ class OutlineModel:
         """Return the outline of views and angles.
 
         Args:
-            numbers: Numbers of `VIEW` and angles (rad), (b, NUMBERS + n).
+            numbers: Numbers of `VIEW`, angles (rad) and, where notches are measured, their
+                lengths (mm), (b, NUMBERS + n) or (b, NUMBERS + 4 n + 1).
         """
-        view = View(np.atleast_2d(numbers))
+        view = View(np.atleast_2d(numbers), self.table.notches)
         start, turned = self.table.poses(view.angles)
         point = np.zeros((len(view.angles), len(self.kind), 3))
         tangent = np.zeros_like(point)
@@ -154,25 +157,31 @@ class OutlineModel:
         self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
     ) -> tuple[Numbers, Numbers]:
         ring = self.ring[part]
-        half = 0.5 * view.kerf
-        first = np.where(ring > 0, half, -self.base)
-        length = np.append(self.base, self.table.uncut)[ring]
-        last = np.where(ring == 0, 0.0, length) - np.where(ring < self.table.notches, half, 0.0)
+        begin, end = self._ends(view)
+        first, last = begin[:, ring], end[:, ring]
         frame = Frame(view, start, turned, ring)
         centre = frame.at(first + (last - first) * self.place[part])
         lateral, _ = frame.lateral(centre)
         across = self.table.outer * self.which[part]
         return centre + across[:, None] * lateral, frame.axis
 
+    def _ends(self, view: View) -> tuple[Numbers, Numbers]:
+        """Return where the rings begin and end, along each from its start, mm, (b, n + 1)."""
+        n, half = self.table.notches, 0.5 * view.kerf
+        begin = np.full((len(half), n + 1), -self.base)
+        begin[:, 1:] = half + view.moved[:, :n]
+        end = np.append(0.0, self.table.uncut) + view.moved
+        end[:, :n] -= half
+        return begin, end
+
     def _faces(
         self, view: View, start: Numbers, turned: Numbers, part: NDArray[np.bool_]
     ) -> tuple[Numbers, Numbers]:
         ring, which = self.ring[part], self.which[part]
-        n, half = self.table.notches, 0.5 * view.kerf
-        far = np.where(ring < n, np.append(0.0, self.table.uncut)[ring] - half, 0.0)
-        far = np.where(ring == n, self.table.uncut[-1], far)
+        n = self.table.notches
+        begin, end = self._ends(view)
         frame = Frame(view, start, turned, ring)
-        centre = frame.at(np.where(which > 0, far, half))
+        centre = frame.at(np.where(which > 0, end[:, ring], begin[:, ring]))
         lateral, toward = frame.lateral(centre)
         notch = np.clip(np.where(which > 0, ring, ring - 1), 0, n - 1)
         tip = (which > 0) & (ring == n)
@@ -180,7 +189,7 @@ class OutlineModel:
         # The part of an end beside the notch; the whole end at the tip.
         edge = self._spine_edge(view, lateral, frame, notch)
         r = self.table.outer
-        low = np.where(tip, -0.9 * r, np.minimum(edge * side + 0.12 * r, 0.8 * r))
+        low = np.where(tip, -0.9 * r, np.minimum(edge * side + self.corner * r, 0.8 * r))
         q = side * (low + (0.92 * r - low) * self.place[part]) / r
         depth = np.sqrt(1.0 - q**2)
         # The half of the circle that bulges out of the ring.
@@ -218,18 +227,32 @@ class OutlineModel:
         self, view: View, lateral: Numbers, frame: Frame, notch: NDArray[np.int_]
     ) -> Numbers:
         """Return where the inner edge of a spine is seen, along `lateral` from the axis, mm."""
-        t = self.table
-        depth = np.clip(t.depth[notch] + view.cut, 0.02 * t.outer, 1.98 * t.outer)
-        cosine = (depth - t.outer) / t.outer
-        side = t.side[notch]
+        side = self.table.side[notch]
         x = (lateral * frame.x).sum(axis=-1) * side
         y = np.abs((lateral * view.y[:, None]).sum(axis=-1))
-        high = -np.inf
-        for radius in (t.outer, t.inner):
-            cos = np.where(t.radial[notch], cosine, np.clip(cosine * t.outer / radius, -1.0, 1.0))
-            sin = np.sqrt(1.0 - cos**2)
-            high = np.maximum(high, radius * (-cos * x + sin * y))
-        return side * high
+        return side * spine_edge(self.table, notch, view.cut[:, notch], x, y)
+
+
+def spine_edge(
+    table: ChainTable, notch: NDArray[np.int_], cut: Numbers, x: Numbers, y: Numbers
+) -> Numbers:
+    """Return how high over the axis, toward the notch, the inner edge of a spine is seen, mm.
+
+    Args:
+        table: The robot.
+        notch: Which notches, from 0.
+        cut: What they are deeper than in the robot file, mm.
+        x: Cosine of the roll, the component of the side of the notch across the line of sight.
+        y: Sine of the roll, not negative.
+    """
+    outer = table.outer
+    depth = np.clip(table.depth[notch] + cut, 0.02 * outer, 1.98 * outer)
+    cosine = (depth - outer) / outer
+    high = -np.inf
+    for radius in (outer, table.inner):
+        cos = np.where(table.radial[notch], cosine, np.clip(cosine * outer / radius, -1.0, 1.0))
+        high = np.maximum(high, radius * (-cos * x + np.sqrt(1.0 - cos**2) * y))
+    return high
 
 
 def _block(

@@ -1,4 +1,4 @@
-"""The loads under which photographs were taken: from a table, or from the names of the files."""
+"""The loads under which photographs were taken: by a table, the names of the files, or EXIF."""
 
 from __future__ import annotations
 
@@ -9,10 +9,18 @@ from pathlib import Path
 
 from notchflex.errors import InputError
 from notchflex.photographs.measured import PHOTOGRAPH
+from notchflex.photographs.reading import photograph_bytes
+from notchflex.photographs.taken.exif import exif_texts
 from notchflex.results.files.csv_reading import read_table
 from notchflex.robot import Robot
 
 _FIELDS = {"tension": r"(?P<tension>\d+(?:[.,]\d+)?)", "pull": r"(?P<pull>[^_]+?)"}
+
+_TENSION = re.compile(
+    r"\btension\s*=\s*(?P<tension>\d+(?:[.,]\d+)?)\s*(?:N\s*)?(?=$|[;,\s](?!\s*[mk]N))",
+    re.IGNORECASE,
+)
+_PULL = re.compile(r"\bpull\s*=\s*(?P<pull>\w+)", re.IGNORECASE)
 
 
 def loads_of(
@@ -20,14 +28,19 @@ def loads_of(
     robot: Robot,
     table: str | os.PathLike[str] | None,
     pattern: str | None,
+    exif: bool = False,
 ) -> dict[str, tuple[str, ...]]:
     """Return columns of loads, one text for each photograph; none if nothing is given.
 
     Raises:
-        InputError: Both are given, a photograph has no loads, or a file name does not fit.
+        InputError: Several are given, a photograph has no loads, or a file name does not fit.
     """
-    if table is not None and pattern is not None:
-        raise InputError.CONFLICT("give the loads as a table or by a pattern of names, not both")
+    if (table is not None) + (pattern is not None) + exif > 1:
+        raise InputError.CONFLICT(
+            "give the loads as a table, by a pattern of names or by EXIF, not by several"
+        )
+    if exif:
+        return _from_exif(names, robot)
     if table is not None:
         return _from_table(names, table)
     return {} if pattern is None else _from_names(names, robot, pattern)
@@ -55,11 +68,7 @@ def _from_table(names: Sequence[str], source: str | os.PathLike[str]) -> dict[st
 
 
 def _from_names(names: Sequence[str], robot: Robot, pattern: str) -> dict[str, tuple[str, ...]]:
-    if robot.number_of_tendons != 1:
-        raise InputError.UNSUPPORTED(
-            f"{robot.name} has {robot.number_of_tendons} tendons; a pattern gives the tension of "
-            "one, give the loads as a table"
-        )
+    _check_one_tendon(robot, "a pattern")
     if pattern.count("{tension}") != 1 or pattern.count("{pull}") > 1:
         raise InputError.BAD_SYNTAX(
             f"the pattern {pattern!r} needs {{tension}} once, and {{pull}} at most once, such as "
@@ -81,3 +90,38 @@ def _from_names(names: Sequence[str], robot: Robot, pattern: str) -> dict[str, t
     if "pull" in found[0]:
         return {"pull": tuple(one["pull"] for one in found), **columns}
     return columns
+
+
+def _from_exif(names: Sequence[str], robot: Robot) -> dict[str, tuple[str, ...]]:
+    _check_one_tendon(robot, "EXIF")
+    tensions: list[str] = []
+    pulls: list[str] = []
+    for name in names:
+        texts = exif_texts(photograph_bytes(name))
+        found = [match for text in texts if (match := _TENSION.search(text))]
+        if not found:
+            words = f"its texts are {texts!r:.200}" if texts else "it has no text in EXIF"
+            raise InputError.MISSING_VALUE(
+                f"{Path(name).name}: UserComment and ImageDescription of EXIF give no tension; "
+                f"{words}, write such as: tension=1.2 N"
+            )
+        tensions.append(found[0]["tension"].replace(",", "."))
+        pull = _PULL.search(found[0].string)
+        pulls.append(pull["pull"] if pull else "")
+    columns = {"tendon_force_N": tuple(tensions)}
+    if all(pulls):
+        return {"pull": tuple(pulls), **columns}
+    if any(pulls):
+        without = Path(names[pulls.index("")]).name
+        raise InputError.MISSING_VALUE(
+            f"{without}: EXIF gives no pull, but that of other photographs does; give all or none"
+        )
+    return columns
+
+
+def _check_one_tendon(robot: Robot, what: str) -> None:
+    if robot.number_of_tendons != 1:
+        raise InputError.UNSUPPORTED(
+            f"{robot.name} has {robot.number_of_tendons} tendons; {what} gives the tension of "
+            "one, give the loads as a table"
+        )

@@ -1,0 +1,68 @@
+"""What `notchflex measure --cut` writes and prints."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from notchflex.cli import terminal
+from notchflex.cli.outputs import Outputs
+from notchflex.cli.terminal import DONE, NOT_CONVERGED
+
+if TYPE_CHECKING:
+    from notchflex.photographs import MeasuredCut
+
+
+def write_cut(
+    found: MeasuredCut,
+    outputs: Outputs,
+    output: str | None,
+    robot: str | None,
+    overlays: tuple[Path, ...],
+) -> int:
+    """Write and print the notches as they were cut; return the exit code.
+
+    Args:
+        found: What was measured.
+        outputs: Where results go.
+        output: The CSV.
+        robot: The robot file with the measured lengths.
+        overlays: A file for each photograph, or none.
+    """
+    from notchflex.photographs.documents import cut_document
+    from notchflex.photographs.overlay import cut_lines, write_overlay
+    from notchflex.photographs.reading import read_photograph
+
+    if overlays:
+        overlays[0].parent.mkdir(exist_ok=True)
+    for file, one in zip(overlays, found.photographs, strict=False):
+        write_overlay(file, read_photograph(one.source), one, cut_lines(found))
+    outputs.write_json(lambda: cut_document(found))
+    if found.reason:
+        terminal.warn(f"the cut is refused: {found.reason}.")
+        unwritten = [name for name in (output, robot) if name is not None]
+        if unwritten:
+            terminal.error(f"nothing was measured; not written: {', '.join(unwritten)}.")
+        return NOT_CONVERGED
+    if output is not None:
+        found.write_csv(output)
+    if robot is not None:
+        found.write_robot(robot)
+    if outputs.prints_tables and "-" not in (output, robot):
+        _print(found)
+    if len(found.photographs) == 1:
+        terminal.note("depths need a second photograph, with the robot turned by some 20 deg.")
+    return DONE
+
+
+def _print(found: MeasuredCut) -> None:
+    console = terminal.output()
+    console.print(f"Notches of {found.robot.name} as cut, with standard deviations")
+    heads = [">\nnotch", ">height\nmm", ">±\nmm", ">depth\nmm", ">±\nmm"]
+    heads += [">uncut\nmm", ">±\nmm"]
+    first, *others = found.columns().values()
+    rows = [
+        [f"{number:.0f}", *(f"{value:.3f}" for value in values)]
+        for number, *values in zip(first, *others, strict=True)
+    ]
+    console.print(terminal.table(heads, rows))

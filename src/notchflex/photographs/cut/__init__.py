@@ -1,0 +1,1 @@
+"""Notches as they were cut, from photographs of the straight robot."""
