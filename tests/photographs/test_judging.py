@@ -1,4 +1,4 @@
-"""What makes a fit doubtful: shifts of lines, notches unlike the robot file, parts that are not seen.
+"""What makes a fit doubtful: shifted lines, notches unlike the robot file, parts that are not seen.
 
 The fits are made up: an outline with edges at known distances.
 """
