@@ -98,6 +98,14 @@ def test_bad_files(tmp_path, photograph):
     (tmp_path / "half.png").write_bytes(data[:60])
     huge = data[:16] + (20000).to_bytes(4, "big") + (10000).to_bytes(4, "big") + data[24:]
     (tmp_path / "huge.png").write_bytes(huge)
+    wide = cv2.imencode(".tif", np.zeros((70, 70), np.uint8))[1].tobytes()
+    first = int.from_bytes(wide[4:8], "little")
+    for tag in (256, 257):  # width and height become 30000
+        at = wide.index(tag.to_bytes(2, "little"), first)
+        wide = wide[: at + 8] + (30000).to_bytes(4, "little") + wide[at + 12 :]
+    (tmp_path / "wide.tif").write_bytes(wide)
+    other = cv2.imencode(".bmp", np.zeros((70, 70), np.uint8))[1].tobytes()
+    (tmp_path / "other.bmp").write_bytes(other)
     tiny = cv2.imencode(".png", np.zeros((20, 20), np.uint8))[1].tobytes()
     (tmp_path / "tiny.png").write_bytes(tiny)
     for name, code in (
@@ -107,6 +115,8 @@ def test_bad_files(tmp_path, photograph):
         ("empty.jpg", "FILE_FORMAT"),
         ("half.png", "FILE_FORMAT"),
         ("huge.png", "OUT_OF_RANGE"),
+        ("wide.tif", "OUT_OF_RANGE"),
+        ("other.bmp", "FILE_FORMAT"),
         ("tiny.png", "OUT_OF_RANGE"),
     ):
         with refused(code):
@@ -132,7 +142,13 @@ def test_depths_and_channels(tmp_path):
     grey = np.random.default_rng(1).integers(0, 256, (90, 80)).astype(np.uint8)
     deep = grey.astype(np.uint16) * 257
     see_through = np.dstack([grey, grey, grey, np.full_like(grey, 255)])
-    for name, picture in (("a.png", grey), ("b.png", deep), ("c.png", see_through)):
+    for name, picture in (
+        ("a.png", grey),
+        ("b.png", deep),
+        ("c.png", see_through),
+        ("d.tif", grey),
+        ("e.tif", deep),
+    ):
         cv2.imwrite(str(tmp_path / name), picture)
         read = read_photograph(tmp_path / name)
         assert read.shape == (90, 80, 3)

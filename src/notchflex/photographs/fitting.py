@@ -23,7 +23,8 @@ _EDGE = 0.25  # px: noise of an edge in quick rounds
 _LEAST_NOISE = 0.05  # px
 _FAR = 3.0  # px: an edge farther away belongs to something else
 _CAP, _ALIKE = 4.0, 4.0  # residuals over their noise; edges that err as one
-_OWN = 0.75  # px: how far a line may be shifted and still lie where it should
+_OWN = 0.75  # px: how far a line may be shifted from the others and still lie where it should
+_COMMON = 0.025  # of the width of the tube: how far all lines may be shifted outward or inward
 _LINE = np.array([0.1, 0.06])  # px: usual shift and turn of a line
 _ROBUST = 3.0  # over the noise: edges farther away count less
 _DAMPING, _LITTLE = 1e-3, 1e-7
@@ -239,19 +240,24 @@ def misfit(fit: Fit, model: OutlineModel, noise: float) -> float:
 
     Neighbouring edges err alike, so that only some of them count; missed edges count most. Lines
     that are shifted or turned relative to the others count too: seen from the wrong side, a robot
-    fits edge by edge, but only with lines that are shifted.
+    fits edge by edge, but only with lines that are shifted, or with notches of another depth.
     """
     lines = lines_of(model)
     errors, left = lines.errors(fit.residual, 1.0)
     capped = np.minimum(np.nan_to_num(np.abs(left) / noise, nan=np.inf), _CAP) ** 2
     own = (errors - [float(np.nanmedian(errors[:, 0])), 0.0]) / _LINE
     of_lines = float(np.nansum(2.0 * np.log1p(own**2 / 2.0)))
-    return float(capped[fit.edges.looked].sum()) / _ALIKE + of_lines
+    centre, spread = priors(model, fit.numbers)
+    unlikely = float((((fit.numbers - centre) / spread) ** 2).sum())
+    return float(capped[fit.edges.looked].sum()) / _ALIKE + of_lines + unlikely
 
 
 def _own(fit: Fit, model: OutlineModel) -> Numbers:
     """Return residuals less the shift of their line, as far as lines shift."""
     lines = lines_of(model)
     errors, _ = lines.errors(fit.residual, 1.0)
-    shift = np.clip(np.nan_to_num(errors[:, 0]), -_OWN, _OWN)
+    most = _COMMON * 2.0 * model.table.outer * math.exp(fit.numbers[3])
+    known = errors[np.isfinite(errors[:, 0]), 0]
+    common = float(np.clip(np.median(known), -most, most)) if len(known) else 0.0
+    shift = common + np.clip(np.nan_to_num(errors[:, 0] - common), -_OWN, _OWN)
     return fit.residual - shift[lines.which]

@@ -11,7 +11,7 @@ NEAR = 2.0
 """Distance from the outline within which an edge counts as its own, px."""
 
 _LEAST_SCORE, _LEAST_SIDE, _LEAST_BASE, _LEAST_TIP = 0.7, 0.5, 0.35, 0.5
-_LEAST_FACES, _LEAST_SPINES = 0.35, 0.5
+_LEAST_FACES, _LEAST_SPINES, _LEAST_INNER = 0.35, 0.5, 0.3
 
 
 def missing(model: OutlineModel, fit: Fit) -> str:
@@ -45,6 +45,12 @@ def missing(model: OutlineModel, fit: Fit) -> str:
     back = (model.kind == SPINE) & (model.which * model.table.side[notch] < 0.0)
     if share(back) < _LEAST_SPINES:
         return "the spines beside the notches are not seen where the robot file has them"
+    inner = (model.kind == SPINE) & (model.which * model.table.side[notch] > 0.0) & looked
+    if inner.any() and share(inner) < _LEAST_INNER:
+        return (
+            "the notches are not as deep as in the robot file: their inner edges are not seen "
+            "there; check depth and cut"
+        )
     if fit.score < _LEAST_SCORE:
         return f"only {100 * fit.score:.0f} % of the outline is found in the photograph"
     return ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,9 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
     need("cv2", "photographs", "measuring photographs")
     name = os.fspath(source)
     data = photograph_bytes(name)
-    _check_size(name, *_size_in_head(data))
-    image = _decoded(data)
+    size = _size_in_head(data)
+    _check_size(name, *size)
+    image = _decoded(data) if min(size) > 0 else None
     if image is None or image.ndim != 3:
         raise InputError.FILE_FORMAT(
             f"{name} is no photograph that can be read; give a PNG, JPEG or TIFF file"
@@ -76,19 +77,42 @@ def photograph_bytes(name: str) -> bytes:
 
 
 def _size_in_head(data: bytes) -> tuple[int, int]:
-    """Return width and height by the head of a PNG or JPEG, before it is decoded; else (0, 0)."""
+    """Return width and height by the head of a PNG, JPEG or TIFF, before it is decoded.
+
+    Files of another kind, whose size is not known beforehand, give (0, 0) and are not decoded.
+    """
     if data[:8] == b"\x89PNG\r\n\x1a\n":
         return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    if data[:4] in (b"II*\0", b"MM\0*"):
+        return _size_of_tiff(data, "little" if data[:1] == b"I" else "big")
     if data[:2] != b"\xff\xd8":
         return 0, 0
     at = 2
     while at + 9 < len(data) and data[at] == 0xFF:
         marker = data[at + 1]
+        if marker == 0xFF:  # fills up
+            at += 1
+            continue
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             height = int.from_bytes(data[at + 5 : at + 7], "big")
             return int.from_bytes(data[at + 7 : at + 9], "big"), height
         at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
     return 0, 0
+
+
+def _size_of_tiff(data: bytes, order: Literal["little", "big"]) -> tuple[int, int]:
+    """Return width and height by the first directory of a TIFF."""
+
+    def number(at: int, length: int) -> int:
+        return int.from_bytes(data[at : at + length], order)
+
+    first = number(4, 4)
+    size = {256: 0, 257: 0}  # tags of width and height
+    for at in range(first + 2, first + 2 + 12 * number(first, 2), 12):
+        tag, kind = number(at, 2), number(at + 2, 2)
+        if tag in size and kind in (3, 4):  # numbers of 16 or of 32 bits
+            size[tag] = number(at + 8, 2 if kind == 3 else 4)
+    return size[256], size[257]
 
 
 def _check_size(name: str, width: int, height: int) -> None:
