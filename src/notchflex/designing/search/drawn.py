@@ -83,7 +83,7 @@ def met_by(
     for part, reader in ((closings, _of_closings), (others, _of_robots)):
         if part:
             rows = reader([one for _, one in part], solver, x, robots)
-            met[np.ix_(valid, [k for k, _ in part])] = rows
+            met[np.ix_(np.flatnonzero(valid), np.array([k for k, _ in part]))] = rows
     return met
 
 
