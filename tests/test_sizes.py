@@ -4,7 +4,7 @@ Commands are excluded: their parameters are the options that `--help` shows.
 """
 
 import ast
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import notchflex
@@ -20,8 +20,13 @@ _NOT_COUNTED = ("self", "cls", "progress")
 """The result does not depend on where progress is reported."""
 
 
-def _functions() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
-    """Every function of the sources, with its place; those of the command line's verbs excluded."""
+_Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@cache
+def _functions() -> dict[str, _Function]:
+    """Every function of the sources by its place; those of the command line's verbs excluded."""
+    functions: dict[str, _Function] = {}
     for package in ("notchflex", "lanewise"):
         for file in sorted((SOURCE / package).rglob("*.py")):
             place = file.relative_to(SOURCE)
@@ -29,10 +34,11 @@ def _functions() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]
                 continue
             for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
                 if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                    yield f"{place}:{node.lineno} {node.name}", node
+                    functions[f"{place}:{node.lineno} {node.name}"] = node
+    return functions
 
 
-def _lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+def _lines(function: _Function) -> int:
     assert function.end_lineno is not None
     lines = function.end_lineno - function.lineno + 1
     if (text := ast.get_docstring(function, clean=False)) is not None:
@@ -40,19 +46,21 @@ def _lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     return lines
 
 
-def _parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+def _parameters(function: _Function) -> int:
     arguments = function.args
     named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
     return sum(one.arg not in _NOT_COUNTED for one in named)
 
 
 def test_functions_are_short():
-    functions = dict(_functions())
+    functions = _functions()
     assert len(functions) > 3000
     long = {place: n for place, one in functions.items() if (n := _lines(one)) > MOST_LINES}
     assert not long, f"a function has at most {MOST_LINES} lines without its docstring; {long}"
 
 
 def test_functions_have_few_parameters():
-    many = {place: n for place, one in _functions() if (n := _parameters(one)) > MOST_PARAMETERS}
+    many = {
+        place: n for place, one in _functions().items() if (n := _parameters(one)) > MOST_PARAMETERS
+    }
     assert not many, f"a function has at most {MOST_PARAMETERS} parameters; {many}"

@@ -22,7 +22,9 @@ from notchflex.errors import InputError
 
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
+    from notchflex.results.recorded import Recorded
     from notchflex.robot import Robot
+    from notchflex.solver.programs.prepare import PreparedChain
 
 FORMAT = "notchflex path 1"
 IN_BASE = "_in_base"
@@ -180,12 +182,8 @@ def _arrays_of(path: EquilibriumPath) -> Iterator[tuple[str, NDArray[Any]]]:
 
 
 def _path_of(record: Record) -> EquilibriumPath:
-    import jax.tree_util as tree_util
-
     from notchflex.loads import LoadPath
     from notchflex.results.path import EquilibriumPath
-    from notchflex.results.recorded import BEFORE, FLATTENING, MATERIAL, REPORTED, Recorded
-    from notchflex.results.state import leaf_name
     from notchflex.robot import robot_from_text
     from notchflex.solver.newton import Settings
     from notchflex.solver.programs.prepare import prepare
@@ -205,15 +203,29 @@ def _path_of(record: Record) -> EquilibriumPath:
         refinement=facts["refinement"],
         flat=facts["flat"],
     )
-    steps = len(load)
+    recorded = _recorded(arrays, ready, len(load), bool(load.base_rotation.any()))
+    return EquilibriumPath(
+        robot, load, ready, recorded, facts["each_from_rest"], Settings(**facts["settings"])
+    )
+
+
+def _recorded(
+    arrays: Mapping[str, NDArray[Any]], ready: PreparedChain, steps: int, turned: bool
+) -> Recorded:
+    """Return what the solver found, of the shapes that robot and loads ask for."""
+    import jax.tree_util as tree_util
+
+    from notchflex.results.recorded import FLATTENING, REPORTED, Recorded
+    from notchflex.results.state import leaf_name
+
     leaves, structure = tree_util.tree_flatten_with_path(ready.rest)
     state: list[NDArray[Any]] = []
     for key, leaf in leaves:
         name = _STATE + leaf_name(key)
         state.append(_of_shape(arrays[name], (steps, *np.shape(leaf)), name))
-    turned = bool(load.base_rotation.any())
+    notches = (steps, ready.chain.flexures)
     # Older files do not count the loss of flattening.
-    unflattened = np.zeros((steps, ready.chain.flexures, 3, 1))
+    unflattened = np.zeros((*notches, 3, 1))
     reported = {
         name: arrays.get(name, unflattened) if name == FLATTENING else arrays[_key(name, turned)]
         for name in REPORTED
@@ -224,29 +236,32 @@ def _path_of(record: Record) -> EquilibriumPath:
         name: _of_shape(arrays["solver_converged" if name == "converged" else name], (steps,), name)
         for name in _RUN
     }
-    first = {name: arrays[_START + name] for name in BEFORE}
-    at_rest = ready.rest.memory.material
-    if not isinstance(at_rest, tuple):  # older files do not have it
-        material = arrays.get(_START + MATERIAL, np.asarray(at_rest))
-        first[MATERIAL] = _of_shape(material, np.shape(at_rest), _START + MATERIAL)
-        flat = reported[FLATTENING].shape[1:]
-        first[FLATTENING] = _of_shape(
-            arrays.get(_START + FLATTENING, np.zeros(flat)), flat, _START + FLATTENING
-        )
     # Older files do not have it, nor do those of robots that cannot snap need it.
-    notches = (steps, ready.chain.flexures)
     snapped = _of_shape(arrays.get(_SNAPPED, np.zeros(notches)), notches, _SNAPPED)
-    recorded = Recorded(
+    return Recorded(
         solved=tree_util.tree_unflatten(structure, state),
         reported=reported,
-        first=first,
+        first=_before_the_first(arrays, ready, reported[FLATTENING].shape[1:]),
         held=(arrays[_HELD[0]], arrays[_HELD[1]]),
         snapped=snapped,
         **run,
     )
-    return EquilibriumPath(
-        robot, load, ready, recorded, facts["each_from_rest"], Settings(**facts["settings"])
-    )
+
+
+def _before_the_first(
+    arrays: Mapping[str, NDArray[Any]], ready: PreparedChain, flattening: tuple[int, ...]
+) -> dict[str, NDArray[Any]]:
+    """Return quantities of the state before the first step; older files lack those of materials."""
+    from notchflex.results.recorded import BEFORE, FLATTENING, MATERIAL
+
+    first = {name: arrays[_START + name] for name in BEFORE}
+    at_rest = ready.rest.memory.material
+    if not isinstance(at_rest, tuple):
+        none = {MATERIAL: np.asarray(at_rest), FLATTENING: np.zeros(flattening)}
+        for name, missing in none.items():
+            key = _START + name
+            first[name] = _of_shape(arrays.get(key, missing), missing.shape, key)
+    return first
 
 
 def _key(name: str, turned: bool) -> str:
