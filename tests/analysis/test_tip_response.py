@@ -25,6 +25,7 @@ def pose_slope(after, before, width: float) -> np.ndarray:
     return np.concatenate([vector, after.tip_position - before.tip_position]) / width
 
 
+@pytest.mark.nightly
 def test_compliance_against_differences(wrist, found, margin):
     width = 2e-4
     for step in (1, 2):

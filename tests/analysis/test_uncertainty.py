@@ -23,6 +23,7 @@ def linear(wrist: nf.Robot) -> nf.Robot:
     return wrist.replace(material=nf.Linear(10_000.0))
 
 
+@pytest.mark.nightly
 def test_small_tolerances_add_as_squares(linear: nf.Robot, margin):
     """Against the root of the sum of squares, by differences of single solves."""
     sizes = {

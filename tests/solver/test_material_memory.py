@@ -182,6 +182,7 @@ def test_derivatives_where_friction_holds_a_notch(margin) -> None:
     margin.within("slope, per modulus", (found - difference) * value, 1e-6)
 
 
+@pytest.mark.nightly
 def test_no_loop_gains_work_where_notches_flatten() -> None:
     """Flattening and hysteresis together: back and forth over the same strokes costs work."""
     random, steps, begins = np.random.default_rng(5), [], []

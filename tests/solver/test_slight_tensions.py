@@ -43,7 +43,15 @@ def test_every_load_of_two_axes_is_solved(slight):
     assert compared > 100 or slight > 3e-17
 
 
-@pytest.mark.parametrize("name", ["pacheco2021-a", "pacheco2021-a-true", "liu2022", "gao2017"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "pacheco2021-a",
+        pytest.param("pacheco2021-a-true", marks=pytest.mark.nightly),
+        "liu2022",
+        "gao2017",
+    ],
+)
 def test_ready_robots_with_slight_tensions(name):
     robot = nf.load_robot(name)
     tendons = robot.number_of_tendons

@@ -22,7 +22,10 @@ FORCE = {0: 1e-5, 1: 1e-6}  # N
 PART_OF_FRICTION = {0: 1e-4, 1: 1e-5}
 
 
-@pytest.mark.parametrize("refinement", MODES)
+@pytest.mark.parametrize(
+    "refinement",
+    [pytest.param(one, marks=[pytest.mark.nightly] * (one > 0)) for one in MODES],
+)
 def test_tip(refinement, margin):
     rows, path = reference("gao_free_bending.csv"), pulled_and_let_go(refinement)
     assert path.converged.all(), path.reason

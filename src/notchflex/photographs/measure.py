@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from notchflex.analysis import tip_from_angles
 from notchflex.errors import InputError
@@ -81,6 +82,8 @@ def measure(
     return MeasuredPhotographs(robot, tuple(measured), given)
 
 
+# Of matrices this small, threads of the linear algebra only cost.
+@threadpool_limits.wrap(limits=1)
 def measure_picture(picture: NDArray[np.uint8], table: ChainTable, name: str) -> MeasuredPhotograph:
     """Measure a photograph that was read, (height, width, 3).
 

@@ -51,7 +51,7 @@ def compare(cut, cases, margin):
         margin.within(f"{cut} {name}, relative, worst at {where}", error, WITHIN)
 
 
-@pytest.mark.parametrize("cut", SECTIONS)
+@pytest.mark.parametrize("cut", ["on-axis"])
 def test_sectionproperties(cut, margin):
     compare(cut, FEW, margin)
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
@@ -53,6 +54,8 @@ class StraightFit(NamedTuple):
     edge_spread: Numbers
 
 
+# Of matrices this small, threads of the linear algebra only cost.
+@threadpool_limits.wrap(limits=1)
 def fit_straight(picture: NDArray[np.uint8], table: ChainTable, name: str) -> StraightFit:
     """Fit heights, depths and places of all notches to a photograph, (height, width, 3)."""
     n = table.notches
