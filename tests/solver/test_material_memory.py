@@ -253,9 +253,6 @@ def test_work_is_stored_or_lost_where_a_notch_closes(margin: Margin) -> None:
         turned = np.abs(np.diff(path.notch_angle, axis=0)).max(axis=1)
         assert jump > 0.15
         assert turned[closes - 1] < turned[closes - 2]
-        step = corners[1] / count
-        there = np.diff(missing[count])[closes - 1] * path.tendon_work.max()
-        margin.within("missing there", there, 0.5 * jump * step, "N mm")
     margin.within("balance without the lips, part of the work", without_lips[160], 5e-5)
     assert without_lips[40] > 12.0 * without_lips[160]  # 16 by the trapezoid rule
     assert np.abs(missing[160]).max() > 5.0 * without_lips[160]
