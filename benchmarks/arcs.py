@@ -129,6 +129,9 @@ def judge_arcs(state: State, path: nf.EquilibriumPath) -> Arcs:
         sheared = [law.push[0] * (_WEIGHTS @ forces[:, 0]), law.sway[0] * (_WEIGHTS @ forces[:, 1])]
         problems += _out_of_balance(i, modes[k], inside - local, sheared, scale)
         problems += _disagreeing(state, path, i, modes[k], precurved[k], law)
+        edge = edge_angle(turn[k], law.edge * modes[k, 0])
+        if abs(edge - path.edge_angle[step, i]) > POSE:
+            problems.append(f"notch {i + 1}: its edge angle is not {edge:.6g}")
         largest = inside[np.abs(inside[:, 1]).argmax(), 1]
         if abs(largest - path.notch_moment[step, i]) > BALANCE * scale:
             problems.append(f"notch {i + 1}: notch_moment is not that of its strains")
@@ -161,16 +164,26 @@ def _disagreeing(
     precurved: float,
     law: ArcLaw,
 ) -> list[str]:
-    """Gap as the lips' fibre has it and as they yield; angle of the edges."""
+    """Gap as the lips' fibre has it and as they yield."""
     step, found = state.step, []
     gap = law.height - law.closure * (precurved + modes[0])
     gap += law.lips * path.contact_force[step, notch]
     if abs(gap - path.gap[step, notch]) > POSE * law.height:
         found.append(f"notch {notch + 1}: gap {path.gap[step, notch]:.3g} mm, not {gap:.3g}")
-    edge = path.notch_angle[step, notch] - law.edge * (path.notch_angle[step, notch] - precurved)
-    if abs(edge - path.edge_angle[step, notch]) > POSE:
-        found.append(f"notch {notch + 1}: its edge angle is not {edge:.6g}")
     return found
+
+
+def edge_angle(turn: np.ndarray, beyond: float) -> float:
+    """Angle between the faces of a notch: its ends, turned back by what bends beyond the faces.
+
+    Args:
+        turn: Rotation of the distal end against the proximal one, in the frame of the notch.
+        beyond: Bending about y beyond the two faces together, half of it at each, rad.
+    """
+    cosine, sine = np.cos(0.5 * beyond), np.sin(0.5 * beyond)
+    back = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
+    faces = back @ turn @ back
+    return float(np.arctan2(faces[0, 2] - faces[2, 0], faces[0, 0] + faces[2, 2]))
 
 
 def _inside(

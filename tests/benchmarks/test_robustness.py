@@ -5,7 +5,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
+import notchflex as nf
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 # One shape of each kind of notch, friction and load; all of them are drawn by the benchmark.
@@ -32,6 +36,34 @@ def test_a_draw_is_solved_or_says_why(robustness, number):
 @pytest.mark.parametrize("number", DRAWN)
 def test_a_draw_as_the_tube_makes_it_is_solved_or_says_why(robustness, number):
     follow_draws(robustness, __import__("shapes").DRAWN, number)
+
+
+@pytest.mark.nightly
+def test_edges_of_a_notch_that_also_twists_are_where_they_are_seen(robustness):
+    """The edge angle lacks bending of the rings, no part of notch angle less precurvature."""
+    wrist = nf.load_robot("pacheco2021-a-true")
+    robot = wrist.replace(
+        notch=wrist.notches[:1],
+        tendon=[nf.Tendon(0.7, path="straight")],
+        friction=nf.Frictionless(),
+        material=nf.Linear(60_000.0, poisson_ratio=0.33),
+    )
+    load = nf.Load(tension=1.0, tip_force=(0.0, 1.0, 0.0), tip_moment=(0.0, 0.0, 1.0))
+    path = nf.simulate(robot, load).raise_if_failed()
+    assert __import__("judge").wrong(robot, load, path) == []
+
+
+def test_faces_turn_less_by_what_bends_beyond_them(robustness, margin):
+    """Exactly so, whatever sideways bending and twist there is between the faces."""
+    edge_angle = __import__("arcs").edge_angle
+    beyond = 0.03
+    rng = np.random.default_rng(3)
+    for faces in Rotation.from_rotvec(rng.uniform(-0.6, 0.6, (8, 3))):
+        half = Rotation.from_rotvec([0.0, 0.5 * beyond, 0.0])
+        turn = (half * faces * half).as_matrix()
+        seen = edge_angle(faces.as_matrix(), 0.0)
+        margin.within("turned back", edge_angle(turn, beyond) - seen, 1e-14, "rad")
+        margin.within("difference", edge_angle(turn, 0.0) - beyond - seen, 1e-14, "rad")
 
 
 def follow_draws(robustness, shapes, number):
