@@ -31,7 +31,7 @@ def unmeasured(tmp_path):
     )
 
 
-def test_points_are_dragged_then_fitted_then_accepted(unmeasured):
+def test_points_are_dragged_then_fitted_then_accepted(unmeasured, capsys):
     """All that the buttons do, without a browser."""
     from notchflex.viewer.correction.correction import LEFT_OUT, Correction
 
@@ -56,6 +56,7 @@ def test_points_are_dragged_then_fitted_then_accepted(unmeasured):
     page.leave_out()
     assert page.done
     found = page.run()
+    assert capsys.readouterr().out == ""  # where `-o -` writes the CSV
     assert [one.reason for one in found.photographs] == ["", LEFT_OUT]
     assert len(found.columns()["photograph"]) == 1
 
@@ -64,7 +65,9 @@ def test_the_verb_refuses_what_has_no_page(tmp_path, capsys):
     words = ["measure", "a.png", "--robot", "pacheco2021-a", "--correct"]
     assert run([*words, "--cut"]) == 2
     assert run([*words, "--port", "0"]) == 2
-    assert "port" in capsys.readouterr().err
+    for alone in (["--port", "8080"], ["--open"]):
+        assert run([*words[:-1], *alone]) == 2
+        assert "need --correct" in capsys.readouterr().err
 
 
 @pytest.mark.browser

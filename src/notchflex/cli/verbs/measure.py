@@ -75,10 +75,13 @@ def measure(
         bool, flag("With `--correct`: open a browser there.", name="--open")
     ] = False,
     port: Annotated[
-        int,
+        int | None,
         converted(whole(1, 65535), "N"),
-        Parameter(help="With `--correct`: port of the page, or the next one that is free."),
-    ] = PORT,
+        Parameter(
+            help="With `--correct`: port of the page, or the next one that is free; "
+            f"{PORT} by default."
+        ),
+    ] = None,
     cut: Annotated[
         bool,
         flag(
@@ -110,11 +113,7 @@ def measure(
     anything is doubtful is refused with its reason (exit code 1); look at the overlays.
     """
     _check_options(cut, turn, write_robot, exif or loads is not None or pattern is not None)
-    if correct:
-        if cut:
-            raise InputError.CONFLICT("--correct: notches as cut (--cut) have no such page")
-        check_installed()
-        check_host(HOST, port)
+    _check_page(correct, cut, port, open_browser)
     inputs = [*photographs, *robot_files(robot), *([] if loads is None else [loads])]
     folder = overlays
     if folder is None and output not in (None, "-"):
@@ -146,9 +145,20 @@ def measure(
             photographs, chosen, loads=loads, pattern=pattern, exif=exif, progress=progress
         )
     if correct:
-        found = _corrected(found, port, open_browser)
+        found = _corrected(found, port or PORT, open_browser)
     _write(found, outputs, output, files)
     return DONE if not found.refused else NOT_CONVERGED
+
+
+def _check_page(correct: bool, cut: bool, port: int | None, open_browser: bool) -> None:
+    """Check the options of the page before anything is measured."""
+    if correct and cut:
+        raise InputError.CONFLICT("--correct: notches as cut (--cut) have no page; leave it out")
+    if not correct and (port is not None or open_browser):
+        raise InputError.MISSING_VALUE("--port and --open need --correct")
+    if correct:
+        check_installed()
+        check_host(HOST, port or PORT)
 
 
 def _corrected(found: MeasuredPhotographs, port: int, open_browser: bool) -> MeasuredPhotographs:

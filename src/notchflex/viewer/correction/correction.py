@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -84,7 +86,8 @@ class Correction:
                 if (task := self._tasks.take(0.5)) is not None:
                     task()
         finally:
-            self.server.stop()
+            with contextlib.redirect_stdout(io.StringIO()):  # a CSV may go there
+                self.server.stop()
         return replace(self.found, photographs=tuple(self.results))
 
     def refit(self) -> None:
