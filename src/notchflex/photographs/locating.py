@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from notchflex.photographs.chain.axis_points import BASE
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 from notchflex.photographs.chain.outline import OutlineModel
@@ -44,18 +46,24 @@ class Located(NamedTuple):
     factor: float
 
 
-def locate(table: ChainTable, contrast: Contrast) -> Located | None:
-    """Find a robot in a photograph; None if nothing there looks like a tube of its proportions."""
+def locate(table: ChainTable, contrast: Contrast, given: Sequence[Numbers] = ()) -> Located | None:
+    """Find a robot in a photograph; None if nothing there looks like a tube of its proportions.
+
+    Args:
+        table: The robot.
+        contrast: Contrast of the photograph.
+        given: Numbers from which fits are started; if there are none, starts are searched.
+    """
     height, width = contrast.value.shape
     middle = np.array([width - 1.0, height - 1.0]) / 2.0
     factor = min(1.0, COARSE / max(width, height))
-    coarse = _coarse(table, contrast, factor, middle)
+    coarse = [*given, *_coarse(table, contrast, factor, middle, given)]
     if not coarse:
         return None
     wide = 2.0 * table.outer * math.exp(coarse[0][3])
     fine = min(1.0, _FINE_WIDTH / wide)
     contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
-    model = OutlineModel(table, base=1.2 * table.outer)
+    model = OutlineModel(table, base=BASE * table.outer)
     fits = _fine(model, contrast, middle, [_scaled(numbers, fine) for numbers in coarse])
     whole = [fit for fit in fits if not missing(model, fit)] or fits
     first = min(whole, key=lambda fit: cost(fit, model))
@@ -95,13 +103,20 @@ def _fine(
     ]
 
 
-def _coarse(table: ChainTable, contrast: Contrast, factor: float, middle: Numbers) -> list[Numbers]:
-    model = OutlineModel(table, 8, 6, base=1.2 * table.outer)
+def _coarse(
+    table: ChainTable,
+    contrast: Contrast,
+    factor: float,
+    middle: Numbers,
+    given: Sequence[Numbers],
+) -> list[Numbers]:
+    model = OutlineModel(table, 8, 6, base=BASE * table.outer)
     found: list[tuple[float, Numbers]] = []
     low = contrast.reduced(factor)
     low_middle = (middle + 0.5) * factor - 0.5
     images: dict[float, Contrast] = {}
-    for start in starts(table, low, low_middle):
+    first = [_scaled(numbers, factor) for numbers in given]
+    for start in first or starts(table, low, low_middle):
         wide = 2.0 * table.outer * math.exp(start[3]) / factor
         rough = min(1.0, _COARSE_WIDTH / wide)
         rough = min(1.0, 2.0 ** (round(2.0 * math.log2(rough)) / 2.0))

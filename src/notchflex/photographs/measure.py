@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from notchflex.analysis import tip_from_angles
 from notchflex.errors import InputError
+from notchflex.photographs.chain.axis_points import axis_points, on_axis_points
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
 from notchflex.photographs.contrast import contrast
@@ -84,16 +85,25 @@ def measure(
 
 # Of matrices this small, threads of the linear algebra only cost.
 @threadpool_limits.wrap(limits=1)
-def measure_picture(picture: NDArray[np.uint8], table: ChainTable, name: str) -> MeasuredPhotograph:
+def measure_picture(
+    picture: NDArray[np.uint8], table: ChainTable, name: str, chain: Numbers | None = None
+) -> MeasuredPhotograph:
     """Measure a photograph that was read, (height, width, 3).
 
     Args:
         picture: Blue, green and red.
         table: The robot.
         name: What the photograph is called.
+        chain: Points of the tube axis from which the fit is started, px, (n + 2, 2), as in
+            `MeasuredPhotograph.chain`; without them the robot is searched.
+
+    Raises:
+        InputError: The points of the chain are invalid.
     """
     picture, factor = smaller(picture)
-    located = locate(table, contrast(picture))
+    middle = (np.array([picture.shape[1], picture.shape[0]]) - 1.0) / 2.0
+    given = () if chain is None else on_axis_points(table, (chain + 0.5) * factor - 0.5 - middle)
+    located = locate(table, contrast(picture), given)
     if located is None:
         return refused_photograph(name, table, NO_TUBE)
     factor *= located.factor
@@ -136,14 +146,18 @@ def judged_photograph(
     reason, noise, factor = judged
     fit, table = located.fit, located.model.table
     angles = fit.numbers[NUMBERS : NUMBERS + table.notches]
-    outline = (fit.outline.point[0] + middle + 0.5) / factor - 0.5
+
+    def placed(points: Numbers) -> Numbers:
+        return (points + middle + 0.5) / factor - 0.5
+
     view: dict[str, Any] = {
         "scale": math.exp(fit.numbers[3]) / factor,
         "roll": math.remainder(fit.numbers[4], math.pi),
         "tilt": float(fit.numbers[5]),
         "noise": noise / factor,
         "found": fit.score,
-        "outline": outline,
+        "outline": placed(fit.outline.point[0]),
+        "chain": placed(axis_points(table, fit.numbers)),
         "seen": np.abs(fit.residual) < NEAR,
     }
     if reason:

@@ -38,6 +38,8 @@ class MeasuredPhotograph:
         found: Share of the outline that was found, 0 to 1.
         outline: Points of the fitted outline in the photograph, px, (N, 2).
         seen: Whether an edge was found at each of them, (N,).
+        chain: Points of the fitted tube axis in the photograph, px, (n + 2, 2): before the first
+            notch, where it starts, and the end of every body behind a notch, the tip last.
     """
 
     source: str
@@ -53,6 +55,7 @@ class MeasuredPhotograph:
     found: float = 0.0
     outline: Numbers = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
     seen: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool), repr=False)
+    chain: Numbers = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
 
     @property
     def measured(self) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from notchflex._load_words import number
+from notchflex._load_words import number, whole
 from notchflex.cli import terminal
 from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.arguments.robots import Settings, chosen_robot, robot_files
@@ -16,6 +16,7 @@ from notchflex.cli.tables.measured_cut import write_cut
 from notchflex.cli.terminal import DONE, NOT_CONVERGED
 from notchflex.errors import InputError
 from notchflex.results.files.writing import check_folder, check_output
+from notchflex.viewer import HOST, PORT, check_host, check_installed
 
 if TYPE_CHECKING:
     from notchflex.photographs import MeasuredPhotographs
@@ -63,6 +64,24 @@ def measure(
             "NAME.csv` NAME-overlays by default.",
         ),
     ] = None,
+    correct: Annotated[
+        bool,
+        flag(
+            "Serve a page for the browser on which each fit is corrected by hand: drag points of "
+            "the chain, fit again, and accept the fit or leave the photograph out."
+        ),
+    ] = False,
+    open_browser: Annotated[
+        bool, flag("With `--correct`: open a browser there.", name="--open")
+    ] = False,
+    port: Annotated[
+        int | None,
+        converted(whole(1, 65535), "N"),
+        Parameter(
+            help="With `--correct`: port of the page, or the next one that is free; "
+            f"{PORT} by default."
+        ),
+    ] = None,
     cut: Annotated[
         bool,
         flag(
@@ -94,6 +113,7 @@ def measure(
     anything is doubtful is refused with its reason (exit code 1); look at the overlays.
     """
     _check_options(cut, turn, write_robot, exif or loads is not None or pattern is not None)
+    _check_page(correct, cut, port, open_browser)
     inputs = [*photographs, *robot_files(robot), *([] if loads is None else [loads])]
     folder = overlays
     if folder is None and output not in (None, "-"):
@@ -124,8 +144,34 @@ def measure(
         found = measured(
             photographs, chosen, loads=loads, pattern=pattern, exif=exif, progress=progress
         )
+    if correct:
+        found = _corrected(found, port or PORT, open_browser)
     _write(found, outputs, output, files)
     return DONE if not found.refused else NOT_CONVERGED
+
+
+def _check_page(correct: bool, cut: bool, port: int | None, open_browser: bool) -> None:
+    """Check the options of the page before anything is measured."""
+    if correct and cut:
+        raise InputError.CONFLICT("--correct: notches as cut (--cut) have no page; leave it out")
+    if not correct and (port is not None or open_browser):
+        raise InputError.MISSING_VALUE("--port and --open need --correct")
+    if correct:
+        check_installed()
+        check_host(HOST, port or PORT)
+
+
+def _corrected(found: MeasuredPhotographs, port: int, open_browser: bool) -> MeasuredPhotographs:
+    """Serve the page until every photograph was accepted or left out."""
+    from notchflex.viewer.correction.correction import Correction
+
+    page = Correction(found, port=port)
+    terminal.note(f"correct the fits on {page.address} (Ctrl+C ends, nothing is written)")
+    if open_browser:
+        import webbrowser
+
+        webbrowser.open(page.address)
+    return page.run()
 
 
 def _check_options(cut: bool, turn: tuple[float, ...], robot: str | None, loaded: bool) -> None:

@@ -1,0 +1,1 @@
+"""A page in the browser on which fits to photographs are corrected by hand."""
