@@ -218,6 +218,36 @@ def test_a_picture_of_something_else_is_refused():
         assert found.reason
 
 
+def test_base_and_tip_that_look_alike_are_told_apart_or_refused():
+    """Without a collet, the tube before the first notch seen as long as the body of the tip."""
+    angles = np.radians([22.2, 32.0, 32.0, 13.49, 24.9])
+    scene = Scene(
+        size=(1200, 900),
+        scale=54.257,
+        place=(770.3, 446.1),
+        direction=116.6,
+        roll=-5.83,
+        tilt=1.67,
+        distance=211.0,
+        background=170,
+        dark=40,
+        bright=90,
+        stripe=115.9,
+        stripe_at=35.0,
+        blur=0.519,
+        noise=4.15,
+        base=1.226,
+        collet=False,
+        seed=40351,
+    )
+    picture = cv2.cvtColor(render(ROBOT, angles, scene), cv2.COLOR_GRAY2BGR)
+    found = measure_picture(picture, chain_table(ROBOT), "wrist")
+    if found.reason:
+        assert "two shapes fit nearly alike" in found.reason
+    else:
+        np.testing.assert_allclose(found.notch_angle, angles, atol=np.radians(0.5))
+
+
 def test_a_line_far_off_counts_less():
     """Shift and turn of every line are found; a line that is shifted far has a larger spread."""
     model = OutlineModel(chain_table(ROBOT))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from notchflex.photographs.chain.axis_points import BASE
+from notchflex.photographs.chain.axis_points import BASE, axis_points, on_axis_points
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 from notchflex.photographs.chain.outline import OutlineModel
@@ -60,6 +60,8 @@ def locate(table: ChainTable, contrast: Contrast, given: Sequence[Numbers] = ())
     coarse = [*given, *_coarse(table, contrast, factor, middle, given)]
     if not coarse:
         return None
+    # Where both ends look alike, a chain from tip to base fits nearly as well.
+    coarse += on_axis_points(table, axis_points(table, coarse[0])[::-1])[:1]
     wide = 2.0 * table.outer * math.exp(coarse[0][3])
     fine = min(1.0, _FINE_WIDTH / wide)
     contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
