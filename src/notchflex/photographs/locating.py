@@ -25,7 +25,9 @@ _LAST_REACHES = [5.0, 5.0] + 10 * [4.0]
 _KEPT = 4
 _WORSE = 0.1  # by how much the cost of a fit may be higher than the best and be looked into
 _TILT = 0.06
-_EDGE_NOISE = 0.08  # px: no edge is known better
+EDGE_NOISE = 0.08
+"""No edge is known better, px."""
+
 _SAME = math.radians(1.5)
 
 
@@ -69,7 +71,7 @@ def locate(table: ChainTable, contrast: Contrast, given: Sequence[Numbers] = ())
     fits = _fine(model, contrast, middle, [_scaled(numbers, fine) for numbers in coarse])
     whole = [fit for fit in fits if not missing(model, fit)] or fits
     first = min(whole, key=lambda fit: cost(fit, model))
-    noise = max(_EDGE_NOISE, covariance(first, model)[1])
+    noise = max(EDGE_NOISE, covariance(first, model)[1])
     misfits = [misfit(fit, model, noise) for fit in whole]
     least = min(misfits)
     best = whole[misfits.index(least)]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from notchflex._extras import need
 from notchflex.errors import InputError
+from notchflex.photographs.heads import PNG, Tiff, jpeg_segments, tiff_of
 
 MOST_PIXELS = 120e6
 LARGEST_FILE = 400_000_000
@@ -81,37 +82,22 @@ def _size_in_head(data: bytes) -> tuple[int, int]:
 
     Files of another kind, whose size is not known beforehand, give (0, 0) and are not decoded.
     """
-    if data[:8] == b"\x89PNG\r\n\x1a\n":
+    if data.startswith(PNG):
         return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
-    if data[:4] in (b"II*\0", b"MM\0*"):
-        return _size_of_tiff(data, "little" if data[:1] == b"I" else "big")
-    if data[:2] != b"\xff\xd8":
-        return 0, 0
-    at = 2
-    while at + 9 < len(data) and data[at] == 0xFF:
-        marker = data[at + 1]
-        if marker == 0xFF:  # fills up
-            at += 1
-            continue
+    if (tiff := tiff_of(data)) is not None:
+        return _size_of_tiff(tiff)
+    for marker, content in jpeg_segments(data):
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
-            height = int.from_bytes(data[at + 5 : at + 7], "big")
-            return int.from_bytes(data[at + 7 : at + 9], "big"), height
-        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+            height = int.from_bytes(content[1:3], "big")
+            return int.from_bytes(content[3:5], "big"), height
     return 0, 0
 
 
-def _size_of_tiff(data: bytes, order: Literal["little", "big"]) -> tuple[int, int]:
-    """Return width and height by the first directory of a TIFF."""
-
-    def number(at: int, length: int) -> int:
-        return int.from_bytes(data[at : at + length], order)
-
-    first = number(4, 4)
+def _size_of_tiff(tiff: Tiff) -> tuple[int, int]:
     size = {256: 0, 257: 0}  # tags of width and height
-    for at in range(first + 2, first + 2 + 12 * number(first, 2), 12):
-        tag, kind = number(at, 2), number(at + 2, 2)
+    for tag, kind, value in tiff.entries:
         if tag in size and kind in (3, 4):  # numbers of 16 or of 32 bits
-            size[tag] = number(at + 8, 2 if kind == 3 else 4)
+            size[tag] = tiff.number(value[: 2 if kind == 3 else 4])
     return size[256], size[257]
 
 

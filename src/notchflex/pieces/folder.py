@@ -170,6 +170,20 @@ def head_of(file: Path, manifest: Manifest, piece: int) -> dict[str, Any] | None
     return head if (head["sweep"], head["piece"]) == (manifest.digest, piece) else None
 
 
+def finished_head(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> dict[str, Any]:
+    """Return the head of a piece that was finished.
+
+    Raises:
+        InputError: Its file is gone, or damaged.
+    """
+    head = head_of(piece_file(folder, piece), manifest, piece)
+    if head is None:
+        raise InputError.FILE_DAMAGED(
+            f"{folder} lost its piece {piece} while it was read; call again."
+        )
+    return head
+
+
 def done_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> Done | None:
     """Return what became of a piece that is there already, None if it is not or is damaged."""
     file = piece_file(folder, piece)

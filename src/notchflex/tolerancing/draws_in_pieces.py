@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.errors import InputError
 from notchflex.pieces.codes import ACCEPTED, CODES
-from notchflex.pieces.folder import head_of
+from notchflex.pieces.folder import finished_head
 from notchflex.pieces.manifest import Manifest
 from notchflex.pieces.options import PieceFolder
-from notchflex.pieces.piece import Piece, Recipe, piece_file
+from notchflex.pieces.piece import Piece, Recipe
 from notchflex.pieces.plain import plain
 from notchflex.pieces.run import Progress
 from notchflex.pieces.sketch import Scale, Sketch
@@ -175,11 +174,7 @@ def draw_in_pieces(
     below, above = np.zeros(size, int), np.zeros(size, int)
     sketches, scales = [Sketch() for _ in range(size)], [Scale(0.0, 1.0)] * size
     for piece in range(manifest.pieces):
-        head = head_of(piece_file(folder.directory, piece), manifest, piece)
-        if head is None:
-            raise InputError.FILE_DAMAGED(
-                f"{folder.directory} lost its piece {piece} while it was read; call again."
-            )
+        head = finished_head(folder.directory, manifest, piece)
         codes += np.array(head["codes"])
         accepted[head["replicate"]] += head["codes"][ACCEPTED]
         below += np.array(head["below"], int)

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from notchflex.errors import InputError
-from notchflex.pieces.folder import head_of
+from notchflex.pieces.folder import finished_head
 from notchflex.pieces.manifest import Manifest
 from notchflex.pieces.options import PieceFolder
 from notchflex.pieces.piece import Piece, Recipe, piece_file
@@ -195,14 +194,8 @@ def explore_in_pieces(
     codes = np.zeros(4, int)
     every: dict[str, np.ndarray] = {}
     for piece in range(task.manifest.pieces):
-        file = piece_file(folder.directory, piece)
-        head = head_of(file, task.manifest, piece)
-        if head is None:
-            raise InputError.FILE_DAMAGED(
-                f"{folder.directory} lost its piece {piece} while it was read; call again."
-            )
-        codes += np.array(head["codes"])
-        frame = polars.read_parquet(file)
+        codes += np.array(finished_head(folder.directory, task.manifest, piece)["codes"])
+        frame = polars.read_parquet(piece_file(folder.directory, piece))
         mine: dict[str, Any] = {name: frame[name].to_numpy() for name in frame.columns}
         every = {n: np.concatenate([every[n], one]) for n, one in mine.items()} if every else mine
         kept = np.union1d(thinned(every, task.size), np.flatnonzero(every["corner"]))

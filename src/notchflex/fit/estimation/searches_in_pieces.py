@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.errors import InputError
 from notchflex.fit.estimation.minimise import Minimum
 from notchflex.fit.estimation.problem import Problem, Progress, search_from, starting_points
 from notchflex.fit.model.samples import Samples
-from notchflex.pieces.folder import head_of
+from notchflex.pieces.folder import finished_head
 from notchflex.pieces.manifest import Manifest
 from notchflex.pieces.options import PieceFolder
-from notchflex.pieces.piece import Piece, Recipe, piece_file
+from notchflex.pieces.piece import Piece, Recipe
 from notchflex.pieces.plain import plain
 from notchflex.robot.robot import to_table
 
@@ -127,11 +126,7 @@ def search_in_pieces(
 
         folder.run(task, pieces=range(done, last), cores=1, progress=told)
         for piece in range(done, last):
-            head = head_of(piece_file(folder.directory, piece), task.manifest, piece)
-            if head is None:
-                raise InputError.FILE_DAMAGED(
-                    f"{folder.directory} lost its piece {piece} while it was read; call again."
-                )
+            head = finished_head(folder.directory, task.manifest, piece)
             if head["codes"][0] or not piece:
                 minima.append(task.minimum(head))
         done = last

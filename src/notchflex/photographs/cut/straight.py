@@ -16,7 +16,7 @@ from notchflex.photographs.chain.outline import OutlineModel, spine_edge
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import Fit, covariance, misfit, refine
 from notchflex.photographs.judging import doubt
-from notchflex.photographs.locating import locate
+from notchflex.photographs.locating import EDGE_NOISE, locate
 from notchflex.photographs.measure import (
     NO_TUBE,
     judged_photograph,
@@ -32,7 +32,6 @@ _ROUNDS = 30
 _CORNER = 0.35  # outer radii: blurred corners beside spines shift ends
 _BENT = "the robot is bent; photograph it straight"
 _MOST_ANGLE = math.radians(12.0)
-_EDGE_NOISE = 0.08  # px
 _STEP = 1e-5  # mm, rad
 
 
@@ -115,7 +114,7 @@ def _tilted(table: ChainTable, numbers: Numbers) -> list[Numbers]:
 
 
 def _best(fits: list[Fit], model: OutlineModel) -> Fit:
-    noise = max(_EDGE_NOISE, min(covariance(fit, model)[1] for fit in fits))
+    noise = max(EDGE_NOISE, min(covariance(fit, model)[1] for fit in fits))
     return min(fits, key=lambda fit: misfit(fit, model, noise))
 
 
