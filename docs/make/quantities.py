@@ -15,13 +15,15 @@ PAGE = "../units_and_frames.md"  # from the folder of page.py
 
 def tables() -> dict[str, str]:
     """Return the table of all quantities by the name of its mark."""
-    head = ("Python", "unit in files", "JSON key", "CSV column", "meaning")
+    head = ("Python", "meaning", "unit in files", "JSON key", "CSV column")
     rows = [
-        (_code(one.name), one.unit, _code(one.key), _code(one.column), one.description)
+        (_code(one.name), one.description, one.unit, _code(one.key), _code(one.column))
         for one in QUANTITIES.values()
     ]
     text = "\n".join(f"| {' | '.join(row)} |" for row in [head, ("---",) * len(head), *rows])
-    return {"quantities": f"\n\n{text.replace('|  |', '| |')}\n\n"}
+    # The class keeps the column of sentences wide (docs/style.css): the names would squeeze it.
+    table = f'<div class="quantities" markdown="1">\n\n{text}\n\n</div>'
+    return {"quantities": f"\n\n{table.replace('|  |', '| |')}\n\n"}
 
 
 def _code(text: str) -> str:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,6 +77,9 @@ def test_the_table_says_how_the_rows_were_loaded(call, loop):
     out = call("compare", "pacheco2021-b", loop, "--from-rest")[1]
     assert "18 points of 1 trial, each pulled from rest" in out
     assert "Unloading rows of b.csv are" in out
+    head, row = Path(loop).read_text(encoding="utf-8").splitlines()[:2]
+    Path("one.csv").write_text(f"{head}\n{row}\n", encoding="utf-8")
+    assert "1 point of 1 trial, each" in call("compare", "pacheco2021-b", "one.csv")[1]
 
 
 def test_an_order_that_may_mean_two_things_is_refused(call, refused, tmp_path):

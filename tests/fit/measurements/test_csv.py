@@ -154,6 +154,7 @@ def test_a_hung_weight_needs_no_tendon(read):
             "line 2: tendon_force_N and tendon_displacement_mm",
         ),
         (f"{HEADER}\n0.5,one,2\n", "NOT_A_NUMBER", "line 2: notch_1_deg is 'one'"),
+        (f"{HEADER}\n0.5,NA,2\n", "NOT_A_NUMBER", "empty where there is none"),
         (f"# rig\n{HEADER}\n\n0.5,nan,2\n", "NOT_FINITE", "line 4: notch_1_deg"),
         ("tendon_force_N\n0.5\n", "NO_DATA", "notch_1_deg"),
         ("tendon_force_N,total_deg\n0.5,\n", "NO_DATA", "notch_1_deg"),
@@ -190,6 +191,13 @@ def test_bad_tables_are_told_in_one_sentence(read, text, code, name):
     assert "data.csv" in str(told.value)
     assert re.search(r"\.$", str(told.value))
     assert ".." not in str(told.value).replace("...", "")
+
+
+def test_a_table_of_another_encoding_is_refused_with_the_remedy(tmp_path, robot):
+    file = tmp_path / "data.csv"
+    file.write_bytes("tendon_force_N,total_deg,Prüfer\n1,2,3\n".encode("latin-1"))
+    with refused("FILE_UNREADABLE", "save it as CSV in UTF-8"):
+        nf.read_measurements(file, robot)
 
 
 def test_gravity_needs_something_to_act_on(read, robot):

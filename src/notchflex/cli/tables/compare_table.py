@@ -21,10 +21,13 @@ def print_comparison(comparison: Comparison, others: dict[str, Comparison]) -> N
     """Print the errors of a model, and of others beside it, of every part that was measured."""
     console = terminal.output()
     measured = comparison.measured
-    trials = len(measured.pulls)
     console.print(f"{comparison.robot.name}, {measured.source}", soft_wrap=True)
+    points, trials = (
+        f"{number} {what}{'s' if number > 1 else ''}"
+        for number, what in ((comparison.points, "point"), (len(measured.pulls), "trial"))
+    )
     console.print(
-        f"{comparison.points} points of {trials} trial{'s' if trials > 1 else ''}, each "
+        f"{points} of {trials}, each "
         f"{'pulled from rest' if measured.from_rest else 'trial one loading path'}"
     )
     if comparison.angle == "edge_angle":

@@ -66,21 +66,22 @@ class Table:
         """
         return np.array(
             [
-                math.nan if may_miss and not text else self._number(text, column, line)
+                math.nan if may_miss and not text else self._number(text, column, line, may_miss)
                 for text, line in zip(self.texts(column), self.lines, strict=True)
             ]
         )
 
-    def _number(self, text: str, column: str, line: int) -> float:
+    def _number(self, text: str, column: str, line: int, may_miss: bool) -> float:
         at = f"{self.name}, line {line}: {column} is {text}"
+        empty = "; leave the entry empty where there is none" if may_miss else ""
         try:
             value = float(text.replace(self.decimal, ".", 1))
         except ValueError:
             got = repr(text) if text else "nothing"
             at = f"{self.name}, line {line}: {column} is {got}"
-            raise InputError.NOT_A_NUMBER(f"{at}; give a number.") from None
+            raise InputError.NOT_A_NUMBER(f"{at}; give a number{empty}.") from None
         if not math.isfinite(value):
-            raise InputError.NOT_FINITE(f"{at}; give a finite number.")
+            raise InputError.NOT_FINITE(f"{at}; give a finite number{empty}.")
         if abs(value) > LARGEST:
             raise InputError.OUT_OF_RANGE(f"{at}; give at most {LARGEST:g}.")
         return value

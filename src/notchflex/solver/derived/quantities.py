@@ -181,7 +181,7 @@ def gap(state: SolvedState) -> Array:
 @Quantity("derived", "closed", key="closed", column="notch_{notch}_closed", per=("notch",),
           kind=bool)  # fmt: skip
 def closed(state: SolvedState) -> Array:
-    """True where the lips of a notch response."""
+    """True where the lips of a notch touch."""
     # Contact force or gap is zero, but for rounding.
     force, gap = state.quantity("contact_force"), state.quantity("gap")
     return force > gap * state.chain.contact_stiffness
