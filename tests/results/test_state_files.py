@@ -36,6 +36,25 @@ def test_states_that_cannot_be_written(tmp_path, chain, name):
         State("wrist", at_rest(chain), "tendons", loaded=False, refinement=0).save(tmp_path / name)
 
 
+def test_a_state_that_fails_to_be_written_leaves_the_old_one(file, chain, monkeypatch):
+    old = file.read_bytes()
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full)
+    with refused(ErrorCode.FILE_UNWRITABLE, "No space left"):
+        State("other", at_rest(chain), "tendons", loaded=False, refinement=0).save(file)
+    assert file.read_bytes() == old
+    assert list(file.parent.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("given", ["state.json", nf.Load(tension=1.0), 1.0])
+def test_what_is_no_state_is_told(given):
+    with refused(ErrorCode.WRONG_TYPE, "from_state"):
+        nf.solve(nf.load_robot("pacheco2021-a"), nf.Load(tension=1.0), from_state=given)
+
+
 @pytest.mark.parametrize("wrong", ["drop", "nan", "text", "huge", "null"])
 def test_damaged_arrays_are_not_blamed_on_the_robot(file, chain, wrong):
     content = json.loads(file.read_text())

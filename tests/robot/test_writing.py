@@ -163,6 +163,8 @@ def test_what_cannot_be_written(tmp_path: Path):
         nf.save_robot(robot, tmp_path / "none" / "a.toml")
     with pytest.raises(nf.RobotFileError, match="cannot be written"):
         nf.save_robot(robot, tmp_path)
+    with pytest.raises(nf.RobotFileError, match="cannot be written"):
+        nf.save_robot(robot, tmp_path / "a\0.toml")
     with pytest.raises(nf.RobotFileError, match="cannot be read"):
         nf.save_robot(robot, tmp_path / "a.toml", template=tmp_path / "none.toml")
     assert list(tmp_path.iterdir()) == []

@@ -13,8 +13,10 @@ import numpy as np
 from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
 from notchflex.loads.applied import in_frame, out_of_frame
+from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
+from notchflex.results.files.writing import replacing
 from notchflex.results.same_robot import mismatch
 from notchflex.robot import Robot
 from notchflex.solver.continuation import SolverState, at_rest
@@ -50,7 +52,7 @@ class State(Displayed):
         """Write the state to a JSON file.
 
         Args:
-            path: Where to; an existing file is replaced.
+            path: Where to; an existing file is replaced, whole or not at all.
 
         Raises:
             InputError: The file cannot be written.
@@ -67,14 +69,8 @@ class State(Displayed):
             from notchflex.robot.writing import robot_text
 
             content["description"] = robot_text(self.description)
-        text = json.dumps(content, indent=1) + "\n"
-        try:
-            FilePath(path).write_text(text, encoding="utf-8")
-        except (OSError, ValueError) as error:  # ValueError: a null character in the name
-            reason = getattr(error, "strerror", None) or error
-            raise InputError.FILE_UNWRITABLE(
-                f"the state cannot be written to {path}: {reason}"
-            ) from None
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
     def _summary(self) -> Summary:
         from notchflex.results.summary import state_summary
@@ -205,8 +201,14 @@ def check_robot(state: State | SavedState, robot: Robot) -> None:
     """Check that a state belongs to a robot.
 
     Raises:
-        InputError: It belongs to another one; the message names the values that differ.
+        InputError: It belongs to another one, and the message names the values that differ; or it
+            is no state.
     """
+    if not isinstance(state, State | SavedState):
+        raise InputError.WRONG_TYPE(
+            "from_state must be a notchflex.State: the `state` of a result, or State.load(file); "
+            f"got {short_repr(state)}"
+        )
     if state.robot != robot.name:
         raise InputError.STATE_OF_ANOTHER_ROBOT(
             f"the state belongs to robot {state.robot!r}, this one is {robot.name!r}; "

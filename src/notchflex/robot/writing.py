@@ -65,10 +65,9 @@ def save_robot(
             raise RobotFileError.FILE_UNREADABLE(f"{template} cannot be read: {reason}.") from None
     try:
         Path(path).write_text(robot_text(robot, source, fitted), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise RobotFileError.FILE_UNWRITABLE(
-            f"{path} cannot be written: {error.strerror}."
-        ) from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = getattr(error, "strerror", None) or error
+        raise RobotFileError.FILE_UNWRITABLE(f"{path} cannot be written: {reason}.") from None
 
 
 def robot_text(

@@ -199,16 +199,15 @@ def replacing(target: str | Path) -> Generator[Path]:
             words = problem.strerror or problem
             raise InputError.FILE_UNWRITABLE(f"{target} cannot be written: {words}.") from None
         return
-    destination = Path(os.path.realpath(target))
     try:
+        destination = Path(os.path.realpath(target))
         handle, name = tempfile.mkstemp(
             dir=destination.parent, prefix=f".{destination.stem}-", suffix=destination.suffix
         )
         os.close(handle)
-    except OSError as problem:
-        raise InputError.FILE_UNWRITABLE(
-            f"{target} cannot be written: {problem.strerror}."
-        ) from None
+    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
+        words = getattr(problem, "strerror", None) or problem
+        raise InputError.FILE_UNWRITABLE(f"{target} cannot be written: {words}.") from None
     temporary = Path(name)
     try:
         yield temporary
