@@ -10,6 +10,7 @@ pytest.importorskip("viser", reason="the extra `viewer` is not installed")
 pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 
 WIDTH, HEIGHT = 1280, 720
+CHARTS_WIDTH = 280
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +57,14 @@ def test_numbers_loop_and_legend_are_seen_without_scrolling(visit):
         box = visit.box(label).bounding_box()
         assert box["y"] + box["height"] < HEIGHT
         assert box["x"] + box["width"] < WIDTH
+
+
+def test_numbers_lie_in_the_panel(visit):
+    visit.set_tension(1.8)  # the longest text: 11.80 % > 8 % allowed
+    for number in visit.page.locator("td[data-name]").all():
+        box = number.bounding_box()
+        assert box["x"] + box["width"] <= CHARTS_WIDTH + 4  # with its border
+    visit.reset()
 
 
 def test_messages_of_the_browser_do_not_cover_the_scene(visit):

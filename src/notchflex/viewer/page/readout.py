@@ -68,9 +68,10 @@ def rows(session: Session) -> list[ReadoutRow]:
 
 def readout(session: Session) -> str:
     """Return the numbers of a session's state as an HTML table; `data-name` names each."""
+    # Labels may take two lines: in a wide font the numbers would lie beyond the panel.
     cells = "".join(
         f"<tr{_WARNING if row.warns else ''}>"
-        f'<td style="padding:1px 4px;white-space:nowrap">{escape(row.label)}</td>'
+        f'<td style="padding:1px 4px">{escape(row.label)}</td>'
         f'<td {_CELL} data-name="{row.name}">{escape(row.value)}</td></tr>'
         for row in rows(session)
     )
