@@ -112,6 +112,7 @@ def test_robot_files(folder, refused, code, old, new):
         ("FILE_UNWRITABLE", ["new", "null\0"]),
         ("UNKNOWN_NAME", ["show", "mine.toml", "--set", "depth=1"]),
         ("INVALID_ROBOT", ["show", "mine.toml", "--set", "notch.depth=2"]),
+        ("UNKNOWN_NAME", ["--quiet", *SIMULATE]),
         ("FILE_NOT_FOUND", ["compare", "mine.toml", "none.csv"]),
         ("TABLE_COLUMNS", ["compare", "mine.toml", "mine.toml"]),
         ("BAD_SYNTAX", ["compare", "mine.toml", "data.csv", "--beside", "linear"]),

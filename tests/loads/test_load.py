@@ -6,6 +6,7 @@ import pytest
 import notchflex as nf
 from notchflex.errors import InputError
 from notchflex.loads.load_path import load_path
+from refusals import refused
 
 NAN = np.nan
 
@@ -64,6 +65,14 @@ def test_steps_and_tendon_are_whole_numbers(make, wrong):
     with pytest.raises(InputError, match="tendon"):
         make(0, 3, tendon=wrong)
     assert len(make(0, 3, np.int64(5))) == 5
+
+
+@pytest.mark.parametrize("make", [nf.pull, nf.stroke_path])
+def test_one_step_goes_nowhere(make):
+    # Its value would be the first one, and the last would never be reached.
+    with refused("OUT_OF_RANGE", "one step cannot go from 0 to 3"):
+        make(0, 3, steps=1)
+    assert len(make(3, 3.0, steps=1)) == 1
 
 
 @pytest.mark.parametrize("end", [None, "3", True, 10**400, NAN, np.inf])

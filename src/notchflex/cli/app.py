@@ -219,6 +219,8 @@ def execute(tokens: Sequence[str]) -> int:
             raise problem.__cause__ from None
         verb = next((token for token in tokens if token in VERBS), "")
         words = " ".join(str(problem).split())
+        if verb and tokens[0].startswith("-"):
+            words = f"Options stand behind the command: notchflex {verb} {tokens[0]} ..."
         words += "" if words.endswith((".", "?", "!")) else "."
         help_ = " ".join(["notchflex", *([verb] if verb else []), "--help"])
         code = _CODES.get(type(problem), InputError.UNKNOWN_NAME)

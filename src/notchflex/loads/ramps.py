@@ -22,7 +22,8 @@ def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> Load
         The path; `.release()` adds the way back, `.loaded(...)` external loads.
 
     Raises:
-        InputError: Fewer than one step, a negative or infinite tension, no such tendon.
+        InputError: Fewer than one step, or one step between different tensions; a negative or
+            infinite tension, no such tendon.
 
     Example:
         >>> pull(0.0, 3.0, steps=4).tension[:, 0].tolist()
@@ -44,7 +45,8 @@ def stroke_path(start: float, stop: float, steps: int = 31, *, tendon: int = 1) 
         The path; `.release()` adds the way back, `.loaded(...)` external loads.
 
     Raises:
-        InputError: Fewer than one step, an infinite stroke, no such tendon.
+        InputError: Fewer than one step, or one step between different strokes; an infinite
+            stroke, no such tendon.
 
     Example:
         >>> stroke_path(0.0, 1.0, steps=3).stroke[:, 0].tolist()
@@ -60,6 +62,10 @@ def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> Load
     if tendon < 1:
         raise InputError.OUT_OF_RANGE(f"tendons are counted from 1; got {tendon}")
     first, last = check_number(start, f"the first {what}"), check_number(stop, f"the last {what}")
+    if steps == 1 and first != last:
+        raise InputError.OUT_OF_RANGE(
+            f"a range of one step cannot go from {first:g} to {last:g}; give 2 steps or more"
+        )
     commanded = np.full((steps, tendon), np.nan)
     with np.errstate(over="ignore", invalid="ignore"):
         commanded[:, tendon - 1] = np.linspace(first, last, steps)
