@@ -208,6 +208,20 @@ def test_one_function_for_every_result():
         picture(3)
 
 
+def test_centre_lines_that_were_not_measured_are_not_announced():
+    load = nf.pull(0.5, 0.9, steps=2)
+    seen = {"total_angle": np.radians([23.0, 42.0])}
+    total_only = compare(
+        nf.load_robot("pacheco2021-a"), nf.Measurements("m", load, ("1", "1"), True, seen)
+    )
+    titles = [
+        {axis.get_title(loc="left") for axis in comparison_picture(one).figure().axes}
+        for one in (total_only, a_comparison())
+    ]
+    assert "centre lines of the model" in titles[0]
+    assert "centre lines: model –, measured ··•" in titles[1]
+
+
 def test_rig_in_a_browser_is_that_on_paper(drawn):
     rig, own = a_rig(), drawn["rig"]
     shown, (left, right) = own.interactive(), own.figure().axes

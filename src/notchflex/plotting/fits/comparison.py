@@ -172,11 +172,13 @@ def _centre_lines(comparison: Comparison) -> Panel:
             items.append(Curve(line, colour, dash, width))
             if dash:
                 items.append(dots(line[-1:], colour, 4.0))
+    measured = any(isinstance(item, Curve) and item.dash == DOTTED for item in items)
+    title = "centre lines: model –, measured ··•" if measured else "centre lines of the model"
     return Panel(
         items,
         "across the base [mm]",
         "along the base [mm]",
-        title="centre lines: model –, measured ··•" if points else "",
+        title=title if points else "",
         equal=bool(points),
     )
 
