@@ -33,10 +33,10 @@ class MeasurementReader:
         self.used.add(name)
         return self.table.texts(name)
 
-    def numbers(self, name: str, *, may_miss: bool = False) -> Numbers:
+    def numbers(self, name: str, *, may_miss: bool = False, is_load: bool = False) -> Numbers:
         """Return a column of numbers, of which some may be missing (NaN)."""
         self.used.add(name)
-        return self.table.numbers(name, may_miss=may_miss)
+        return self.table.numbers(name, may_miss=may_miss, is_load=is_load)
 
     def vectors(self, patterns: dict[str, str], **number: object) -> dict[str, Numbers]:
         """Return vectors, (P, 3), for each argument that has a column; axes without one are 0."""
@@ -115,10 +115,10 @@ class MeasurementReader:
             names: list[str] = []
             if tendon in by_force:
                 names.append(by_force[tendon])
-                tension[:, tendon] = self.numbers(names[-1], may_miss=True)
+                tension[:, tendon] = self.numbers(names[-1], may_miss=True, is_load=True)
             if tendon in by_stroke:
                 names.append(by_stroke[tendon])
-                values = table.numbers(names[-1], may_miss=True)
+                values = table.numbers(names[-1], may_miss=True, is_load=True)
                 stroke[:, tendon] = np.where(np.isnan(tension[:, tendon]), values, np.nan)
                 if not np.isnan(stroke[:, tendon]).all():
                     self.used.add(names[-1])

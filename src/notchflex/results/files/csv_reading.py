@@ -54,34 +54,38 @@ class Table:
         position = self.header.index(column)
         return tuple(row[position] for row in self.rows)
 
-    def numbers(self, column: str, *, may_miss: bool = False) -> NDArray[np.float64]:
+    def numbers(
+        self, column: str, *, may_miss: bool = False, is_load: bool = False
+    ) -> NDArray[np.float64]:
         """Return a column of numbers, (rows,).
 
         Args:
             column: Its name.
             may_miss: Whether an entry may be empty, which is then NaN.
+            is_load: Whether another column must have what is empty here, so that a message does
+                not advise to leave an entry empty.
 
         Raises:
             InputError: An entry is not a finite number; the message names line and column.
         """
+        hint = "; leave the entry empty where there is none" if may_miss and not is_load else ""
         return np.array(
             [
-                math.nan if may_miss and not text else self._number(text, column, line, may_miss)
+                math.nan if may_miss and not text else self._number(text, column, line, hint)
                 for text, line in zip(self.texts(column), self.lines, strict=True)
             ]
         )
 
-    def _number(self, text: str, column: str, line: int, may_miss: bool) -> float:
+    def _number(self, text: str, column: str, line: int, hint: str) -> float:
         at = f"{self.name}, line {line}: {column} is {text}"
-        empty = "; leave the entry empty where there is none" if may_miss else ""
         try:
             value = float(text.replace(self.decimal, ".", 1))
         except ValueError:
             got = repr(text) if text else "nothing"
             at = f"{self.name}, line {line}: {column} is {got}"
-            raise InputError.NOT_A_NUMBER(f"{at}; give a number{empty}.") from None
+            raise InputError.NOT_A_NUMBER(f"{at}; give a number{hint}.") from None
         if not math.isfinite(value):
-            raise InputError.NOT_FINITE(f"{at}; give a finite number{empty}.")
+            raise InputError.NOT_FINITE(f"{at}; give a finite number{hint}.")
         if abs(value) > LARGEST:
             raise InputError.OUT_OF_RANGE(f"{at}; give at most {LARGEST:g}.")
         return value
