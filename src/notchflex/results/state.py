@@ -197,7 +197,7 @@ def _damaged(source: str | FilePath, what: str) -> InputError:
     )
 
 
-def check_robot(state: State | SavedState, robot: Robot) -> None:
+def check_robot(state: object, robot: Robot) -> None:
     """Check that a state belongs to a robot.
 
     Raises:
