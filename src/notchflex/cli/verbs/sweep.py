@@ -71,7 +71,10 @@ def sweep(
     part: Annotated[
         tuple[int, int],
         converted(_part, "K/N"),
-        Parameter(help="Only this part of the pieces: for array jobs without a scheduler."),
+        Parameter(
+            help="Only this part of the pieces: for array jobs without a scheduler.",
+            show_default=False,
+        ),
     ] = (1, 1),
     plot: Annotated[
         tuple[str, str] | None,
@@ -120,8 +123,11 @@ def sweep(
                 plan, output, workers=workers, scheduler=scheduler, part=part, progress=show
             )
         except KeyboardInterrupt:
-            again = f"notchflex sweep {shlex.quote(plan)} -o {shlex.quote(output)}"
-            terminal.note(f"finished pieces are kept; go on with: {again}")
+            words = ["notchflex", "sweep", plan, "-o", output]
+            given = {"workers": workers, "scheduler": scheduler}
+            words += [w for k, v in given.items() if v is not None for w in (f"--{k}", str(v))]
+            words += [] if part == (1, 1) else ["--part", "{}/{}".format(*part)]
+            terminal.note(f"finished pieces are kept; go on with: {shlex.join(words)}")
             raise
     return _report(found, outputs)
 
