@@ -89,7 +89,10 @@ class DrawsTask:
                 bad = any(state.silent or state.wrong for state in found)
                 codes[1 if bad else 2 if found[-1].reason else 0] += 1
                 rows += [_row(one.shape.name, state) for state in found]
-        schema = dict.fromkeys(rows[0], polars.String) | {"draw": polars.Int64, "step": polars.Int64}
+        schema = dict.fromkeys(rows[0], polars.String) | {
+            "draw": polars.Int64,
+            "step": polars.Int64,
+        }
         return Piece(polars.DataFrame(rows, schema=schema), {"codes": codes})
 
 

@@ -70,14 +70,18 @@ def print_sweep(found: Sweep) -> None:
     console.print(f"{found.plan.name}: {found.rows} rows{state}; {counts or 'none'}")
     if not found.rows:
         return
+    console.print(terminal.table(*_fitting(found, console.width), gap=2))
+
+
+def _fitting(found: Sweep, width: int) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Return heads and cells with as many quantiles as fit into a width, at least the extremes."""
     parts = sorted({0.0, 1.0, *found.plan.output.quantiles})
-    choices = [parts, _USUAL, *([0.0, *inner, 1.0] for inner in ([0.025, 0.5, 0.975], [0.5], []))]
-    for shown in choices:
-        heads, rows = _quantiles(found, shown)
-        sizes = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
-        if len(shown) <= _MOST and sum(sizes) + 2 * (len(sizes) - 1) <= console.width:
-            break
-    console.print(terminal.table(heads, rows, gap=2))
+    for shown in (parts, _USUAL, [0.0, 0.025, 0.5, 0.975, 1.0], [0.0, 0.5, 1.0]):
+        made = _quantiles(found, shown)
+        sizes = [max(map(len, column)) for column in zip(made[0], *made[1], strict=True)]
+        if len(shown) <= _MOST and sum(sizes) + 2 * (len(sizes) - 1) <= width:
+            return made
+    return _quantiles(found, [0.0, 1.0])
 
 
 def _quantiles(found: Sweep, shown: list[float]) -> tuple[list[str], list[tuple[str, ...]]]:

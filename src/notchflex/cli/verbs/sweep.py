@@ -92,8 +92,21 @@ def sweep(
     A sweep that was stopped goes on where it was: give the same call again. What the files hold
     does not depend on who works on them. Prints counts and quantiles of every kept quantity.
     """
-    is_folder = bool(plan.strip()) and "\0" not in plan and Path(plan).is_dir()
+    if not plan.strip():
+        raise InputError.MISSING_VALUE("a plan file is needed, and got an empty name.")
+    is_folder = "\0" not in plan and Path(plan).is_dir()
     if is_folder:
+        given = {
+            "--dry-run": dry_run,
+            "--workers": workers is not None,
+            "--scheduler": scheduler is not None,
+            "--part": part != (1, 1),
+        }
+        for option in (name for name, there in given.items() if there):
+            raise InputError.CONFLICT(
+                f"{option} is for plan files, and {plan} is a folder, which is only read; to go on "
+                "with a sweep give its plan file and -o."
+            )
         return _look(plan, output, plot, json, quiet)
     if plot is not None:
         raise InputError.CONFLICT(

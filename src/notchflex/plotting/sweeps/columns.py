@@ -45,6 +45,10 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
     frame = found.lazy()
     columns = [one for one in frame.collect_schema().names() if one != "code"]
     for name in (x, y):
+        if name == "code":
+            raise InputError.UNSUPPORTED(
+                "`code` is text, which has no place on an axis; it is told by the colour of points."
+            )
         if name not in columns:
             raise InputError.UNKNOWN_NAME(
                 f'the sweep has no column "{name}"{nearest(name, columns)}; there are '
