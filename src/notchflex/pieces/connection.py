@@ -25,6 +25,9 @@ _CONNECT, _WAIT = 20, 60
 _ASK, _ANSWER, _ALONE = 5.0, 20.0, 30.0
 """Seconds between two questions for workers, to wait for an answer, and without any worker."""
 
+_POLL = 0.2
+"""Seconds between two questions for the first worker."""
+
 _CLOSE = 5.0
 """Seconds for a client to close."""
 
@@ -96,7 +99,7 @@ def scheduler_at(address: str) -> Generator[Any]:
     with silence_logging_cmgr(logging.CRITICAL + 1):  # what is lost is told by an error of ours
         try:
             client = within(_CONNECT + _CLOSE, connect)
-            within(_WAIT + _CLOSE, partial(client.wait_for_workers, 1, timeout=_WAIT))
+            _wait_for_workers(ClusterConnection(client))
         except (OSError, ValueError, TypeError) as problem:
             if client is not None:
                 _close(client)
@@ -108,6 +111,23 @@ def scheduler_at(address: str) -> Generator[Any]:
             yield client
         finally:
             _close(client)
+
+
+def _wait_for_workers(connection: ClusterConnection) -> None:
+    """Wait for the first worker; dask's own way waits on if the scheduler dies meanwhile.
+
+    Raises:
+        OSError: There is none in time, or the scheduler is gone.
+    """
+    until = time.monotonic() + _WAIT
+    while True:
+        if connection.lost:
+            raise OSError("the connection was closed")
+        if connection.threads():
+            return
+        if time.monotonic() > until:
+            raise TimeoutError(f"no worker in {_WAIT} s")
+        time.sleep(_POLL)
 
 
 def _in_words(problem: object) -> str:
