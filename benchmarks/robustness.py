@@ -14,6 +14,9 @@ is left to its number, and `--first I` goes on where a run was stopped. Exit cod
 silent or wrong. Shapes are judged one after the other, and the robots of a shape share their
 programs. The first robot of a shape compiles one, which is no part of the times; putting a robot's
 arrays together is, in the first step.
+
+With `--folder DIR` the draws are worked on in pieces that are kept, without times: the same call
+goes on where it was stopped, and `--workers N` takes so many processes (robustness_pieces.py).
 """
 
 from __future__ import annotations
@@ -136,8 +139,8 @@ def warm(one: Draw) -> float:
 
 def row(name: str, outcomes: list[Outcome]) -> dict[str, object]:
     """Counts and times (ms) of one shape, or of all."""
-    seconds = [one.seconds for one in outcomes if np.isfinite(one.seconds)] or [np.nan]
-    middle, late, last = 1e3 * np.quantile(seconds, [0.5, 0.95, 1.0])
+    seconds = [one.seconds for one in outcomes if np.isfinite(one.seconds)]
+    middle, late, last = 1e3 * np.quantile(seconds, [0.5, 0.95, 1.0]) if seconds else [None] * 3
     reasons = Counter(plain(one.reason) for one in outcomes if one.reason)
     return {
         "shape": name,
@@ -164,7 +167,10 @@ def show(rows: Iterable[dict]) -> None:
         print(
             f"{one['shape']:22}{one['draws']:7}{one['states']:8}{one['solved']:8}"
             f"{sum(one['unsolved'].values()):9}{one['silent']:7}{one['wrong']:6}"
-            f"{one['median_ms']:9.2f}{one['p95_ms']:9.2f}{one['max_ms']:9.1f}"
+            + "".join(
+                f"{'-' if one[name] is None else format(one[name], '.2f'):>9}"
+                for name in ("median_ms", "p95_ms", "max_ms")
+            )
         )
     for one in rows:
         for reason, count in one["unsolved"].items():
@@ -198,6 +204,26 @@ def told(outcomes: list[Outcome], name: str) -> None:
                 print(f"    {more}", flush=True)
 
 
+def judged_shapes(
+    given: argparse.Namespace, compiled: dict[str, float]
+) -> dict[str, list[Outcome]]:
+    """Follow the draws of all shapes, one after the other; what came of them, by shape.
+
+    Args:
+        given: The options.
+        compiled: Takes the time to compile, s, by shape.
+    """
+    shapes = DRAWN if given.drawn else SHAPES
+    outcomes: dict[str, list[Outcome]] = {}
+    for number, shape in enumerate(shapes):
+        numbers = range(number, given.first + given.count, len(shapes))
+        every = [draw(one, given.seed, shape) for one in numbers if one >= given.first]
+        if every and given.shape in (None, shape.name):
+            outcomes[shape.name], compiled[shape.name] = judged(every, shape)
+    print(file=sys.stderr)
+    return outcomes
+
+
 def main() -> int:
     """Draw, solve, judge, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -207,17 +233,20 @@ def main() -> int:
     parser.add_argument("--drawn", action="store_true", help="shapes as the tube makes them")
     parser.add_argument("--shape", help="only draws of this shape")
     parser.add_argument("--json", type=Path, help="write rows and every state that is not good")
+    parser.add_argument("--folder", type=Path, help="keep pieces here, and go on with them")
+    parser.add_argument("--workers", type=int, help="processes that work on the pieces")
     given = parser.parse_args()
-    shapes = DRAWN if given.drawn else SHAPES
-    outcomes: dict[str, list[Outcome]] = {}
-    compiled: dict[str, float] = {}
     last = given.first + given.count
-    for number, shape in enumerate(shapes):
-        numbers = range(number, last, len(shapes))
-        every = [draw(one, given.seed, shape) for one in numbers if one >= given.first]
-        if every and given.shape in (None, shape.name):
-            outcomes[shape.name], compiled[shape.name] = judged(every, shape)
-    print(file=sys.stderr)
+    compiled: dict[str, float] = {}
+    if given.folder:
+        from robustness_pieces import Chosen, PieceFolder, followed
+
+        chosen = Chosen(given.seed, given.first, given.count, given.drawn, given.shape)
+        outcomes = followed(chosen, PieceFolder(given.folder, given.workers))
+        for name, some in outcomes.items():
+            told(some, name)
+    else:
+        outcomes = judged_shapes(given, compiled)
     every = sorted((one for some in outcomes.values() for one in some), key=lambda o: o.number)
     rows = [row(name, some) for name, some in outcomes.items() if some]
     rows.append(row("all", every))

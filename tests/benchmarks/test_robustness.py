@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import notchflex as nf
+from swept import digests
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 # One shape of each kind of notch, friction and load; all of them are drawn by the benchmark.
@@ -64,6 +65,30 @@ def test_faces_turn_less_by_what_bends_beyond_them(robustness, margin):
         seen = edge_angle(faces.as_matrix(), 0.0)
         margin.within("turned back", edge_angle(turn, beyond) - seen, 1e-14, "rad")
         margin.within("difference", edge_angle(turn, 0.0) - beyond - seen, 1e-14, "rad")
+
+
+@pytest.mark.nightly
+def test_draws_in_pieces_are_those_without(robustness, tmp_path):
+    """A lost piece is made again, with the same bytes; other draws are refused."""
+    pytest.importorskip("polars")
+    pieces, shape = __import__("robustness_pieces"), __import__("shapes").SHAPES[0]
+    draws = [__import__("draw").draw(16 * one, 7, shape) for one in range(9)]
+    chosen = pieces.Chosen(7, 0, 16 * 9, False, shape.name)
+    assert [number for _, number in chosen.numbers] == [one.number for one in draws]
+    folder = pieces.PieceFolder(tmp_path / "draws")
+    found = pieces.followed(chosen, folder)
+    wanted = [state for one in draws for state in robustness.follow(one)]
+    assert [(one.number, one.step, bool(one.reason)) for one in found[shape.name]] == [
+        (one.number, one.step, bool(one.reason)) for one in wanted
+    ]
+    before = digests(tmp_path)
+    assert len(before) == 4
+    (tmp_path / "draws" / "pieces" / "piece-000000001.parquet").unlink()
+    pieces.followed(chosen, folder)
+    assert digests(tmp_path) == before
+    with pytest.raises(nf.InputError) as caught:
+        pieces.followed(chosen._replace(seed=8), folder)
+    assert caught.value.code.name == "CONFLICT"
 
 
 def follow_draws(robustness, shapes, number):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import re
 import threading
 import time
@@ -24,8 +25,20 @@ _CONNECT, _WAIT = 20, 60
 _ASK, _ANSWER, _ALONE = 5.0, 20.0, 30.0
 """Seconds between two questions for workers, to wait for an answer, and without any worker."""
 
+_POLL = 0.2
+"""Seconds between two questions for the first worker."""
+
 _CLOSE = 5.0
 """Seconds for a client to close."""
+
+_QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.worker.memory.monitor-interval": "1s",
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.system-monitor.interval": "2s",
+}
+"""Settings of dask on this machine. By default it samples the stacks of its workers 100 times, and
+asks its event loops 50 times a second: in all a tenth of a core, which the pieces need."""
 
 
 @contextlib.contextmanager
@@ -36,9 +49,11 @@ def local_cluster(workers: int) -> Generator[Any]:
         workers: How many.
     """
     need("distributed", "cluster", "--workers")
+    import dask.config
     import distributed
 
     with (
+        dask.config.set(_QUIET),
         distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
@@ -75,26 +90,52 @@ def scheduler_at(address: str) -> Generator[Any]:
     """
     need("distributed", "cluster", "--scheduler")
     import distributed
+    from distributed.utils import silence_logging_cmgr
 
     def connect() -> Any:
         return distributed.Client(address, timeout=_CONNECT, set_as_default=False)
 
     client = None
-    try:
-        client = within(_CONNECT + _CLOSE, connect)
-        within(_WAIT + _CLOSE, partial(client.wait_for_workers, 1, timeout=_WAIT))
-    except (OSError, ValueError, TypeError) as problem:
-        if client is not None:
+    with silence_logging_cmgr(logging.CRITICAL + 1):  # what is lost is told by an error of ours
+        try:
+            client = within(_CONNECT + _CLOSE, connect)
+            _wait_for_workers(ClusterConnection(client))
+        except (OSError, ValueError, TypeError) as problem:
+            if client is not None:
+                _close(client)
+            raise InputError.NO_CONNECTION(
+                f"no scheduler with workers answers at {address}: {_in_words(problem)}. Start one "
+                f"with `dask scheduler`, and workers with `dask worker {address}`."
+            ) from None
+        try:
+            yield client
+        finally:
             _close(client)
-        words = " ".join(str(problem).split())[:200]
-        raise InputError.NO_CONNECTION(
-            f"no scheduler with workers answers at {address}: {words}. Start one with `dask "
-            f"scheduler`, and workers with `dask worker {address}`."
-        ) from None
-    try:
-        yield client
-    finally:
-        _close(client)
+
+
+def _wait_for_workers(connection: ClusterConnection) -> None:
+    """Wait for the first worker; dask's own way waits on if the scheduler dies meanwhile.
+
+    Raises:
+        OSError: There is none in time, or the scheduler is gone.
+    """
+    until = time.monotonic() + _WAIT
+    while True:
+        if connection.lost:
+            raise OSError("the connection was closed")
+        if connection.threads():
+            return
+        if time.monotonic() > until:
+            raise TimeoutError(f"no worker in {_WAIT} s")
+        time.sleep(_POLL)
+
+
+def _in_words(problem: object) -> str:
+    """Return an error of dask without names of its objects and tasks."""
+    words = " ".join(str(problem).split())
+    if "closed" in words or "connection-lost" in words:
+        return "the connection was closed"
+    return words[:200]
 
 
 def _close(client: Any) -> None:
@@ -135,10 +176,9 @@ def scheduler_gone(why: object) -> InputError:
     Args:
         why: What was found.
     """
-    words = " ".join(str(why).split())[:100]
     return InputError.NO_CONNECTION(
-        f"the scheduler or its workers are gone ({words}); all finished pieces are kept: start "
-        "them again, and call again."
+        f"the scheduler or its workers are gone ({_in_words(why)}); all finished pieces are kept: "
+        "start them again, and call again."
     )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from notchflex.errors import InputError
+from notchflex.pieces.checksum import is_whole
 from notchflex.pieces.manifest import Manifest
 from notchflex.pieces.piece import KEY, Done, done_of, piece_file
 from notchflex.results.files.writing import check_folder, read_text, write_text
@@ -190,4 +191,8 @@ def done_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -
     head = head_of(file, manifest, piece)
     if head is None:
         return None
-    return done_of(manifest, head, file.stat().st_size)
+    try:
+        data = bytearray(file.read_bytes())
+    except OSError:
+        return None
+    return done_of(manifest, head, len(data)) if is_whole(memoryview(data)) else None

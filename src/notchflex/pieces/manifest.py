@@ -73,17 +73,26 @@ class Manifest:
         Raises:
             InputError: It is no manifest of this kind, or one of another format.
         """
+        damaged = InputError.FILE_DAMAGED(
+            f"{where} is no manifest of a {wanted}, or was changed; remove its folder, or take "
+            "another one."
+        )
         try:
             document = json.loads(text)
             kind, form = document["kind"], document["format"]
-        except (ValueError, TypeError, KeyError):
-            raise InputError.FILE_DAMAGED(
-                f"{where} is no manifest of a {wanted}; remove its folder, or take another one."
-            ) from None
+        except (ValueError, TypeError, KeyError, RecursionError):
+            raise damaged from None
         if kind != wanted or form != FORMAT:
             raise InputError.FILE_FORMAT(
                 f"{where} is of kind {kind} and format {form}; needed are {wanted} and {FORMAT}."
             )
+        numbers = [document.get(key) for key in ("rows", "piece", "pieces")]
+        if not isinstance(document.get("versions"), dict) or not all(
+            isinstance(one, int) and one > 0 for one in numbers
+        ):
+            raise damaged
+        if -(-numbers[0] // numbers[1]) != numbers[2]:
+            raise damaged
         return cls(document)
 
     @cached_property
@@ -141,8 +150,8 @@ class Manifest:
             InputError: Anything differs; the message names the first difference.
         """
         other.check_versions(where)
-        for key, mine in self.document.items():
-            place = _difference(key, mine, other.document.get(key))
+        for key in dict.fromkeys([*self.document, *other.document]):
+            place = _difference(key, self.document.get(key), other.document.get(key))
             if place:
                 raise InputError.CONFLICT(
                     f"{where} holds another {self.kind}: {place}; take another folder, or "

@@ -10,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from notchflex.pieces import checksum
 from notchflex.pieces.codes import FAILED
 from notchflex.pieces.manifest import Manifest
 from notchflex.results.files.writing import replacing
@@ -109,9 +110,11 @@ def encoded(task: Task, piece: int) -> tuple[memoryview, dict[str, Any]]:
     frame, content = task.piece(piece)
     head = {"sweep": task.manifest.digest, "piece": piece, **content}
     buffer = io.BytesIO()
-    metadata = {KEY: json.dumps(head)}
+    metadata = {KEY: json.dumps(head), checksum.KEY: checksum.BLANK}
     frame.write_parquet(buffer, compression="lz4", statistics=True, metadata=metadata)
-    return buffer.getbuffer(), head
+    data = buffer.getbuffer()
+    checksum.seal(data)
+    return data, head
 
 
 def make_piece(task: Task, folder: str | os.PathLike[str], piece: int) -> Done:

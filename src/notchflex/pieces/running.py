@@ -42,6 +42,7 @@ def in_threads(
     task: Task, folder: str, pieces: Iterable[int], cores: int | None = None
 ) -> Generator[Done]:
     """Work on pieces in threads of this process; each piece keeps to one of them."""
+    keep_memory()
     cores = cores or number_of_cores()
     work = partial(make_piece, task, folder)
     if cores == 1:
@@ -144,8 +145,8 @@ def _work(recipe: Recipe, text: str, folder: str, piece: int) -> Done:
 def keep_memory() -> None:
     """Let the C library keep the memory that arrays gave back, for the next ones.
 
-    dask sets MALLOC_TRIM_THRESHOLD_ for its workers, so that all memory is given back to the system
-    at once: a batch then spends as much time on new pages as on solving.
+    Threads give theirs back to the system at once, and so does all of a worker of dask, which sets
+    MALLOC_TRIM_THRESHOLD_: a batch then spends as much time on new pages as on solving.
     """
     if not sys.platform.startswith("linux"):
         return

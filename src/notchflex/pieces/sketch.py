@@ -88,18 +88,17 @@ class Sketch:
             return cls()
         bins = scale.bins(values)
         first = int(bins.min())
+        counts = np.bincount(bins - first)
         moved = values - scale.middle
         with np.errstate(over="ignore"):
             total, squares = float(moved.sum()), float(np.square(moved).sum())
-        return cls(
-            len(values),
-            total,
-            squares,
-            _least(values, rows, max(extremes, 1)),
-            [(-value, row) for value, row in _least(-values, rows, max(extremes, 1))],
-            first,
-            np.bincount(bins - first),
-        )
+        # All values are never put in order: extremes are in the outermost bins.
+        keep = max(extremes, 1)
+        low = np.flatnonzero(bins <= first + _holding(counts, keep))
+        high = np.flatnonzero(bins >= first + len(counts) - 1 - _holding(counts[::-1], keep))
+        smallest = _least(values[low], rows[low], keep)
+        largest = [(-value, row) for value, row in _least(-values[high], rows[high], keep)]
+        return cls(len(values), total, squares, smallest, largest, first, counts)
 
     def merged(self, other: Sketch, extremes: int) -> Sketch:
         """Return the description of both columns."""
@@ -155,6 +154,11 @@ class Sketch:
         }
         changed["counts"] = np.array(document["counts"], np.int64)
         return cls(**(document | changed))
+
+
+def _holding(counts: Int[np.ndarray, " bins"], keep: int) -> int:
+    """Return the first place up to which so many values are counted, or the last place."""
+    return min(int(np.searchsorted(np.cumsum(counts), keep)), len(counts) - 1)
 
 
 def _least(

@@ -18,6 +18,8 @@ _TOML_TYPES = (
     (Mapping, "a table"),
     (Sequence, "a list"),
 )
+_LONGEST = 80
+"""Letters of a text that are shown at most."""
 
 
 def sentences(error: ValidationError, cls: type, repeats: Sequence[int] = ()) -> list[str]:
@@ -178,7 +180,8 @@ def _got(value: object, unit: str) -> str:
     if isinstance(value, (int, float)):
         return f"{value} {unit}".strip()
     if isinstance(value, str):
-        return f'"{value}" (text)'
+        shown = value if len(value) <= _LONGEST else f"{value[: _LONGEST - 3]}..."
+        return f'"{shown}" (text)'
     for cls, word in _TOML_TYPES:
         if isinstance(value, cls):
             return word
@@ -238,6 +241,7 @@ _RULES = {
     "finite_number": "it must be a finite number",
     "whole_number_wanted": "it must be a whole number",
     "string_type": "it must be text in quotes",
+    "bool_type": "it must be true or false",
     "string_too_short": "it must not be empty",
     "string_too_long": "it is too long",
     "string_pattern_mismatch": "it must be a word of letters, digits, - and _",

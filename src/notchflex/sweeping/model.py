@@ -69,7 +69,7 @@ def model_of(plan: SweepPlan, robot: Robot) -> SweepModel:
     criteria: dict[str, Criterion] = {}
     for one in plan.keep:
         load = one.load or next(iter(loads))
-        for entry in entries_of(one, load, paths[load], len(loads) > 1):
+        for entry in entries_of(one, load, paths[load], len(loads) > 1, "`keep`"):
             if entry.name in criteria:
                 raise InputError.CONFLICT(f"`keep` has {entry.name} twice; keep it once.")
             scale = entry.quantity.scale

@@ -254,6 +254,24 @@ class Sweep(Displayed):
         return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
 
 
+def check_content(manifest: SweepManifest, directory: str | os.PathLike[str]) -> None:
+    """Raise unless plan, robot and columns can be read from a manifest.
+
+    Raises:
+        InputError: Its file was changed.
+    """
+    try:
+        _ = manifest.plan, manifest.robot
+        columns = manifest.document["columns"]
+        if not isinstance(columns, list) or not all(isinstance(one, str) for one in columns):
+            raise TypeError
+    except (InputError, LookupError, TypeError, AttributeError):
+        raise InputError.FILE_DAMAGED(
+            f"{directory} cannot be read: its sweep.json was changed; give the plan again with "
+            "another folder."
+        ) from None
+
+
 def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
     """Read a sweep, which may be unfinished.
 
@@ -268,6 +286,7 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
     """
     need("polars", "data", "read_sweep")
     manifest = SweepManifest(manifest_in(directory, KIND).document)
+    check_content(manifest, directory)
     output = manifest.plan.output
     pieces: list[int] = []
     codes = np.zeros(len(CODES), int)

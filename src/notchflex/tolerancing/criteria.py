@@ -88,7 +88,7 @@ def criteria_of(spec: ToleranceSpec, paths: Mapping[str, EquilibriumPath]) -> li
 
 
 def entries_of(
-    limit: Limited, load: str, path: EquilibriumPath, named: bool
+    limit: Limited, load: str, path: EquilibriumPath, named: bool, what: str = "the limit"
 ) -> Iterator[Criterion]:
     """Yield the numbers of a result that a limit is about.
 
@@ -97,12 +97,13 @@ def entries_of(
         load: Name of the load.
         path: The robot of the drawing under it.
         named: Whether their names say which load it is.
+        what: What messages call it.
     """
     quantity, steps = REGISTERED[limit.quantity], len(path)
     step = steps if limit.step is None else limit.step
     if step > steps:
         raise InputError.OUT_OF_RANGE(
-            f"the limit of {limit.quantity} has step {step}, but the load {load} has {steps}."
+            f"{what} of {limit.quantity} has step {step}, but the load {load} has {steps}."
         )
     if not holds(path, quantity):
         raise InputError.UNSUPPORTED(
@@ -110,7 +111,8 @@ def entries_of(
         )
     values = np.asarray(path.quantity(limit.quantity))[step - 1]
     choices = [
-        _places(limit, axis, size) for axis, size in zip(quantity.per, values.shape, strict=True)
+        _places(limit, axis, size, what)
+        for axis, size in zip(quantity.per, values.shape, strict=True)
     ]
     at = [f"at {load}"] if named else []
     at += [f"step {step}"] if limit.step is not None else []
@@ -126,7 +128,7 @@ def entries_of(
         yield Criterion(words, quantity, load, step - 1, index, lower, upper)
 
 
-def _places(limit: Limited, axis: str, size: int) -> Sequence[int]:
+def _places(limit: Limited, axis: str, size: int, what: str) -> Sequence[int]:
     """Return the places along an axis that a limit is about."""
     number = getattr(limit, axis) if axis in INDICES else None
     if number is None:
@@ -136,7 +138,7 @@ def _places(limit: Limited, axis: str, size: int) -> Sequence[int]:
     first = FIRST.get(axis, 1)
     if not first <= number < first + size:
         raise InputError.OUT_OF_RANGE(
-            f"the limit of {limit.quantity} names {axis} {number}; "
+            f"{what} of {limit.quantity} names {axis} {number}; "
             f"give a number from {first} to {first + size - 1}."
         )
     return [number - first]

@@ -56,8 +56,13 @@ def print_estimate(expected: Estimate) -> None:
     terminal.output().print(terminal.table(("", ""), rows, gap=2))
 
 
+_USUAL = [0.0, 0.025, 0.25, 0.5, 0.75, 0.975, 1.0]
+_MOST = 9
+"""Quantiles that a table shows at most."""
+
+
 def print_sweep(found: Sweep) -> None:
-    """Print counts, and quantiles of every kept quantity."""
+    """Print counts, and quantiles of every kept quantity: as many as fit beside its name."""
     console = terminal.output(terminal.width())
     counts = ", ".join(f"{count} {code}" for code, count in found.counts.items() if count)
     state = "" if found.finished else f" of {found.manifest.rows}, {len(found.pieces)} of "
@@ -65,12 +70,26 @@ def print_sweep(found: Sweep) -> None:
     console.print(f"{found.plan.name}: {found.rows} rows{state}; {counts or 'none'}")
     if not found.rows:
         return
+    console.print(terminal.table(*_fitting(found, console.width), gap=2))
+
+
+def _fitting(found: Sweep, width: int) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Return heads and cells with as many quantiles as fit into a width, at least the extremes."""
     parts = sorted({0.0, 1.0, *found.plan.output.quantiles})
-    shown = parts if len(parts) <= 9 else [0.0, 0.025, 0.25, 0.5, 0.75, 0.975, 1.0]
+    for shown in (parts, _USUAL, [0.0, 0.025, 0.5, 0.975, 1.0], [0.0, 0.5, 1.0]):
+        made = _quantiles(found, shown)
+        sizes = [max(map(len, column)) for column in zip(made[0], *made[1], strict=True)]
+        if len(shown) <= _MOST and sum(sizes) + 2 * (len(sizes) - 1) <= width:
+            return made
+    return _quantiles(found, [0.0, 1.0])
+
+
+def _quantiles(found: Sweep, shown: list[float]) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Return heads and cells of a table of quantiles."""
     names = {0.0: ">smallest", 1.0: ">largest", 0.5: ">median"}
     heads = ["quantity", *(names.get(part, f">{100 * part:g} %") for part in shown)]
     rows = [
         (name, *(f"{value:.5g}" for value in found.quantiles(name, shown)))
         for name in found.columns
     ]
-    console.print(terminal.table(heads, rows, gap=2))
+    return heads, rows

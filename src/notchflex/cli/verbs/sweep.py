@@ -71,7 +71,10 @@ def sweep(
     part: Annotated[
         tuple[int, int],
         converted(_part, "K/N"),
-        Parameter(help="Only this part of the pieces: for array jobs without a scheduler."),
+        Parameter(
+            help="Only this part of the pieces: for array jobs without a scheduler.",
+            show_default=False,
+        ),
     ] = (1, 1),
     plot: Annotated[
         tuple[str, str] | None,
@@ -89,8 +92,21 @@ def sweep(
     A sweep that was stopped goes on where it was: give the same call again. What the files hold
     does not depend on who works on them. Prints counts and quantiles of every kept quantity.
     """
-    is_folder = bool(plan.strip()) and "\0" not in plan and Path(plan).is_dir()
+    if not plan.strip():
+        raise InputError.MISSING_VALUE("a plan file is needed, and got an empty name.")
+    is_folder = "\0" not in plan and Path(plan).is_dir()
     if is_folder:
+        given = {
+            "--dry-run": dry_run,
+            "--workers": workers is not None,
+            "--scheduler": scheduler is not None,
+            "--part": part != (1, 1),
+        }
+        for option in (name for name, there in given.items() if there):
+            raise InputError.CONFLICT(
+                f"{option} is for plan files, and {plan} is a folder, which is only read; to go on "
+                "with a sweep give its plan file and -o."
+            )
         return _look(plan, output, plot, json, quiet)
     if plot is not None:
         raise InputError.CONFLICT(
@@ -120,8 +136,11 @@ def sweep(
                 plan, output, workers=workers, scheduler=scheduler, part=part, progress=show
             )
         except KeyboardInterrupt:
-            again = f"notchflex sweep {shlex.quote(plan)} -o {shlex.quote(output)}"
-            terminal.note(f"finished pieces are kept; go on with: {again}")
+            words = ["notchflex", "sweep", plan, "-o", output]
+            given = {"workers": workers, "scheduler": scheduler}
+            words += [w for k, v in given.items() if v is not None for w in (f"--{k}", str(v))]
+            words += [] if part == (1, 1) else ["--part", "{}/{}".format(*part)]
+            terminal.note(f"finished pieces are kept; go on with: {shlex.join(words)}")
             raise
     return _report(found, outputs)
 

@@ -45,6 +45,10 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
     frame = found.lazy()
     columns = [one for one in frame.collect_schema().names() if one != "code"]
     for name in (x, y):
+        if name == "code":
+            raise InputError.UNSUPPORTED(
+                "`code` is text, which has no place on an axis; it is told by the colour of points."
+            )
         if name not in columns:
             raise InputError.UNKNOWN_NAME(
                 f'the sweep has no column "{name}"{nearest(name, columns)}; there are '
@@ -79,9 +83,16 @@ def sweep_picture(found: Sweep, x: str, y: str) -> Picture:
 
 
 def _band(both: np.ndarray) -> list[Mark]:
-    """Return the median and the band of 95 % along x, from bins of equally many rows."""
-    order = np.argsort(both[:, 0], kind="stable")
-    parts = [one for one in np.array_split(both[order], _BINS) if np.ptp(one[:, 0]) >= 0.0]
+    """Return the median and the band of 95 % along x: at its values if these are few.
+
+    Otherwise they are those of bins of equally many rows.
+    """
+    values, of = np.unique(both[:, 0], return_inverse=True)
+    if len(values) <= _BINS:
+        parts = [both[of == number] for number in range(len(values))]
+    else:
+        order = np.argsort(both[:, 0], kind="stable")
+        parts = np.array_split(both[order], _BINS)
     middle = np.array([np.median(one[:, 0]) for one in parts])
     keep = np.concatenate([[True], np.diff(middle) > 0.0])
     low, half, high = (

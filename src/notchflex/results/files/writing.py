@@ -238,7 +238,9 @@ def read_text(source: str | os.PathLike[str], kind: str) -> str:
     except IsADirectoryError:
         raise InputError.FILE_UNREADABLE(f"{source} is a folder; name a {kind}.") from None
     except UnicodeDecodeError:
-        saved = f"save it as {kind.removesuffix(' file')} in UTF-8"
+        form = kind.removesuffix(" file")  # such as "CSV file"
+        form = form if form[0].isupper() else "text"
+        saved = f"save it as {form} in UTF-8"
         raise InputError.FILE_UNREADABLE(f"{source} is no text in UTF-8; {saved}.") from None
     except (OSError, ValueError) as problem:  # ValueError: a null character in the name
         words = getattr(problem, "strerror", None) or problem
