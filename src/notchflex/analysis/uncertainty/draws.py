@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr, ndtri
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
@@ -74,6 +73,8 @@ def deviation(tolerance: Tolerance, value: float, level: Any) -> Any:
         return level * (plus + minus) - minus
     if sd == 0.0:
         return 0.0 * level
+    from scipy.special import ndtr, ndtri  # takes a fifth of a second, and most commands do without
+
     lower, upper = ndtr(-minus / sd), ndtr(plus / sd)
     return sd * ndtri(lower + level * (upper - lower))
 
@@ -91,6 +92,8 @@ def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
         return 0.5 * (plus - minus), (plus + minus) / math.sqrt(12.0)
     if sd == 0.0 or (math.isinf(plus) and math.isinf(minus)):
         return 0.0, sd
+    from scipy.special import ndtr
+
     # A normal distribution that is cut off at a and b, in standard deviations.
     a, b = -minus / sd, plus / sd
     part = ndtr(b) - ndtr(a)
@@ -148,6 +151,8 @@ def _levels(
     """
     part = random.permuted(np.tile(np.arange(draws), (count, 1)), axis=1).T
     if draws > count + 1 > 2:
+        from scipy.special import ndtri
+
         normal = ndtri((part + 0.5) / draws)
         root = np.linalg.cholesky(np.corrcoef(normal, rowvar=False))
         part = np.linalg.solve(root, normal.T).T.argsort(axis=0).argsort(axis=0)
