@@ -11,7 +11,8 @@ import notchflex as nf
 from notchflex.analysis.uncertainty.assumed import tolerances_of
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
 from notchflex.analysis.varied import varied_chains as varied
-from notchflex.analysis.varied.sparse_polynomial import Wanted, fit_polynomial, leja_points
+from notchflex.analysis.varied.fit_polynomial import Wanted, fit_polynomial
+from notchflex.analysis.varied.sparse_polynomial import leja_points
 from notchflex.robot.varied import VariedRobots
 from refusals import refused
 

@@ -17,7 +17,8 @@ from jaxtyping import Float
 
 from notchflex._jax import jax
 from notchflex.analysis.solve import prepare_for
-from notchflex.analysis.varied.sparse_polynomial import SparsePolynomial, Wanted, fit_polynomial
+from notchflex.analysis.varied.fit_polynomial import Wanted, fit_polynomial
+from notchflex.analysis.varied.sparse_polynomial import SparsePolynomial
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.command import Command, make_commands
