@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 
 from notchflex.analysis.varied.sparse_polynomial import (
     DEGREE,
-    Block,
+    CoefficientBlock,
     SparsePolynomial,
     Terms,
     leja_points,
@@ -28,7 +28,7 @@ _ROUNDS = 6  # of parts that are not yet right
 VectorOf = Callable[[Float[np.ndarray, " d"]], Float[np.ndarray, " m"]]
 
 
-class Wanted(NamedTuple):
+class PolynomialAccuracy(NamedTuple):
     """How exact a polynomial should be, and what that may cost.
 
     Attributes:
@@ -48,7 +48,7 @@ def fit_polynomial(
     scale_of: VectorOf,
     parts: Sequence[Int[np.ndarray, ...]],
     *,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[PolynomialAccuracy],
     checks: Float[np.ndarray, "k d"],
 ) -> SparsePolynomial | None:
     """Find a polynomial that is right to a tolerance.
@@ -192,11 +192,11 @@ def _solved(
     block_of = block_of.ravel()
     order = np.argsort(block_of, kind="stable")
     place = np.argsort(order)
-    blocks: list[Block] = []
+    blocks: list[CoefficientBlock] = []
     for block in range(block_of.max(initial=-1) + 1):
         own = coefficients[block_of == block]
         used = np.flatnonzero((own != 0.0).any(axis=0))
-        blocks.append(Block(used, np.ascontiguousarray(own[:, used])))
+        blocks.append(CoefficientBlock(used, np.ascontiguousarray(own[:, used])))
     return SparsePolynomial(middle, half, terms, blocks, entries, place[which.ravel()], base, nodes)
 
 
@@ -210,6 +210,3 @@ def _errors(
     found = np.tile(made.base, (len(checks), 1))
     found[:, made.entries] = made.varied(checks).T
     return np.max(np.abs(found - exact) / scale, axis=0)
-
-
-__all__ = ["SparsePolynomial", "Wanted", "fit_polynomial", "leja_points"]

@@ -77,7 +77,7 @@ def span(leja: np.ndarray, degree: int) -> float:
     return float(above / below)
 
 
-class Block(NamedTuple):
+class CoefficientBlock(NamedTuple):
     """Entries that depend on the same numbers.
 
     Attributes:
@@ -106,7 +106,7 @@ class SparsePolynomial(NamedTuple):
     middle: Float[np.ndarray, " d"]
     half: Float[np.ndarray, " d"]
     terms: Terms
-    blocks: Sequence[Block]
+    blocks: Sequence[CoefficientBlock]
     entries: Int[np.ndarray, " v"]
     which: Int[np.ndarray, " v"]
     base: Float[np.ndarray, " m"]
