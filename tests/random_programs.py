@@ -65,6 +65,12 @@ def _like(x: Any, value: Any) -> Any:
     return lax.full_like(x, value)
 
 
+def _later(name: str) -> list[tuple[Callable[[Any], Any], str]]:
+    """Return a function of few digits that not every JAX has, if this one has it."""
+    function = getattr(lax, name, None)
+    return [(lambda x: function(digits(x)), "f")] if function else []
+
+
 def _within(low: float, high: float) -> Callable[[Any], Any]:
     return lambda x: lax.clamp(low, x, high)
 
@@ -115,6 +121,7 @@ UNARY: dict[str, list[tuple[Callable[[Any], Any], str]]] = {
         (lambda x: lax.round(x, lax.RoundingMethod.AWAY_FROM_ZERO), "f"),
         (lax.sign, "f"),
         (lax.square, "f"),
+        *_later("one_minus_square"),
         (lambda x: lax.integer_pow(digits(x), 3), "f"),
         (lambda x: lax.integer_pow(signs(x), -2), "f"),
         (lambda x: lax.clamp(-1.5, x, 2.0), "f"),

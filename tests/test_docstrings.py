@@ -54,7 +54,7 @@ def test_readme_examples(capsys: pytest.CaptureFixture[str]):
 
 
 def test_readme_comparisons_are_those_of_the_pages():
-    (table,) = re.findall(r"## How right\n\n(.*?)\n\n", README, re.DOTALL)
+    (table,) = re.findall(r"## Accuracy\n\n(.*?)\n\n", README, re.DOTALL)
     names = ("validation.md", "from_the_drawing.md")
     pages = "".join((DOCS / name).read_text(encoding="utf-8") for name in names)
     rows = [line.split("|")[1:-1] for line in table.splitlines()[2:]]

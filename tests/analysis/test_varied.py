@@ -11,7 +11,8 @@ import notchflex as nf
 from notchflex.analysis.uncertainty.assumed import tolerances_of
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
 from notchflex.analysis.varied import varied_chains as varied
-from notchflex.analysis.varied.sparse_polynomial import Wanted, fit_polynomial, leja_points
+from notchflex.analysis.varied.fit_polynomial import PolynomialAccuracy, fit_polynomial
+from notchflex.analysis.varied.sparse_polynomial import leja_points
 from notchflex.robot.varied import VariedRobots
 from refusals import refused
 
@@ -137,7 +138,7 @@ def test_a_polynomial_finds_what_a_polynomial_is():
     made = fit_polynomial(
         exact, np.array([0.5, 1.0, -1.0]), np.array([1.0, 2.0, 3.0]), [[0, 1, 2]],
         lambda sizes: np.maximum(sizes, 1e-6), [np.array([0]), np.array([1]), np.array([2])],
-        wanted=[Wanted(1e-9, 500)], checks=np.array([[0.7, 1.3, 2.0]]),
+        wanted=[PolynomialAccuracy(1e-9, 500)], checks=np.array([[0.7, 1.3, 2.0]]),
     )  # fmt: skip
     assert made is not None
     assert made.entries.tolist() == [0, 1]

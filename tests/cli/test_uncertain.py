@@ -79,7 +79,7 @@ def test_draws_that_fail_are_warned_of(call):
 def test_show_says_how_right_it_is(call):
     code, out, err = call("show", "pacheco2021-a", "--json", "a.json")
     assert code == 0, err
-    text = " ".join(out.partition("How right is it?")[2].split())
+    text = " ".join(out.partition("Accuracy:")[2].split())
     assert "notch 1 closes at 1." in text
     assert "10 µm of depth in all notches change that angle by 3.9 deg" in text
     assert "material.elastic_modulus ±10 %" in text

@@ -20,7 +20,7 @@ from notchflex.fit import (
     write_fitted,
 )
 from notchflex.fit.documents import calibration_document
-from notchflex.fit.estimation.problem import Problem
+from notchflex.fit.estimation.problem import FitProblem
 from notchflex.fit.model.samples import Samples
 from notchflex.plotting.fits.calibration_rows import data_panel, residual_panel
 from notchflex.plotting.sheet import Curve
@@ -283,7 +283,7 @@ def test_what_cannot_be_is_one_sentence(ask, code, name):
 
 def test_why_no_robot_can_be_is_forgotten_with_the_next_try():
     samples = Samples.of({WRIST.name: WRIST}, {WRIST.name: [measured()]}, fitted().problem.unknowns)
-    problem = Problem(samples, LeastSquares())
+    problem = FitProblem(samples, LeastSquares())
     assert problem(np.array([-1.0, 1e4])) is None
     assert "friction.coefficient" in samples.refused
     assert problem(np.array([0.1, 1e4])) is not None

@@ -17,7 +17,7 @@ from notchflex.fit import (
     read_measurements,
     simulate_measurements,
 )
-from notchflex.fit.estimation.problem import Problem
+from notchflex.fit.estimation.problem import FitProblem
 from notchflex.fit.model.constants import unknowns
 from notchflex.fit.model.samples import Samples
 from notchflex.robot.value_names import number_at
@@ -87,7 +87,7 @@ def test_ends_of_an_interval_are_where_the_misfit_has_risen_by_chi_squared(noisy
 def test_slope_of_the_misfit_is_that_of_differences(objective):
     seen = simulate_measurements(WRIST, UP, deviation=NOISE, seed=1)
     data = {"A": (seen,)}
-    problem = Problem(Samples.of({"A": WRIST}, data, unknowns({"A": WRIST}, FOUR)), objective)
+    problem = FitProblem(Samples.of({"A": WRIST}, data, unknowns({"A": WRIST}, FOUR)), objective)
     at = np.array([1.07 * TRUE[name] for name in FOUR])
     slope = problem(at).gradient
     for number, value in enumerate(at):

@@ -1,7 +1,10 @@
 """Programs of the small compiler against what JAX makes of the same functions."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
+from jax.extend.core import Primitive
 
 from lanewise import Program, UnsupportedPrimitiveError, lower, machine_code
 from notchflex._jax import jax, jnp
@@ -195,6 +198,32 @@ def test_rows_of_their_own_and_what_all_share():
     np.testing.assert_allclose(found, np.asarray(wanted).reshape(19, -1), rtol=ROUNDING)
     (none,) = made([shared, own[:0]])
     assert none.shape == (0, 10)
+
+
+def primitive(name, function):
+    """JAX's primitive of that name; where this JAX is too old, one that computes the same."""
+    if hasattr(jax.lax, f"{name}_p"):
+        return getattr(jax.lax, f"{name}_p").bind
+    made = Primitive(name)
+    made.def_impl(function)
+    made.def_abstract_eval(lambda x, *_: x)
+    return made.bind
+
+
+@pytest.mark.parametrize("values", [np.linspace(-3.0, 3.0, 13), 1.0 + 1e-9 * np.arange(9.0)])
+def test_primitives_of_later_versions_of_jax(values):
+    """JAX 0.12 writes derivatives of arc cosines and polynomials by primitives of their own."""
+    one_minus_square = primitive("one_minus_square", lambda x: (1 + x) * (1 - x))
+    horner = primitive("polynomial", lambda x, a, b, c: a + x * (b + x * c))
+
+    def function(x):
+        whole = one_minus_square(jnp.round(4.0 * x).astype(int))
+        return one_minus_square(x), whole, horner(x, *(jnp.float64(one) for one in (1.5, -2.0, 3)))
+
+    exact = np.array([1 - Fraction(one) ** 2 for one in values], float)
+    wanted = exact, 1 - np.round(4.0 * values) ** 2, 1.5 + values * (3.0 * values - 2.0)
+    for own, want in zip(single(function, values, long=(len(values),)), wanted, strict=True):
+        np.testing.assert_allclose(own, want, rtol=1e-15)
 
 
 def test_what_is_not_known_is_said():

@@ -16,11 +16,11 @@ from collections.abc import Callable
 from lanewise.elementary.angles import acos, asin, atan, atan2, cos, sin, tan
 from lanewise.elementary.bits import Array
 from lanewise.elementary.exp import cosh, exp, exp2, expm1, logistic, sinh, tanh
-from lanewise.elementary.log import acosh, asinh, atanh, log, log1p
+from lanewise.elementary.log import acosh, asinh, atanh, log, log1p, log2
 from lanewise.elementary.power import cbrt, pow, rsqrt
 
 _FUNCTIONS = (
-    *(exp, exp2, expm1, log, log1p, logistic, pow, cbrt, rsqrt),
+    *(exp, exp2, expm1, log, log1p, log2, logistic, pow, cbrt, rsqrt),
     *(sin, cos, tan, asin, acos, atan, atan2),
     *(sinh, cosh, tanh, asinh, acosh, atanh),
 )

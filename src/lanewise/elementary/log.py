@@ -57,6 +57,12 @@ def log(x: Array) -> Array:
     return _checked(_log_of_parts(parts - 1.0, exponent), x)
 
 
+def log2(x: Array) -> Array:
+    """Return the logarithm to base 2; that of a power of 2 is exact."""
+    parts, negative, _ = split(x, 1.0)
+    return _checked(_log_of_parts(parts - 1.0, 0.0 * negative) / sum(LN2) - negative, x)
+
+
 def log1p(x: Array) -> Array:
     """Return the logarithm of 1 + x, with all digits near zero."""
     result, total = _log_above(0.5, -0.5 * x)

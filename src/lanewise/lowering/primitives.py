@@ -111,6 +111,22 @@ def _square(arrays: ArrayLowering, operands: Operands, _p: Any, _e: Any) -> Refe
     return arrays.elementwise("mul", operands[0], operands[0])
 
 
+def _one_minus_square(arrays: ArrayLowering, operands: Operands, _p: Any, equation: Any) -> Any:
+    """Return (1 + x)(1 - x), which keeps its digits where x is near 1 (JAX 0.12 or later)."""
+    each, (x,) = arrays.elementwise, operands
+    one = arrays.constant(np.asarray(1, float if _kind(equation) == "f" else int))
+    return each("mul", each("add", one, x), each("sub", one, x))
+
+
+def _polynomial(arrays: ArrayLowering, operands: Operands, _p: Any, _e: Any) -> References:
+    """Evaluate by Horner's rule; coefficients from the lowest degree (JAX 0.12 or later)."""
+    x, *coefficients = operands
+    result = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        result = arrays.elementwise("add", arrays.elementwise("mul", result, x), coefficient)
+    return result
+
+
 def _clamp(arrays: ArrayLowering, operands: Operands, _p: Any, _e: Any) -> References:
     low, x, high = operands
     return arrays.elementwise("min", arrays.elementwise("max", x, low), high)
@@ -241,6 +257,8 @@ PRIMITIVES: dict[str, Callable[..., References]] = {
     "sign": _sign,
     "integer_pow": _integer_pow,
     "square": _square,
+    "one_minus_square": _one_minus_square,
+    "polynomial": _polynomial,
     "clamp": _clamp,
     "round": _round,
     "convert_element_type": _convert,

@@ -17,7 +17,7 @@ from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.solver.continuation import SolverState, at_rest, solve_load_step
-from notchflex.solver.derived.quantities import believable
+from notchflex.solver.derived.reported import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native

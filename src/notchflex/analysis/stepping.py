@@ -25,7 +25,7 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.results.state import State
 from notchflex.robot import Robot
 from notchflex.solver.continuation import solve_load_step
-from notchflex.solver.derived.quantities import believable
+from notchflex.solver.derived.reported import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import native

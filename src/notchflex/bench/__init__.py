@@ -1,5 +1,5 @@
 """Speed of the solver, in multiples of a reference time that every machine can measure."""
 
-from notchflex.bench.measure import MEASURED, PEERS, Row, bench_document, measured
+from notchflex.bench.measure import MEASURED, PEERS, BenchRow, bench_document, measured
 
-__all__ = ["MEASURED", "PEERS", "Row", "bench_document", "measured"]
+__all__ = ["MEASURED", "PEERS", "BenchRow", "bench_document", "measured"]

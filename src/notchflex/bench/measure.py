@@ -43,7 +43,7 @@ PEERS: tuple[tuple[str, str, tuple[float, float]], ...] = (
 
 
 @dataclass(frozen=True)
-class Row:
+class BenchRow:
     """One line of the table.
 
     Attributes:
@@ -64,7 +64,7 @@ class Row:
 
 def measured(
     only: str | None = None, progress: Callable[[str], None] = lambda name: None
-) -> list[Row]:
+) -> list[BenchRow]:
     """Measure all cases, or those with a text in their names and what these are compared with.
 
     `progress` is called with the name of each case before it is measured.
@@ -77,7 +77,7 @@ def measured(
         names = "; ".join(one.name for one in CASES)
         raise InputError.UNKNOWN_NAME(f"no case has `{only}` in its name; there are: {names}")
     wanted |= {one.of for one in CASES if one.name in wanted}
-    rows: dict[str, Row] = {}
+    rows: dict[str, BenchRow] = {}
     runs: dict[str, Run] = {}
     for one in (one for one in CASES if one.name in wanted):
         progress(one.name)
@@ -89,7 +89,7 @@ def measured(
     return list(rows.values())
 
 
-def bench_document(rows: Sequence[Row]) -> dict[str, Any]:
+def bench_document(rows: Sequence[BenchRow]) -> dict[str, Any]:
     """Return rows, the machine they were measured on, and the figures of others, for `--json`."""
     peers = [{"name": name, "what": what, "ms": ms} for name, what, ms in PEERS]
     return {
@@ -108,20 +108,20 @@ def bench_document(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _process(case: Case) -> Row:
+def _process(case: Case) -> BenchRow:
     try:
         value = case.make()
     except InputError as problem:  # what has been measured so far must not be lost
-        return Row(case.name, note=str(problem))
+        return BenchRow(case.name, note=str(problem))
     note = f"{value:.3g} {case.unit}; target {case.target:.4g} {case.unit}"
     if case.unit != "s":
-        return Row(case.name, note=note)
+        return BenchRow(case.name, note=note)
     unit = _lu135(60) / _MICROSECONDS
     target = (case.target or np.nan) / unit
-    return Row(case.name, value * _MICROSECONDS, value / unit, target, note)
+    return BenchRow(case.name, value * _MICROSECONDS, value / unit, target, note)
 
 
-def _timed(case: Case, rows: dict[str, Row], runs: dict[str, Run]) -> Row:
+def _timed(case: Case, rows: dict[str, BenchRow], runs: dict[str, Run]) -> BenchRow:
     """Time a case in turns with LU135, and with the case that its target is a multiple of."""
     run, other = runs[case.name], runs.get(case.of)
     run()
@@ -138,11 +138,11 @@ def _timed(case: Case, rows: dict[str, Row], runs: dict[str, Run]) -> Row:
             others[number] = _median(other, -(-repeats // rounds))
     us, lu135 = float(np.median(taken)), float(np.median(taken / unit))
     if other is None or case.target is None:
-        return Row(case.name, us, lu135, case.target)
+        return BenchRow(case.name, us, lu135, case.target)
     base = rows[case.of].lu135 or np.nan
     ratio = float(np.median(taken / others))
     note = f"{ratio:.2f} times '{case.of}'; target {case.target:.3g} times"
-    return Row(case.name, us, lu135, case.target * base, note)
+    return BenchRow(case.name, us, lu135, case.target * base, note)
 
 
 def _lu135(repeats: int) -> float:

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from notchflex.loads.command import Command
 from notchflex.solver.continuation import SolverState
-from notchflex.solver.derived.quantities import STATE, Shape
+from notchflex.solver.derived.reported import STATE, Shape
 
 REPORTED = (*Shape._fields, *STATE)
 """Everything that a run reports of each state, by name."""

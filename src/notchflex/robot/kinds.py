@@ -84,7 +84,9 @@ class Notch:
 
     def expanded(self) -> tuple["Notch", ...]:
         """Return the notches that this one stands for: `repeat` of them, each with `repeat` 1."""
-        return (dataclasses.replace(self, repeat=1),) * self.repeat
+        # Checking a part again takes longer than all else here.
+        one = self if self.repeat == 1 else dataclasses.replace(self, repeat=1)
+        return (one,) * self.repeat
 
     @classmethod
     def further_on(cls, table: Mapping[str, Any], count: int) -> dict[str, Any]:

@@ -79,7 +79,7 @@ _MORE_ITERATIONS = 4
 _CREEP, _LESS_CREEP, _LEAST_CREEP, _CREEPING_RESIDUAL = 1e-1, 1e-1, 1e-8, 1e-8
 
 
-class _Search(NamedTuple):
+class _LoadStepSearch(NamedTuple):
     """State of the loop over substeps.
 
     Attributes:
@@ -156,12 +156,12 @@ def solve_load_step(
     may_creep = chain.tendons > 1
     most = settings.max_all_iterations * (_MORE_ITERATIONS if can_snap else 1)
 
-    def proceed(search: _Search) -> Bool[Array, ""]:
+    def proceed(search: _LoadStepSearch) -> Bool[Array, ""]:
         result, part = search.result, search.part
         more = (part >= settings.smallest_load_step) & (search.tries < settings.max_load_steps)
         return ~result.converged & more & (result.iterations < most)
 
-    def substep(search: _Search) -> _Search:
+    def substep(search: _LoadStepSearch) -> _LoadStepSearch:
         reached = search.result.reached
         first = external_first & (reached < _EXTERNAL_COMPLETE)
         stop = jnp.where(first, _EXTERNAL_COMPLETE, 1.0)
@@ -174,7 +174,7 @@ def solve_load_step(
     return jax.lax.while_loop(proceed, substep, _begin(last)).result
 
 
-def _begin(last: SolverState) -> _Search:
+def _begin(last: SolverState) -> _LoadStepSearch:
     """Return the state of the loop before the first substep, which is the whole load step."""
     start = LoadStepResult(
         solved=last,
@@ -188,11 +188,11 @@ def _begin(last: SolverState) -> _Search:
     )
     none, tries = jnp.zeros(()), jnp.zeros((), int)
     no, yes = jnp.array(False), jnp.array(True)
-    return _Search(start, jnp.ones(()), tries, none, none, no, last.point, yes)
+    return _LoadStepSearch(start, jnp.ones(()), tries, none, none, no, last.point, yes)
 
 
 def _result_after(
-    search: _Search, new: NewtonResult, towards: Command, aim: Float[Array, ""]
+    search: _LoadStepSearch, new: NewtonResult, towards: Command, aim: Float[Array, ""]
 ) -> LoadStepResult:
     """Return the result after a substep: its state counts if no viscosity or creep held it."""
     result = search.result
@@ -212,8 +212,12 @@ def _result_after(
 
 
 def _search_after(
-    search: _Search, new: NewtonResult, result: LoadStepResult, can_snap: bool, may_creep: bool
-) -> _Search:
+    search: _LoadStepSearch,
+    new: NewtonResult,
+    result: LoadStepResult,
+    can_snap: bool,
+    may_creep: bool,
+) -> _LoadStepSearch:
     """Return how the next substep is tried: its length, its viscosity, creep of its contacts."""
     part, viscosity, before = search.part, search.viscosity, search.result.solved.point
     still, creeps = viscosity == 0.0, search.creep > 0.0
@@ -240,7 +244,9 @@ def _search_after(
         predicts = jnp.where(waits, predicts, other)
     last_point = result.solved.point
     moving = choose(given_up, last_point, choose(new.converged, new.point, search.moving))
-    return _Search(result, part, search.tries + 1, viscosity, creep, eased, moving, predicts)
+    return _LoadStepSearch(
+        result, part, search.tries + 1, viscosity, creep, eased, moving, predicts
+    )
 
 
 def _next_viscosity(
@@ -261,7 +267,7 @@ def _next_viscosity(
 def _solve_substep(
     chain: Chain,
     command: Command,
-    search: _Search,
+    search: _LoadStepSearch,
     settings: Settings,
     aim: Array,
     can_snap: bool,

@@ -77,7 +77,7 @@ class NewtonResult(NamedTuple):
     converged: Bool[Array, ""]
 
 
-class _Search(NamedTuple):
+class _Iteration(NamedTuple):
     """State of the line search.
 
     Attributes:
@@ -153,10 +153,10 @@ def newton(
     tolerance = _tolerance(chain, start, settings)
     small_enough = jnp.maximum(tolerance, enough)
 
-    def proceed(search: _Search) -> Bool[Array, ""]:
+    def proceed(search: _Iteration) -> Bool[Array, ""]:
         return ~search.terminate & (search.best.iterations <= settings.max_iterations)
 
-    def iterate(search: _Search) -> _Search:
+    def iterate(search: _Iteration) -> _Iteration:
         best = search.best
         y = jax.tree.map(lambda at, by: at + search.fraction * by, best.point, search.step)
         at = evaluate(chain, y.unknowns, memory, y.base_tension, command.applied)
@@ -177,7 +177,7 @@ def newton(
             lambda: _next_step(problem, new, at, best.iterations),
             lambda: (search.step, 0.5 * search.fraction),
         )
-        return _Search(
+        return _Iteration(
             best=choose(accept, new, best),
             allowed=jnp.where(accept, (1.0 - 1e-4) * size, search.allowed),
             step=step,
@@ -196,7 +196,7 @@ def newton(
     )
 
 
-def _begin(problem: NewtonProblem, start: Iterate) -> _Search:
+def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
     """The search before anything is evaluated: its first point is the start."""
     nowhere = NewtonResult(
         point=start,
@@ -208,7 +208,7 @@ def _begin(problem: NewtonProblem, start: Iterate) -> _Search:
         iterations=jnp.array(-1),
         converged=jnp.array(False),
     )
-    return _Search(
+    return _Iteration(
         best=nowhere,
         allowed=jnp.array(jnp.inf),
         step=jax.tree.map(jnp.zeros_like, start),

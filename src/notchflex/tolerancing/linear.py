@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from notchflex.analysis.derivatives.forward_model import ForwardModel
 from notchflex.analysis.derivatives.tangent import Change, PathTangents
-from notchflex.analysis.uncertainty.draws import Source, deviation, moments
+from notchflex.analysis.uncertainty.draws import ToleranceSource, deviation, moments
 from notchflex.robot.tolerance import Tolerance
 from notchflex.solver.newton import DEFAULT
 from notchflex.tolerancing.study import Study
@@ -98,7 +98,9 @@ def linear_effects(study: Study) -> LinearEffects:
 
 
 def _moved(
-    sources: Sequence[Source], slopes: Sequence[Float[np.ndarray, "k names"]], which: _Deviation
+    sources: Sequence[ToleranceSource],
+    slopes: Sequence[Float[np.ndarray, "k names"]],
+    which: _Deviation,
 ) -> Float[np.ndarray, "k d"]:
     """Change of every number where each source deviates: all values of a source move at once."""
     columns = [

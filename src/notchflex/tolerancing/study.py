@@ -14,7 +14,7 @@ from notchflex._quantity import REGISTERED
 from notchflex.analysis.batch import simulate_batch
 from notchflex.analysis.outputs import Batch
 from notchflex.analysis.solve import simulate
-from notchflex.analysis.uncertainty.draws import Source, sources_of, values_at
+from notchflex.analysis.uncertainty.draws import ToleranceSource, sources_of, values_at
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.pieces.codes import ACCEPTED, FAILED, INVALID, REJECTED
@@ -76,7 +76,7 @@ class Study:
         return self.robot.replace(tolerance=None)
 
     @cached_property
-    def sources(self) -> list[Source]:
+    def sources(self) -> list[ToleranceSource]:
         """What deviates, each on its own."""
         return [one for one in sources_of(self.exact, self.tolerances) if np.ptp(_ends(one)) > 0.0]
 
@@ -212,7 +212,7 @@ def study_of(
     return Study(robot, tolerances, paths, criteria, settings, refinement, cores)
 
 
-def _ends(source: Source) -> list[float]:
+def _ends(source: ToleranceSource) -> list[float]:
     """Return values of a source that differ where its tolerance is not zero."""
     first = next(iter(source.nominal))
     return [source.values(level)[first] for level in (0.25, 0.75)]

@@ -102,7 +102,7 @@ STRETCH = 10.0
 
 
 @dataclass(frozen=True)
-class Reach:
+class ControlRanges:
     """Ends of the sliders of a robot; forces have both directions."""
 
     tension: tuple[float, ...]  # of each tendon [N]
@@ -124,19 +124,19 @@ class Reach:
         ends = [self.ends(tendon, one)[1] for tendon, one in enumerate(by)]
         return np.array([*ends, *[2.0 * self.force] * 3, self.mass]) / STRIDES
 
-    def stretched(self, tendon: int, by: str, end: float) -> Reach:
+    def stretched(self, tendon: int, by: str, end: float) -> ControlRanges:
         """Return the same with another end of the slider of a tendon (from 0)."""
         ends = list(self.tension if by == TENSION else self.stroke)
         ends[tendon] = end
         return replace(self, **{by: tuple(ends)})
 
 
-def reach_of(robot: Robot) -> Reach:
+def reach_of(robot: Robot) -> ControlRanges:
     """Return the ranges of the sliders of a robot, found by pulling each of its tendons."""
     ends = [_pulled(robot, tendon) for tendon in range(robot.number_of_tendons)]
     tension, stroke = zip(*ends, strict=True)
     force = round_up(FORCE_PART * max(tension))
-    return Reach(tension, stroke, force, round_up(force / GRAVITY))
+    return ControlRanges(tension, stroke, force, round_up(force / GRAVITY))
 
 
 def round_up(value: float) -> float:

@@ -14,7 +14,7 @@ from notchflex.viewer.controls import STROKE, TENSION, Controls
 
 
 @dataclass
-class History:
+class LoopHistory:
     """Solved steps in order; each is one entry of every list."""
 
     controls: list[Controls] = field(default_factory=list[Controls])
@@ -68,10 +68,10 @@ class Session:
 
     def reset(self) -> None:
         """Return to the robot at rest and clear all history."""
-        self.before: History | None = None  # the loop before the robot was last changed
+        self.before: LoopHistory | None = None  # the loop before the robot was last changed
         self.controls = Controls.at_rest(self.robot, self.pointing)
         self.solved = simulate(self.robot, self.controls.load())
-        self.history = History()
+        self.history = LoopHistory()
         self.history.add(self.controls, self.state)
         self._compiled.add(self._form(self.controls))
 

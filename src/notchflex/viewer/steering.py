@@ -10,7 +10,7 @@ from jaxtyping import Float
 from notchflex.control import Limits, TargetSearch, reach
 from notchflex.control.limits import Drive
 from notchflex.loads import Load
-from notchflex.viewer.controls import POINTING, STROKE, TENSION, Controls, Reach
+from notchflex.viewer.controls import POINTING, STROKE, TENSION, ControlRanges, Controls
 from notchflex.viewer.session import Session
 
 # Finer than a screen shows, and never longer than an update may take.
@@ -31,7 +31,7 @@ class Steered(NamedTuple):
     reached: bool
 
 
-def steer(session: Session, ends: Reach, point: Float[np.ndarray, " 3"]) -> Steered:
+def steer(session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"]) -> Steered:
     """Find settings of the tendons that bring the tip to a point, within their sliders.
 
     Tendons that are pulled by tension are driven, all others held; where there are none, all

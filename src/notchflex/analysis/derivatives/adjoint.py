@@ -24,7 +24,7 @@ from notchflex.analysis.derivatives.tangent import (
 )
 from notchflex.analysis.outputs import report_quantities
 from notchflex.results.path import EquilibriumPath
-from notchflex.solver.derived.quantities import unpad_quantity
+from notchflex.solver.derived.reported import unpad_quantity
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.static_structure import StaticStructure
 

@@ -20,7 +20,7 @@ from notchflex._quantity import REGISTERED
 from notchflex.analysis.outputs import report_quantities
 from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
-from notchflex.solver.derived.quantities import unpad_quantity
+from notchflex.solver.derived.reported import unpad_quantity
 from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes

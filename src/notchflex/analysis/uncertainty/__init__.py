@@ -1,1 +1,1 @@
-"""How right a prediction is: tolerances of a robot carried through the solver as bands."""
+"""Accuracy of predictions: tolerances of a robot carried through the solver as bands."""

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr, ndtri
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
@@ -33,7 +32,7 @@ class Draws(NamedTuple):
     redrawn: int
 
 
-class Source(NamedTuple):
+class ToleranceSource(NamedTuple):
     """One number drawn, and the values that follow it.
 
     Attributes:
@@ -74,6 +73,8 @@ def deviation(tolerance: Tolerance, value: float, level: Any) -> Any:
         return level * (plus + minus) - minus
     if sd == 0.0:
         return 0.0 * level
+    from scipy.special import ndtr, ndtri  # takes a fifth of a second, and most commands do without
+
     lower, upper = ndtr(-minus / sd), ndtr(plus / sd)
     return sd * ndtri(lower + level * (upper - lower))
 
@@ -91,6 +92,8 @@ def moments(tolerance: Tolerance, value: float) -> tuple[float, float]:
         return 0.5 * (plus - minus), (plus + minus) / math.sqrt(12.0)
     if sd == 0.0 or (math.isinf(plus) and math.isinf(minus)):
         return 0.0, sd
+    from scipy.special import ndtr
+
     # A normal distribution that is cut off at a and b, in standard deviations.
     a, b = -minus / sd, plus / sd
     part = ndtr(b) - ndtr(a)
@@ -148,13 +151,17 @@ def _levels(
     """
     part = random.permuted(np.tile(np.arange(draws), (count, 1)), axis=1).T
     if draws > count + 1 > 2:
+        from scipy.special import ndtri
+
         normal = ndtri((part + 0.5) / draws)
         root = np.linalg.cholesky(np.corrcoef(normal, rowvar=False))
         part = np.linalg.solve(root, normal.T).T.argsort(axis=0).argsort(axis=0)
     return (part + random.random(part.shape)) / draws
 
 
-def values_at(sources: Sequence[Source], levels: Float[np.ndarray, "... d"]) -> dict[str, Any]:
+def values_at(
+    sources: Sequence[ToleranceSource], levels: Float[np.ndarray, "... d"]
+) -> dict[str, Any]:
     """Return the values of robots by name, at levels of the sources between 0 and 1."""
     drawn: dict[str, Any] = {}
     for source, level in zip(sources, np.moveaxis(levels, -1, 0), strict=True):
@@ -162,25 +169,29 @@ def values_at(sources: Sequence[Source], levels: Float[np.ndarray, "... d"]) -> 
     return drawn
 
 
-def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[Source]:
+def sources_of(robot: Robot, tolerances: Sequence[Tolerance]) -> list[ToleranceSource]:
     """Return what is drawn; the tolerance of a single notch replaces that of all notches there.
 
     Args:
         robot: The robot with the values of the drawing.
         tolerances: What deviates.
     """
-    found: list[Source] = []
+    found: list[ToleranceSource] = []
     alone = {one.value for one in tolerances if "[" in one.value}
     for one in tolerances:
         numbers = numbers_at(robot, one.value)
         others = {name: value for name, value in numbers.items() if name not in alone}
         if one.value not in alone and len(others) < len(numbers):
             names = [[name] for name in others] if one.per_notch else [list(others)]
-            found += [Source(one, {name: others[name] for name in each}) for each in names if each]
+            found += [
+                ToleranceSource(one, {name: others[name] for name in each})
+                for each in names
+                if each
+            ]
         elif one.per_notch:
-            found += [Source(one, {name: value}) for name, value in numbers.items()]
+            found += [ToleranceSource(one, {name: value}) for name, value in numbers.items()]
         elif len(set(numbers.values())) == 1:  # by one name: equal notches stay a group
-            found.append(Source(one, {one.value: number_at(robot, one.value)}))
+            found.append(ToleranceSource(one, {one.value: number_at(robot, one.value)}))
         else:
-            found.append(Source(one, numbers))
+            found.append(ToleranceSource(one, numbers))
     return found

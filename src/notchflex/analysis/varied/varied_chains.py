@@ -17,7 +17,8 @@ from jaxtyping import Float
 
 from notchflex._jax import jax
 from notchflex.analysis.solve import prepare_for
-from notchflex.analysis.varied.sparse_polynomial import SparsePolynomial, Wanted, fit_polynomial
+from notchflex.analysis.varied.fit_polynomial import PolynomialAccuracy, fit_polynomial
+from notchflex.analysis.varied.sparse_polynomial import SparsePolynomial
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.loads.command import Command, make_commands
@@ -194,14 +195,14 @@ def _fitted(
     return found._replace(base=base, nodes=nodes)
 
 
-def _wanted(robots: VariedRobots) -> list[Wanted]:
+def _wanted(robots: VariedRobots) -> list[PolynomialAccuracy]:
     """Nodes cost as much as robots: few for a small batch, unless other batches follow."""
     count = len(robots)
     follows = robots.ranges is not None and count >= _LEAST_ROBOTS
     usual, fine = TOLERANCES
     return [
-        Wanted(usual, _MOST_NODES if follows else min(_MOST_NODES, count // 2)),
-        Wanted(fine, min(_MOST_NODES, count // 2)),
+        PolynomialAccuracy(usual, _MOST_NODES if follows else min(_MOST_NODES, count // 2)),
+        PolynomialAccuracy(fine, min(_MOST_NODES, count // 2)),
     ]
 
 

@@ -1,4 +1,4 @@
-"""What tolerances do to a prediction, in some lines of text."""
+"""Write the effect of tolerances on a prediction as a few lines of text."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def closing_lines(robot: Robot, found: ClosingBands) -> list[str]:
     words = [_closing(found, one) for one in dict.fromkeys((first, last))]
     pulled = f" of tendon {found.tendon}" if robot.number_of_tendons > 1 else ""
     text = (
-        f"How right is it? Of {found.bands.draws} draws within the tolerances 5 to 95 % lie so: "
+        f"Accuracy: of {found.bands.draws} draws within the tolerances, 5 to 95 % give: "
         f"{'; '.join(words)}; total angle at {found.load:.3g} N{pulled}: "
         f"{_range(found.total_angle, '.1f', DEGREES)} deg."
     )

@@ -35,7 +35,7 @@ from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
 from notchflex.solver.block_elimination import Iterate, linear_step
 from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
-from notchflex.solver.derived.quantities import believable
+from notchflex.solver.derived.reported import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.element import Memory
 from notchflex.solver.friction_predictor import limit_slack

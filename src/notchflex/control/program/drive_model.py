@@ -27,7 +27,7 @@ from notchflex.mechanics.motion import rotation_about
 from notchflex.results.state import SavedState, State, fitted
 from notchflex.robot import Robot
 from notchflex.solver.continuation import SolverState
-from notchflex.solver.derived.quantities import unpad_quantity
+from notchflex.solver.derived.reported import unpad_quantity
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.prepare import PreparedChain

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 from notchflex.analysis.closing_loads.varied import closing_tensions_of
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
-from notchflex.analysis.varied.sparse_polynomial import Wanted, fit_polynomial
+from notchflex.analysis.varied.fit_polynomial import PolynomialAccuracy, fit_polynomial
 from notchflex.designing.model.point import CLOSINGS, Point, Solver
 from notchflex.designing.model.quantities import CLOSING
 from notchflex.designing.model.wishes import Wish
@@ -136,7 +136,7 @@ def _of_robots(
         [list(range(len(low)))],
         lambda _: spread,
         [np.arange(len(spread))],
-        wanted=[Wanted(_ERROR, len(table) // 3)],
+        wanted=[PolynomialAccuracy(_ERROR, len(table) // 3)],
         checks=checks,
     )
     if made is None:

@@ -14,7 +14,7 @@ from notchflex.errors import InputError
 from notchflex.fit.assessment.specimens import Specimen, prior_of, updated
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.fit import check_search, fitted
-from notchflex.fit.estimation.problem import Problem, Progress
+from notchflex.fit.estimation.problem import FitProblem, Progress
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
 from notchflex.fit.model.constants import Unknown
 from notchflex.fit.model.residuals import Residuals
@@ -151,7 +151,7 @@ def leave_out(
         constants = tuple(one for _, one in every if one is not None)
         samples = Samples.of(kept, rest, constants, found.settings)
         again = fitted(
-            kept, Problem(samples, found.problem.objective), starts, seed, intervals=False
+            kept, FitProblem(samples, found.problem.objective), starts, seed, intervals=False
         )
         own = [
             replace(one, prior=prior_of(one, again)) for one, remains in every if remains is None

@@ -11,9 +11,9 @@ from notchflex.errors import InputError
 from notchflex.fit.estimation.calibration import Calibration
 from notchflex.fit.estimation.fit import by_label, fitted
 from notchflex.fit.estimation.objective import LeastSquares
-from notchflex.fit.estimation.problem import Problem
+from notchflex.fit.estimation.problem import FitProblem
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
-from notchflex.fit.model.constants import Constant, Number, Unknown, unknowns
+from notchflex.fit.model.constants import Constant, RobotNumber, Unknown, unknowns
 from notchflex.fit.model.residuals import ANGLES
 from notchflex.fit.model.samples import Samples
 from notchflex.robot import Robot
@@ -112,7 +112,7 @@ def updated(
     shared = [(one.of(label, robot), value) for one, value in _values(found) if one.shared]
     # A shared constant sets numbers that those of the specimen leave as they are.
     held = [
-        Number(one.label, one.path, one.base + one.slope * value, 0.0)
+        RobotNumber(one.label, one.path, one.base + one.slope * value, 0.0)
         for unknown, value in shared
         for one in unknown.sets
     ]
@@ -125,7 +125,7 @@ def updated(
     constants = (replace(own[0], sets=(*own[0].sets, *held)), *own[1:])
     rows = replace(measured, deviation=_missed(found, measured))
     samples = Samples.of({label: robot}, {label: [rows]}, constants, found.settings)
-    again = fitted({label: robot}, Problem(samples, LeastSquares()), 1, 0, intervals=False)
+    again = fitted({label: robot}, FitProblem(samples, LeastSquares()), 1, 0, intervals=False)
     before = {one.name: one.prior for one in own if one.prior is not None}
     prior = np.diag([size**2 for _, size in before.values()])
     total = np.isin(again.residuals.quantity, _ANGLES)

@@ -15,7 +15,7 @@ from notchflex.fit.estimation.covariance import ByPulls, by_pulls, inverse_of
 from notchflex.fit.estimation.intervals import LEVEL, Interval, Profile, allowed_rise
 from notchflex.fit.estimation.minimise import Cost, Minimum
 from notchflex.fit.estimation.noise import Noise
-from notchflex.fit.estimation.problem import Problem
+from notchflex.fit.estimation.problem import FitProblem
 from notchflex.fit.model.residuals import Residuals
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
@@ -39,7 +39,7 @@ class Calibration:
     """
 
     given: Mapping[str, Robot]
-    problem: Problem
+    problem: FitProblem
     best: Minimum
     reached: Cost
     searches: tuple[Minimum, ...]

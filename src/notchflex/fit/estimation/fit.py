@@ -14,7 +14,7 @@ from notchflex.fit.estimation.intervals import Interval
 from notchflex.fit.estimation.minimise import Cost, Minimum
 from notchflex.fit.estimation.noise import noise_left
 from notchflex.fit.estimation.objective import FitObjective, LeastSquares
-from notchflex.fit.estimation.problem import Problem, Progress, search
+from notchflex.fit.estimation.problem import FitProblem, Progress, search
 from notchflex.fit.estimation.searches_in_pieces import search_in_pieces
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.model.constants import Constant, unknowns
@@ -85,7 +85,7 @@ def calibrate(
     named = by_label(robots)
     data = _of_robots(named, measurements)
     samples = Samples.of(named, data, unknowns(named, fit), settings)
-    problem = Problem(samples, objective or LeastSquares())
+    problem = FitProblem(samples, objective or LeastSquares())
     searches = None
     if folder is not None:
         searches = search_in_pieces(problem, starts, seed, PieceFolder.of(folder), progress)
@@ -149,7 +149,7 @@ def _of_robots(
 
 def fitted(
     robots: Mapping[str, Robot],
-    problem: Problem,
+    problem: FitProblem,
     starts: int,
     seed: int,
     intervals: bool,
@@ -189,7 +189,7 @@ def _no_start(samples: Samples) -> InputError:
     )
 
 
-def _with_noise(problem: Problem, best: Minimum) -> tuple[Minimum, Cost]:
+def _with_noise(problem: FitProblem, best: Minimum) -> tuple[Minimum, Cost]:
     """Estimate unknown noise from the residuals, and fit again, until both agree."""
     cost, noise = best.cost, problem.noise
     assert cost is not None

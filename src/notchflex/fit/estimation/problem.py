@@ -26,7 +26,7 @@ _HOPS, _HOP, _SETTLED = 3, 3e-3, 1e-6
 _DRAWS = 8
 
 
-class Problem:
+class FitProblem:
     """An objective as a function of constants.
 
     Attributes:
@@ -83,7 +83,7 @@ class Problem:
 
 
 def search(
-    problem: Problem, starts: int, seed: int, progress: Progress | None
+    problem: FitProblem, starts: int, seed: int, progress: Progress | None
 ) -> tuple[Minimum, ...]:
     """Search from several starts; another one replaces a start without a solution."""
     minima: list[Minimum] = []
@@ -99,7 +99,7 @@ def search(
     return tuple(minima)
 
 
-def search_from(problem: Problem, point: Vector, number: int, starts: int, seed: int) -> Minimum:
+def search_from(problem: FitProblem, point: Vector, number: int, starts: int, seed: int) -> Minimum:
     """Search from one starting point; what it finds does not depend on the other searches.
 
     Args:
@@ -112,7 +112,7 @@ def search_from(problem: Problem, point: Vector, number: int, starts: int, seed:
     return _lowest_nearby(problem, point, _HOPS if starts > 1 else 0, seed + number)
 
 
-def starting_points(problem: Problem, starts: int, seed: int) -> Float[np.ndarray, "s k"]:
+def starting_points(problem: FitProblem, starts: int, seed: int) -> Float[np.ndarray, "s k"]:
     """Return the robots as they are and, for several starts, candidates of Sobol's sequence.
 
     Args:
@@ -130,7 +130,7 @@ def starting_points(problem: Problem, starts: int, seed: int) -> Float[np.ndarra
     return np.concatenate([here, first + drawn * (last - first)])
 
 
-def _lowest_nearby(problem: Problem, start: Vector, hops: int, seed: int) -> Minimum:
+def _lowest_nearby(problem: FitProblem, start: Vector, hops: int, seed: int) -> Minimum:
     """Search from a start, and again from points near the minimum.
 
     The objective has kinks where notches close and branches of the material begin, and so shallow

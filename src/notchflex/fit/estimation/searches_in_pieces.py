@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from notchflex.fit.estimation.minimise import Minimum
-from notchflex.fit.estimation.problem import Problem, Progress, search_from, starting_points
+from notchflex.fit.estimation.problem import FitProblem, Progress, search_from, starting_points
 from notchflex.fit.model.samples import Samples
 from notchflex.pieces.folder import finished_head
 from notchflex.pieces.manifest import Manifest
@@ -29,7 +29,7 @@ class SearchTask:
         seed: Seed of the starting points.
     """
 
-    def __init__(self, problem: Problem, starts: int, seed: int) -> None:
+    def __init__(self, problem: FitProblem, starts: int, seed: int) -> None:
         self.problem, self.starts, self.seed = problem, starts, seed
         self.points = starting_points(problem, starts, seed)
         samples = problem.samples
@@ -95,11 +95,11 @@ def search_task(content: bytes) -> SearchTask:
     """Make the task of another process again, from objects that it pickled."""
     (robots, data, constants, settings), objective, starts, seed = pickle.loads(content)
     samples = Samples.of(robots, data, constants, settings)
-    return SearchTask(Problem(samples, objective), starts, seed)
+    return SearchTask(FitProblem(samples, objective), starts, seed)
 
 
 def search_in_pieces(
-    problem: Problem, starts: int, seed: int, folder: PieceFolder, progress: Progress | None
+    problem: FitProblem, starts: int, seed: int, folder: PieceFolder, progress: Progress | None
 ) -> tuple[Minimum, ...]:
     """Search from several starts; another one replaces a start without a solution.
 

@@ -79,7 +79,7 @@ class Constant:
                 )
 
 
-class Number(NamedTuple):
+class RobotNumber(NamedTuple):
     """A number of the robot of a label that a constant sets: `base` + `slope` * its value."""
 
     label: str
@@ -108,7 +108,7 @@ class Unknown:
 
     name: str
     unit: str
-    sets: tuple[Number, ...]
+    sets: tuple[RobotNumber, ...]
     lower: float
     upper: float
     start: float
@@ -216,20 +216,20 @@ def _parsed(path: str) -> tuple[str, str, str]:
     return (key or rule, number, f"{number.rpartition('.')[0]}.{key}" if key else number)
 
 
-def _numbers(label: str, robot: Robot, path: str) -> tuple[Number, ...]:
+def _numbers(label: str, robot: Robot, path: str) -> tuple[RobotNumber, ...]:
     """The numbers of a robot that a constant sets."""
     rule, number, read = _parsed(path)
     if path in _SENSOR or not rule:
-        return (Number(label, number),)
+        return (RobotNumber(label, number),)
     key, end = number.rpartition(".")[2], len(read.rpartition(".")[2])
     values = [(one[:-end] + key, value) for one, value in _apart(robot, read).items()]
     if rule == _OFFSET:
-        return tuple(Number(label, one, value, 1.0) for one, value in values)
+        return tuple(RobotNumber(label, one, value, 1.0) for one, value in values)
     if not any(value for _, value in values):
         raise InputError.MISSING_VALUE(
             f"`{path}` multiplies `{read}`, which is 0 in {robot.name}; give it a value first"
         )
-    return tuple(Number(label, one, 0.0, value) for one, value in values)
+    return tuple(RobotNumber(label, one, 0.0, value) for one, value in values)
 
 
 def _apart(robot: Robot, path: str) -> dict[str, float]:

@@ -15,7 +15,7 @@ from notchflex.analysis.axis_points import AxisPlaces, axis_places, points_on_ax
 from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.fit.measurements.measurements import Measurements, rows_of
-from notchflex.fit.model.constants import Number
+from notchflex.fit.model.constants import RobotNumber
 from notchflex.loads.load_path import LoadPath
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
@@ -65,7 +65,7 @@ class Sample:
     label: str
     robot: Robot
     measured: Measurements
-    numbers: tuple[Number, ...]
+    numbers: tuple[RobotNumber, ...]
     setters: tuple[int, ...]
     pulls: Int[np.ndarray, " p"]
     settings: Settings

@@ -53,6 +53,9 @@ class FrictionLaw(Pytree, ABC):
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]] | None:
         """State the tension that sliding costs beside the ratio of `bounds`, N.
 
+        A loss proportional to the turning vanishes with the tension. Such a law leaves the
+        tensions undetermined where tendons are let go to 0 N: let them go to a small tension.
+
         Args:
             exit_turning: As for `bounds`.
             entry_turning: As for `bounds`.
@@ -142,5 +145,5 @@ def friction_law(friction: Any) -> FrictionLaw:
     """
     raise TypeError(
         f"no friction law is registered for a description of type {type(friction).__name__}; "
-        "add one to notchflex/friction with @friction_law.register"
+        "add one to notchflex/mechanics/friction with @friction_law.register"
     )

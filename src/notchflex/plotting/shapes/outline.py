@@ -21,7 +21,7 @@ _CLAMP = 1.7  # half the width of the clamp, in outer radii
 
 
 @dataclass(frozen=True)
-class Outline:
+class ShapeOutline:
     """Polygons and lines in the plane of a view [mm], each (k, 2)."""
 
     bodies: list[NDArray[np.float64]]  # base first
@@ -50,7 +50,7 @@ def bending_plane(robot: Robot, offset: float = 1e-9) -> float | None:
     return first if np.all(np.abs(np.sin(directions - first)) < offset) else None
 
 
-def outline(shape: RobotShape, view: float) -> Outline:
+def outline(shape: RobotShape, view: float) -> ShapeOutline:
     """Return the outline of a robot, with a direction [rad] of the base drawn to the right."""
     across = _across(view)
     outer, inner = shape.robot.tube.outer_radius, shape.robot.tube.inner_radius
@@ -74,7 +74,7 @@ def outline(shape: RobotShape, view: float) -> Outline:
         )
         for one in shape.flexures
     ]
-    return Outline(
+    return ShapeOutline(
         bodies=bodies,
         bores=bores,
         flexures=flexures,

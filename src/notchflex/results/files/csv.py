@@ -72,7 +72,7 @@ def write_csv(target: str | FilePath, header: Sequence[str], rows: Iterable[Iter
 
 
 @dataclass(frozen=True)
-class Entry:
+class CsvEntry:
     """One entry of a quantity along a path, such as the angle of one notch.
 
     Attributes:
@@ -91,7 +91,7 @@ def is_listed(quantity: Quantity) -> bool:
     return quantity.per in ((), ("notch",), ("axis",), ("tendon",), ("tendon", "span"))
 
 
-def entries_of(path: EquilibriumPath, quantity: Quantity) -> Iterator[Entry]:
+def entries_of(path: EquilibriumPath, quantity: Quantity) -> Iterator[CsvEntry]:
     """Yield every entry of a quantity, in the order of the CSV columns."""
     values: Any = getattr(path, quantity.name)
     if quantity.scale != 1.0:
@@ -100,25 +100,25 @@ def entries_of(path: EquilibriumPath, quantity: Quantity) -> Iterator[Entry]:
     tendons = [(i, i + 1 if several else "") for i in range(path.tension.shape[1])]
     match quantity.per:
         case ():
-            yield Entry(quantity.header(), "", values)
+            yield CsvEntry(quantity.header(), "", values)
         case ("notch",):
             for notch in range(values.shape[1]):
                 header = quantity.header(notch=notch + 1)
-                yield Entry(header, f"notch {notch + 1}", values[:, notch])
+                yield CsvEntry(header, f"notch {notch + 1}", values[:, notch])
         case ("axis",):
             for index, axis in enumerate(AXES):
-                yield Entry(quantity.header(axis=axis), axis, values[:, index])
+                yield CsvEntry(quantity.header(axis=axis), axis, values[:, index])
         case ("tendon",):
             for index, number in tendons:
                 name = f"tendon {number}" if several else ""
-                yield Entry(quantity.header(tendon=number), name, values[:, index])
+                yield CsvEntry(quantity.header(tendon=number), name, values[:, index])
         case ("tendon", "span"):
             for index, number in tendons:
                 for span, name in enumerate(span_names(spans_of(path, index))):
                     header = quantity.header(tendon=number, span=name)
                     words = f"tendon {number}, " if several else ""
                     words += name.replace("_", " ")
-                    yield Entry(header, words, values[:, index, span])
+                    yield CsvEntry(header, words, values[:, index, span])
         case other:
             raise NotImplementedError(f"no CSV columns for a quantity per {other}")
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._quantity import Quantity
-from notchflex.solver.derived.quantities import believable
+from notchflex.solver.derived.reported import believable
 
 if TYPE_CHECKING:  # for the type only: a path evaluates these
     from notchflex.results.path import EquilibriumPath

@@ -178,6 +178,8 @@ class ULink(Notch):
 
     def expanded(self) -> tuple[Notch, ...]:
         """Return the links of the row, the slots before them from the two sides in turn."""
+        if self.repeat == 1:
+            return (self,)
         changes = {"repeat": 1, "proximal_slot": OTHER[self.proximal_slot]}
         pair = dataclasses.replace(self, repeat=1), dataclasses.replace(self, **changes)
         return (pair * self.repeat)[: self.repeat]

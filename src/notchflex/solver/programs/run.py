@@ -19,7 +19,7 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
 from notchflex.solver.derived.limit_points import snapped_notches
-from notchflex.solver.derived.quantities import Shape, quantities, shape, unpad_quantity
+from notchflex.solver.derived.reported import Shape, quantities, shape, unpad_quantity
 from notchflex.solver.derived.solved_state import notch_lips
 from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings

@@ -12,7 +12,7 @@ from notchflex.errors import InputError
 from notchflex.loads import Load
 from notchflex.plotting.style import BLUE, ORANGE
 from notchflex.robot import Robot
-from notchflex.viewer.controls import POINTING, Controls, Reach
+from notchflex.viewer.controls import POINTING, ControlRanges, Controls
 from notchflex.viewer.overlays.background import Background
 from notchflex.viewer.scene.marks import rgb
 from notchflex.workspaces import Workspace, workspace
@@ -48,7 +48,7 @@ class ReachableCloud:
         self._wanted: Any = None
         self._node: Any = None
 
-    def update(self, robot: Robot, controls: Controls, ends: Reach, shown: bool) -> None:
+    def update(self, robot: Robot, controls: Controls, ends: ControlRanges, shown: bool) -> None:
         """Show or hide the points; compute them where they are not known."""
         wanted = (robot, controls.tip_force, controls.tip_mass, controls.pointing, ends.tension)
         if not shown:
@@ -90,7 +90,7 @@ class ReachableCloud:
         )
 
 
-def explored(robot: Robot, controls: Controls, ends: Reach) -> Workspace:
+def explored(robot: Robot, controls: Controls, ends: ControlRanges) -> Workspace:
     """Return the states that a robot reaches with the tensions of its sliders.
 
     Raises:

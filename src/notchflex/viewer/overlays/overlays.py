@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from notchflex.viewer.controls import Reach
+from notchflex.viewer.controls import ControlRanges
 from notchflex.viewer.overlays.cloud import ReachableCloud
 from notchflex.viewer.overlays.handle import TipHandle
 from notchflex.viewer.overlays.sensed import SensedArrow
@@ -45,7 +45,7 @@ class Overlays:
         self.cloud = ReachableCloud(server, length, ask)
         self.sensed = SensedArrow(server, outer, _ARROW * length, ask)
 
-    def update(self, session: Session, ends: Reach, shown: Shown, still: bool) -> None:
+    def update(self, session: Session, ends: ControlRanges, shown: Shown, still: bool) -> None:
         """Move what is shown to the present state.
 
         Args:

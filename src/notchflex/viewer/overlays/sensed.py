@@ -15,7 +15,7 @@ from notchflex.sensing import SensedForce, SensorNoise, sense
 from notchflex.viewer.controls import POINTING
 from notchflex.viewer.overlays.background import Background
 from notchflex.viewer.scene.marks import linear, rgb
-from notchflex.viewer.session import History, Session
+from notchflex.viewer.session import LoopHistory, Session
 
 if TYPE_CHECKING:
     import viser
@@ -142,7 +142,7 @@ def turning_points(rows: Float[np.ndarray, "s k"]) -> Int[np.ndarray, " r"]:
     return np.append(turns, len(rows) - 1)
 
 
-def read(history: History) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarray, "r t"]]:
+def read(history: LoopHistory) -> tuple[Float[np.ndarray, "r t"], Float[np.ndarray, "r t"]]:
     """Return tensions (N) and strokes (mm) of a history, where its loads turn round."""
     tension, stroke = np.array(history.tension), np.array(history.stroke)
     if len(tension) < 2:

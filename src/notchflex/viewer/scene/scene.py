@@ -15,7 +15,7 @@ from notchflex.plotting.shapes.interpolation import rotation_of
 from notchflex.plotting.shapes.robot_shape import HELD, RobotShape, shape_at
 from notchflex.results import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.viewer.controls import GRAVITY, POINTING, Controls, Reach, round_up
+from notchflex.viewer.controls import GRAVITY, POINTING, ControlRanges, Controls, round_up
 from notchflex.viewer.scene.camera import CameraPose, first_eye, framed, quaternions
 from notchflex.viewer.scene.marks import LOAD, METAL, Marks, Shown, linear, strain_colour
 from notchflex.viewer.scene.solids import PIECES, FlexureSurface, at_rest, body_solids, skins
@@ -37,7 +37,9 @@ ROOT = "/robot"
 class Scene:
     """A robot under `/robot` in the scene of a viser server; `reach` gives the length of arrows."""
 
-    def __init__(self, server: viser.ViserServer, robot: Robot, reach: Reach, shown: Shown) -> None:
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, reach: ControlRanges, shown: Shown
+    ) -> None:
         self.server, self.robot, self.reach, self.shown = server, robot, reach, shown
         self.rest = at_rest(robot)
         self.length = float(np.linalg.norm(np.diff(self.rest.position, axis=0), axis=1).sum())

@@ -10,7 +10,7 @@ from notchflex.cli import terminal
 from notchflex.cli.outputs import JsonFile, Outputs, Quiet
 
 if TYPE_CHECKING:
-    from notchflex.bench import Row
+    from notchflex.bench import BenchRow
 
 
 def bench(
@@ -38,7 +38,7 @@ def bench(
         _print(rows)
 
 
-def _print(rows: list[Row]) -> None:
+def _print(rows: list[BenchRow]) -> None:
     from notchflex.bench import MEASURED, PEERS
 
     console = terminal.output()

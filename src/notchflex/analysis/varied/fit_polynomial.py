@@ -1,0 +1,212 @@
+"""Fit a sparse polynomial to exact values of a vector, with a measured error.
+
+Along each variable Leja points are added until they change nothing; which products of powers are
+needed follows from how fast these changes fall (Gerstner and Griebel 2003, with the changes along
+one variable in place of a search). Terms whose variables never act together are left out. The
+error is measured at points that are not among the nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from notchflex.analysis.varied.sparse_polynomial import (
+    DEGREE,
+    CoefficientBlock,
+    SparsePolynomial,
+    Terms,
+    leja_points,
+)
+
+_CUT = 1e-3  # smaller coefficients are left out, in parts of the error that is allowed
+_AIM = 0.3  # smaller terms are left out at first, likewise
+_ROUNDS = 6  # of parts that are not yet right
+VectorOf = Callable[[Float[np.ndarray, " d"]], Float[np.ndarray, " m"]]
+
+
+class PolynomialAccuracy(NamedTuple):
+    """How exact a polynomial should be, and what that may cost.
+
+    Attributes:
+        tolerance: Largest error in parts of the scale.
+        most: How many exact vectors may be evaluated for it, in all.
+    """
+
+    tolerance: float
+    most: int
+
+
+def fit_polynomial(
+    vector_of: VectorOf,
+    low: Float[np.ndarray, " d"],
+    high: Float[np.ndarray, " d"],
+    cliques: Iterable[Sequence[int]],
+    scale_of: VectorOf,
+    parts: Sequence[Int[np.ndarray, ...]],
+    *,
+    wanted: Sequence[PolynomialAccuracy],
+    checks: Float[np.ndarray, "k d"],
+) -> SparsePolynomial | None:
+    """Find a polynomial that is right to a tolerance.
+
+    Args:
+        vector_of: The exact vector at numbers.
+        low: Lower ends of the ranges.
+        high: Upper ends, above the lower ones.
+        cliques: Places of variables that act together.
+        scale_of: From the largest size of every entry to what errors are measured in.
+        parts: Places of entries that answer the numbers alike; of each it is found by itself which
+            products of powers it needs.
+        wanted: Errors that are allowed, the largest first, which must be met. A smaller one is met
+            as far as it may cost.
+        checks: Numbers at which the error is measured.
+
+    Returns:
+        The polynomial; None where not even the first is met by so many evaluations.
+    """
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    known: dict[tuple[int, ...], np.ndarray] = {}
+
+    def at(index: tuple[int, ...]) -> np.ndarray:
+        if index not in known:
+            known[index] = vector_of(middle + half * leja_points()[list(index)])
+        return known[index]
+
+    count = len(middle)
+    scale = scale_of(np.abs(at((0,) * count)))
+
+    cliques = list(cliques)
+
+    def indices_for(aims: Float[np.ndarray, " parts"], most: int) -> list[tuple[int, ...]] | None:
+        """Find the products of powers that matter; None if they are too many."""
+        changes: list[np.ndarray] = []
+        for variable in range(count):
+            found = _changes(at, variable, count, scale, parts, aims)
+            if found is None or len(known) > most:
+                return None
+            changes.append(found)
+        return _indices(changes, cliques, aims, most)
+
+    exact = np.stack([vector_of(one) for one in checks])
+    good: SparsePolynomial | None = None
+    for tolerance, most in wanted:
+        aims = np.full(len(parts), _AIM * tolerance)
+        for _ in range(_ROUNDS):
+            indices = indices_for(aims, most)
+            if indices is None:
+                return good
+            terms = Terms.of(indices)
+            for index in sorted(indices):  # the last variables first: what is left stays the same
+                at(index)
+            values = np.stack([at(tuple(index)) for index in terms.powers.tolist()])
+            nodes = np.stack(list(known.values()))
+            made = _solved(middle, half, terms, values, nodes, _CUT * tolerance * scale)
+            error = _errors(made, exact, checks, scale)
+            of_parts = np.array([np.max(error[part], initial=0.0) for part in parts])
+            if of_parts.max() <= wanted[0].tolerance:
+                good = made
+            wrong = of_parts > tolerance
+            if not wrong.any():
+                break
+            aims = np.where(wrong, 0.1 * aims, aims)
+    return good
+
+
+def _changes(
+    at: Callable[[tuple[int, ...]], np.ndarray],
+    variable: int,
+    count: int,
+    scale: np.ndarray,
+    parts: Sequence[np.ndarray],
+    aims: Float[np.ndarray, " parts"],
+) -> Float[np.ndarray, "parts degrees"] | None:
+    """How much each further point along a variable changes each part, in parts of the scale."""
+    points = leja_points()
+    values: list[np.ndarray] = []
+    sizes: list[np.ndarray] = []
+    for degree in range(DEGREE + 1):
+        index = [0] * count
+        index[variable] = degree
+        value = at(tuple(index))
+        if degree:
+            basis = Terms.of([(power,) for power in range(degree)]).at(points[: degree + 1, None])
+            before = basis[:, degree] @ np.linalg.solve(basis[:, :degree].T, np.stack(values))
+            change = np.abs(value - before) / scale
+            sizes.append(np.array([np.max(change[part], initial=0.0) for part in parts]))
+        values.append(value)
+        if degree > 1 and (np.maximum(sizes[-1], sizes[-2]) < 0.1 * aims).all():
+            kept = np.stack([np.ones(len(parts)), *sizes[:-2]], axis=-1)
+            # None smaller than a later one, so that no term comes without those that divide it.
+            return np.minimum(np.maximum.accumulate(kept[:, ::-1], axis=1)[:, ::-1], 1.0)
+    return None
+
+
+def _indices(
+    changes: Sequence[Float[np.ndarray, "parts degrees"]],
+    cliques: Iterable[Sequence[int]],
+    aims: Float[np.ndarray, " parts"],
+    most: int,
+) -> list[tuple[int, ...]] | None:
+    """Products of powers that matter, none without those that divide it; None if too many."""
+    found: dict[tuple[int, ...], None] = {(0,) * len(changes): None}
+    for clique in cliques:
+        for part in range(len(changes[0])):
+            partial = [(next(iter(found)), 1.0)]
+            for variable in clique:
+                further = changes[variable][part, 1:]
+                partial += [
+                    ((*powers[:variable], degree, *powers[variable + 1 :]), size * float(own))
+                    for powers, size in partial
+                    for degree, own in enumerate(further, start=1)
+                    if size * own >= aims[part]
+                ]
+                if len(partial) > most:
+                    return None
+            found |= dict.fromkeys(powers for powers, _ in partial)
+    return list(found) if len(found) <= most else None
+
+
+def _solved(
+    middle: np.ndarray,
+    half: np.ndarray,
+    terms: Terms,
+    values: Float[np.ndarray, "terms m"],
+    nodes: Float[np.ndarray, "points m"],
+    least: Float[np.ndarray, " m"],
+) -> SparsePolynomial:
+    base = values[0]
+    entries = np.flatnonzero((nodes != base).any(axis=0))
+    columns, first, which = np.unique(
+        values[:, entries], axis=1, return_index=True, return_inverse=True
+    )
+    basis = terms.at(leja_points()[terms.powers])
+    coefficients = np.linalg.solve(basis.T, columns).T
+    coefficients[np.abs(coefficients) < least[entries[first], None]] = 0.0
+    # Which numbers each of the unlike entries depends on.
+    of_variables = (coefficients != 0.0) @ (terms.powers > 0) > 0
+    _, block_of = np.unique(of_variables, axis=0, return_inverse=True)
+    block_of = block_of.ravel()
+    order = np.argsort(block_of, kind="stable")
+    place = np.argsort(order)
+    blocks: list[CoefficientBlock] = []
+    for block in range(block_of.max(initial=-1) + 1):
+        own = coefficients[block_of == block]
+        used = np.flatnonzero((own != 0.0).any(axis=0))
+        blocks.append(CoefficientBlock(used, np.ascontiguousarray(own[:, used])))
+    return SparsePolynomial(middle, half, terms, blocks, entries, place[which.ravel()], base, nodes)
+
+
+def _errors(
+    made: SparsePolynomial,
+    exact: Float[np.ndarray, "k m"],
+    checks: Float[np.ndarray, "k d"],
+    scale: np.ndarray,
+) -> Float[np.ndarray, " m"]:
+    """Largest error of each entry at points that are no nodes, in parts of the scale."""
+    found = np.tile(made.base, (len(checks), 1))
+    found[:, made.entries] = made.varied(checks).T
+    return np.max(np.abs(found - exact) / scale, axis=0)
