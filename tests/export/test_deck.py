@@ -15,7 +15,7 @@ import pytest
 import notchflex as nf
 from fem_wrists import solid, wrist
 from notchflex.export.finite_elements.deck import ring_layers
-from notchflex.export.finite_elements.half_tube import half_tube
+from notchflex.export.finite_elements.meshes import mesh_of
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.rings import RingMotion, read_rings
 from notchflex.export.finite_elements.tendon_spans import tendon_spans
@@ -49,7 +49,7 @@ def run(subject: Any, options: DeckOptions, folder: Path) -> RingMotion:
     nf.export_robot(subject, folder / "deck.inp", options)
     alone = {**os.environ, "OMP_NUM_THREADS": "1"}
     subprocess.run(["ccx", "deck"], cwd=folder, env=alone, check=True, capture_output=True)
-    return read_rings(half_tube(robot, options), (folder / "deck.dat").read_text())
+    return read_rings(mesh_of(robot, options), (folder / "deck.dat").read_text())
 
 
 def jacobians(mesh: Any) -> np.ndarray:
@@ -91,7 +91,7 @@ def test_the_mesh_fills_half_of_the_tube(cut):
             nf.ArcNotch(cut, depth=depth, height=0.8, uncut_length=1.2) for depth in (1.3, 1.42)
         )
     )
-    mesh = half_tube(robot, MEDIUM)
+    mesh = mesh_of(robot, MEDIUM)
     parts = jacobians(mesh)
     assert parts.min() > 0.0
     tube = np.pi * (0.81**2 - 0.70**2)
@@ -103,17 +103,17 @@ def test_the_mesh_fills_half_of_the_tube(cut):
 
 
 def test_nodes_lie_on_the_cuts():
-    mesh = half_tube(one_notch(), MEDIUM)
+    mesh = mesh_of(one_notch(), MEDIUM)
     middle = mesh.faces[0].sum() // 2
-    edge = mesh.nodes[:, mesh.opening, middle]
+    edge = mesh.nodes[:, mesh.openings[0].first, middle]
     assert mesh.place[edge - 1, 0] == pytest.approx(0.81 - 1.4)
-    assert (mesh.nodes[:, mesh.opening + 1 :, middle] == -1).all()
+    assert (mesh.nodes[:, mesh.openings[0].first + 1 :, middle] == -1).all()
     assert mesh.heights[mesh.faces[0]] == pytest.approx([1.2, 2.0])
 
 
 def test_tendons_run_from_edge_to_edge():
     robot = wrist("A", 0.13)
-    mesh = half_tube(robot, COARSE)
+    mesh = mesh_of(robot, COARSE)
     tension = np.linspace(1.0, 0.9, 10)
     spans = tendon_spans(robot, mesh, 0, tension)
     assert [span.tension for span in spans] == pytest.approx(tension)
@@ -127,7 +127,7 @@ def test_tendons_run_from_edge_to_edge():
 def test_without_a_base_the_tendon_starts_at_rest(wrist):
     path = nf.simulate(wrist, nf.pull(0.0, 1.0, 3))
     straight = wrist.replace(tendon=(nf.Tendon(0.70, path="straight"),))
-    mesh = half_tube(straight, COARSE)
+    mesh = mesh_of(straight, COARSE)
     spans = tendon_spans(straight, mesh, 0, path.span_tension[-1, 0])
     assert spans[0].fixed == pytest.approx((0.70, 0.0, 0.0))
     assert spans[0].tension == pytest.approx(path.span_tension[-1, 0, 1])
@@ -135,7 +135,7 @@ def test_without_a_base_the_tendon_starts_at_rest(wrist):
 
 def test_rings_are_read_as_rigid_motions():
     robot = wrist("A")
-    mesh = half_tube(robot, COARSE)
+    mesh = mesh_of(robot, COARSE)
     turn, shift = 0.3, np.array([0.5, 0.0, -0.2])
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
@@ -170,7 +170,7 @@ def test_rings_are_read_as_rigid_motions():
 def test_robots_that_the_mesh_cannot_have_are_refused(make, name):
     robot = make()
     with refused("UNSUPPORTED", name):
-        tendon_spans(robot, half_tube(robot, COARSE), 0, np.ones(2))
+        tendon_spans(robot, mesh_of(robot, COARSE), 0, np.ones(2))
 
 
 def test_nothing_is_written_of_a_robot_that_is_refused(tmp_path):
