@@ -121,6 +121,7 @@ class SparsePolynomial(NamedTuple):
         which: Which of the unlike entries, block after block, each of them is.
         base: The vector in the middle.
         nodes: Exact vectors at all points that were evaluated, (points, m).
+        error: Largest error that was measured, in parts of the scale.
     """
 
     middle: Float[np.ndarray, " d"]
@@ -131,6 +132,7 @@ class SparsePolynomial(NamedTuple):
     which: Int[np.ndarray, " v"]
     base: Float[np.ndarray, " m"]
     nodes: Float[np.ndarray, "points m"]
+    error: float = np.inf
 
     def covers(self, numbers: Float[np.ndarray, "rows d"]) -> bool:
         """Whether numbers lie in the range that the polynomial was made for."""
@@ -211,7 +213,7 @@ def fit_polynomial(
             error = _errors(made, exact, checks, scale)
             of_parts = np.array([np.max(error[part], initial=0.0) for part in parts])
             if of_parts.max() <= wanted[0].tolerance:
-                good = made
+                good = made._replace(error=float(of_parts.max()))
             wrong = of_parts > tolerance
             if not wrong.any():
                 break

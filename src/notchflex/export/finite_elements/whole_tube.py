@@ -44,7 +44,7 @@ def whole_tube(robot: Robot, options: DeckOptions, tendons: Sequence[int]) -> Tu
             )
     height, edges_at, faces = layers_of(robot, notches, options)
     radius = np.linspace(robot.tube.inner_radius, robot.tube.outer_radius, 2 * options.wall + 1)
-    around = 4 * int(np.ceil(_ROUND * (options.spine + options.opening) / 4.0) + 1)
+    around = 4 * int(np.ceil(_ROUND * (options.spine + options.opening) / 2.0))
     sides = [np.radians(robot.tendon[number].direction_deg) for number in tendons]
     openings: list[Opening] = []
     shifts: list[np.ndarray] = []
