@@ -65,7 +65,9 @@ def run(subject: Any, options: DeckOptions, folder: Path) -> RingMotion:
     alone = {**os.environ, "OMP_NUM_THREADS": "1"}
     subprocess.run(["ccx", "deck"], cwd=folder, env=alone, check=True, capture_output=True)
     pulled = [0] if isinstance(subject, nf.Robot) else np.flatnonzero(subject.tension[-1] > 0.0)
-    return read_rings(mesh_of(robot, options, list(pulled)), (folder / "deck.dat").read_text())
+    return read_rings(
+        mesh_of(robot, options, [int(one) for one in pulled]), (folder / "deck.dat").read_text()
+    )
 
 
 def jacobians(mesh: Any) -> np.ndarray:
@@ -155,6 +157,14 @@ def test_the_mesh_of_a_turned_robot_is_the_turned_mesh():
     order = [np.lexsort(np.round(one, 9).T) for one in (first.place @ quarter, second.place)]
     assert (first.place @ quarter)[order[0]] == pytest.approx(second.place[order[1]], abs=1e-12)
     assert not first.is_half
+
+
+def test_short_rings_between_turned_notches_are_warned_of(tmp_path):
+    for uncut, warned in ((0.6, True), (3.0, False)):
+        robot = turned(uncut_length=uncut)
+        path = nf.simulate(robot, nf.Load(tension=[0.5, 0.2]))
+        report = nf.export_robot(path, tmp_path / "a.inp", COARSE)
+        assert any("open to one side" in one for one in report.warnings) is warned
 
 
 def test_tendons_of_a_whole_tube_lie_on_their_sides():
