@@ -36,6 +36,7 @@ def deck_document(subject: Subject, options: DeckOptions) -> FileDocument:
     """
     robot = subject.robot
     pulled: list[int] = []
+    tension = np.zeros((0, 1))
     if subject.path is not None:
         _check_state(subject.path, subject.step)
         tension = np.asarray(subject.path.span_tension[subject.step])

@@ -25,13 +25,13 @@ class Opening(NamedTuple):
 
     Attributes:
         first: Index of the angle at its first edge.
-        count: Number of elements round its opening, to its last edge; in half a tube to the middle.
+        cells: Number of elements round its opening, to its last edge; in half a tube to the middle.
         low: Index along z of its first face.
         high: Index along z of its last face.
     """
 
     first: int
-    count: int
+    cells: int
     low: int
     high: int
 
@@ -88,10 +88,10 @@ class TubeMesh:
         """
         along = (self.cell[:, 1] - opening.first // 2) % (self.nodes.shape[1] // 2)
         if self.is_half:
-            outer = 2 * along >= opening.count
+            outer = 2 * along >= opening.cells
         else:
-            outer = np.abs(2 * along + 1 - opening.count) <= 0.5 * opening.count
-        outer &= along < opening.count
+            outer = np.abs(2 * along + 1 - opening.cells) <= 0.5 * opening.cells
+        outer &= along < opening.cells
         number = np.arange(1, len(self.cell) + 1)
         below = number[outer & (self.cell[:, 2] == opening.low // 2 - 1)]
         return below, number[outer & (self.cell[:, 2] == opening.high // 2)]
@@ -128,7 +128,7 @@ def numbered(
     cut = np.zeros(len(cells), bool)
     for one in openings:
         inside = (2 * cells[:, 2] >= one.low) & (2 * cells[:, 2] < one.high)
-        cut |= inside & ((cells[:, 1] - one.first // 2) % around < one.count)
+        cut |= inside & ((cells[:, 1] - one.first // 2) % around < one.cells)
     cells = cells[~cut]
     # Half a tube counts its angles from the spine, the other way round.
     grid = 2 * cells[:, None] + (_NODES if is_half else [0, 2, 0] + _NODES * [1, -1, 1])
