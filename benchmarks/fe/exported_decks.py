@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import notchflex as nf
-from notchflex.export.finite_elements.half_tube import half_tube
+from notchflex.export.finite_elements.meshes import mesh_of
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.rings import RingMotion, read_rings
 
@@ -36,7 +36,7 @@ def run(subject: nf.Robot | nf.EquilibriumPath, options: DeckOptions) -> RingMot
         nf.export_robot(subject, Path(folder, "deck.inp"), options)
         alone = {**os.environ, "OMP_NUM_THREADS": "1"}
         subprocess.run(["ccx", "deck"], cwd=folder, env=alone, check=True, capture_output=True)
-        return read_rings(half_tube(robot, options), Path(folder, "deck.dat").read_text())
+        return read_rings(mesh_of(robot, options), Path(folder, "deck.dat").read_text())
 
 
 def notches(mesh: str) -> None:

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import notchflex as nf
 from fem_wrists import solid, wrist
 from notchflex.export.finite_elements.deck import ring_layers
-from notchflex.export.finite_elements.half_tube import half_tube
+from notchflex.export.finite_elements.meshes import mesh_of
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.rings import RingMotion, read_rings
 from notchflex.export.finite_elements.tendon_spans import tendon_spans
@@ -43,13 +44,30 @@ def one_notch(**keys: Any) -> nf.Robot:
     )
 
 
+def turned(by: float = 0.0, cut: Any = "on-axis", **keys: Any) -> nf.Robot:
+    """Two notches that open to sides 90 deg apart, with long rings; a tendon for each."""
+    notch = {"depth": 1.3, "height": 1.0, "uncut_length": 3.0, "ends": "shell"} | keys
+    sides = (by, by + 90.0)
+    return nf.Robot(
+        name="turned notches",
+        tube=nf.Tube(1.62, 1.40, base_length=3.0),
+        notch=tuple(nf.ArcNotch(cut, direction_deg=side, **notch) for side in sides),
+        tendon=tuple(nf.Tendon(0.70, path="straight", direction_deg=side) for side in sides),
+        material=nf.Linear(60_000.0, poisson_ratio=0.33),
+        friction=nf.Frictionless(),
+    )
+
+
 def run(subject: Any, options: DeckOptions, folder: Path) -> RingMotion:
     """Write a deck, run CalculiX as the deck says, read the rings."""
     robot = subject if isinstance(subject, nf.Robot) else subject.robot
     nf.export_robot(subject, folder / "deck.inp", options)
     alone = {**os.environ, "OMP_NUM_THREADS": "1"}
     subprocess.run(["ccx", "deck"], cwd=folder, env=alone, check=True, capture_output=True)
-    return read_rings(half_tube(robot, options), (folder / "deck.dat").read_text())
+    pulled = [0] if isinstance(subject, nf.Robot) else np.flatnonzero(subject.tension[-1] > 0.0)
+    return read_rings(
+        mesh_of(robot, options, [int(one) for one in pulled]), (folder / "deck.dat").read_text()
+    )
 
 
 def jacobians(mesh: Any) -> np.ndarray:
@@ -91,7 +109,7 @@ def test_the_mesh_fills_half_of_the_tube(cut):
             nf.ArcNotch(cut, depth=depth, height=0.8, uncut_length=1.2) for depth in (1.3, 1.42)
         )
     )
-    mesh = half_tube(robot, MEDIUM)
+    mesh = mesh_of(robot, MEDIUM)
     parts = jacobians(mesh)
     assert parts.min() > 0.0
     tube = np.pi * (0.81**2 - 0.70**2)
@@ -103,17 +121,66 @@ def test_the_mesh_fills_half_of_the_tube(cut):
 
 
 def test_nodes_lie_on_the_cuts():
-    mesh = half_tube(one_notch(), MEDIUM)
+    mesh = mesh_of(one_notch(), MEDIUM)
     middle = mesh.faces[0].sum() // 2
-    edge = mesh.nodes[:, mesh.opening, middle]
+    edge = mesh.nodes[:, mesh.openings[0].first, middle]
     assert mesh.place[edge - 1, 0] == pytest.approx(0.81 - 1.4)
-    assert (mesh.nodes[:, mesh.opening + 1 :, middle] == -1).all()
+    assert (mesh.nodes[:, mesh.openings[0].first + 1 :, middle] == -1).all()
     assert mesh.heights[mesh.faces[0]] == pytest.approx([1.2, 2.0])
+
+
+@pytest.mark.parametrize("cut", ["on-axis", "off-axis"])
+@pytest.mark.parametrize("side", [90.0, 155.0, 180.0])
+def test_the_mesh_of_a_whole_tube(cut, side):
+    notches = [nf.ArcNotch(cut, d, 0.8, uncut_length=1.2, direction_deg=a)
+               for d, a in ((1.3, 20.0), (1.42, 20.0 + side))]  # fmt: skip
+    robot = one_notch().replace(notch=tuple(notches))
+    mesh = mesh_of(robot, MEDIUM)
+    parts = jacobians(mesh)
+    assert parts.min() > 0.0
+    tube = np.pi * (0.81**2 - 0.70**2)
+    section = nf.annular_sector if cut == "on-axis" else nf.annular_segment
+    areas = [float(section(0.81, 0.70, depth).area) for depth in (1.3, 1.42)]
+    assert parts.sum() == pytest.approx(3 * 1.2 * tube + 0.8 * sum(areas), rel=1e-4)
+    assert len(np.unique(mesh.elements)) == len(mesh.place)
+    for notch, opening in zip(notches, mesh.openings, strict=True):
+        layer = mesh.layer((opening.low + opening.high) // 2)
+        direction = np.radians(notch.direction_deg)
+        along = mesh.place[layer - 1, :2] @ [np.cos(direction), np.sin(direction)]
+        at_edge = 0.81 * (notch.depth / 0.81 - 1.0)  # of the outer surface, from the axis
+        assert -along.max() == pytest.approx(at_edge if cut == "off-axis" else at_edge * 0.7 / 0.81)
+
+
+def test_the_mesh_of_a_turned_robot_is_the_turned_mesh():
+    first, second = (mesh_of(turned(by), COARSE, [0, 1]) for by in (0.0, 90.0))
+    quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    order = [np.lexsort(np.round(one, 9).T) for one in (first.place @ quarter, second.place)]
+    assert (first.place @ quarter)[order[0]] == pytest.approx(second.place[order[1]], abs=1e-12)
+    assert not first.is_half
+
+
+def test_short_rings_between_turned_notches_are_warned_of(tmp_path):
+    for uncut, warned in ((0.6, True), (3.0, False)):
+        robot = turned(uncut_length=uncut)
+        path = nf.simulate(robot, nf.Load(tension=[0.5, 0.2]))
+        report = nf.export_robot(path, tmp_path / "a.inp", COARSE)
+        assert any("open to one side" in one for one in report.warnings) is warned
+
+
+def test_tendons_of_a_whole_tube_lie_on_their_sides():
+    robot = turned(20.0)
+    mesh = mesh_of(robot, COARSE, [0, 1])
+    for tendon, side in enumerate(np.radians([20.0, 110.0])):
+        for span in tendon_spans(robot, mesh, tendon, np.ones(4)):
+            ends = mesh.place[np.array(span.nodes) - 1, :2]
+            assert ends == pytest.approx(
+                np.tile(0.7 * np.array([np.cos(side), np.sin(side)]), (2, 1))
+            )
 
 
 def test_tendons_run_from_edge_to_edge():
     robot = wrist("A", 0.13)
-    mesh = half_tube(robot, COARSE)
+    mesh = mesh_of(robot, COARSE)
     tension = np.linspace(1.0, 0.9, 10)
     spans = tendon_spans(robot, mesh, 0, tension)
     assert [span.tension for span in spans] == pytest.approx(tension)
@@ -127,7 +194,7 @@ def test_tendons_run_from_edge_to_edge():
 def test_without_a_base_the_tendon_starts_at_rest(wrist):
     path = nf.simulate(wrist, nf.pull(0.0, 1.0, 3))
     straight = wrist.replace(tendon=(nf.Tendon(0.70, path="straight"),))
-    mesh = half_tube(straight, COARSE)
+    mesh = mesh_of(straight, COARSE)
     spans = tendon_spans(straight, mesh, 0, path.span_tension[-1, 0])
     assert spans[0].fixed == pytest.approx((0.70, 0.0, 0.0))
     assert spans[0].tension == pytest.approx(path.span_tension[-1, 0, 1])
@@ -135,7 +202,7 @@ def test_without_a_base_the_tendon_starts_at_rest(wrist):
 
 def test_rings_are_read_as_rigid_motions():
     robot = wrist("A")
-    mesh = half_tube(robot, COARSE)
+    mesh = mesh_of(robot, COARSE)
     turn, shift = 0.3, np.array([0.5, 0.0, -0.2])
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
@@ -158,19 +225,19 @@ def test_rings_are_read_as_rigid_motions():
     ("make", "name"),
     [
         (lambda: nf.load_robot("gao2017"), "u-link"),
-        (lambda: nf.load_robot("two-axis-wrist"), "notch 2"),
+        (lambda: turned(uncut_length=0.0), "uncut_length"),
+        (lambda: turned().with_value("tendon[1].direction_deg", 127.0), "near to an edge"),
         (lambda: one_notch(precurvature_deg=3.0), "precurvature"),
         (lambda: one_notch(depth=1.55), "solid strip"),
         (lambda: one_notch().with_value("tendon[1].radius", 0.4), "tendon[1].radius"),
-        (lambda: one_notch().with_value("tendon[1].direction_deg", 20.0), "20 deg"),
         (lambda: one_notch(uncut_length=0.0), "uncut_length"),
     ],
-    ids=["u-link", "direction", "precurvature", "strip", "radius", "beside", "no wall"],
+    ids=["u-link", "no room", "near", "precurvature", "strip", "radius", "no wall"],
 )
 def test_robots_that_the_mesh_cannot_have_are_refused(make, name):
     robot = make()
     with refused("UNSUPPORTED", name):
-        tendon_spans(robot, half_tube(robot, COARSE), 0, np.ones(2))
+        tendon_spans(robot, mesh_of(robot, COARSE), 0, np.ones(2))
 
 
 def test_nothing_is_written_of_a_robot_that_is_refused(tmp_path):
@@ -245,3 +312,39 @@ def test_closed_notches_press_on_each_other(tmp_path):
     assert path.closed[-1, 0]
     angle = run(path, COARSE, tmp_path).notch_angle[0]
     assert angle == pytest.approx(path.notch_angle[-1, 0], rel=0.04)
+
+
+@needs_ccx
+@pytest.mark.nightly
+def test_notches_that_open_to_two_sides(tmp_path, margin):
+    """Both tendons pulled: turns of the chain, balance of forces, and the same turned by 90 deg."""
+    found = []
+    for number, by in enumerate((0.0, 90.0)):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        robot = turned(by)
+        path = nf.simulate(robot, [nf.Load(tension=[k / 4.0, k / 8.0]) for k in range(1, 5)])
+        found.append(run(path, COARSE, folder))
+        rotation = path.body_rotation[-1]
+        known = Rotation.from_matrix(np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:]).as_rotvec()
+        off = np.linalg.norm(found[-1].notch_turn - known, axis=1)
+        # The coarse mesh is 1.7 % off.
+        margin.within("turns", off / np.linalg.norm(known, axis=1).max(), 0.025)
+        total = (folder / "deck.dat").read_text().split("for set NCLAMP")[-1].split("\n")[2]
+        assert np.array(total.split(), float) == pytest.approx(0.0, abs=1e-7)
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    assert found[1].position == pytest.approx(found[0].position @ quarter.T, abs=1e-7)
+    assert found[1].rotation == pytest.approx(quarter @ found[0].rotation @ quarter.T, abs=1e-7)
+
+
+@needs_ccx
+@pytest.mark.nightly
+def test_a_whole_tube_bends_as_half_of_it(tmp_path, margin):
+    robot = one_notch(ends="shell")
+    path = nf.simulate(robot, nf.pull(0.0, 1.0, 3))
+    half = run(path, COARSE, tmp_path).notch_angle[0]
+    more = (*robot.tendon, nf.Tendon(0.70, path="straight", direction_deg=180.0))
+    loads = [nf.Load(tension=[level, 1e-6]) for level in (0.5, 1.0)]
+    path = nf.simulate(robot.replace(tendon=more), loads)
+    whole = run(path, COARSE, tmp_path).notch_angle[0]
+    margin.within("angle", whole / half - 1.0, 0.01)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from notchflex.analysis.uncertainty.assumed import tolerances_of
-from notchflex.designing.explanation import curves_missed, explain, yield_sentences
+from notchflex.designing.explanation import chosen_form, curves_missed, explain, yield_sentences
 from notchflex.designing.forms import problems_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.result import (
@@ -164,7 +164,7 @@ def made_of(spec: DesignSpec, first: Robot, problems: list[Problem], searches: S
                 variables.columns, one.point.x.tolist(), variables.start.tolist(), strict=True
             )
         ),
-        explanation=explain(best),
+        explanation=(*chosen_form(spec, one.point.robot, len(problems)), *explain(best)),
         solves=solves,
         gradients=gradients,
         starts=len(searches.outcomes),

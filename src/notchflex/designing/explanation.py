@@ -15,6 +15,9 @@ from notchflex.designing.search.robust_search import YieldOf
 from notchflex.designing.search.rows import TOLERANCE, Row
 from notchflex.designing.search.search import Outcome
 from notchflex.designing.specification.asked import DesignObjective
+from notchflex.designing.specification.spec import DesignSpec
+from notchflex.robot import Robot
+from notchflex.robot.value_names import numbers_at
 
 # The most sentences about limits, the dearest first.
 _MOST = 12
@@ -38,6 +41,17 @@ def curves_missed(outcome: Outcome) -> tuple[str, ...]:
                 f"({shown}), up to {short(float(far.max()))} mm away; asked {curve.within:g} mm."
             )
     return tuple(told)
+
+
+def chosen_form(spec: DesignSpec, robot: Robot, forms: int) -> tuple[str, ...]:
+    """Return a sentence about the number of notches and the sizes that were chosen of several."""
+    if forms < 2:
+        return ()
+    chosen = [f"{robot.number_of_notches} notches"] if spec.number_of_notches else []
+    for path in (path for stock in spec.stock for path in stock.values):
+        value = next(iter(numbers_at(robot, path).values()))
+        chosen.append(f"{path} {short(value)}")
+    return (f"Chosen of {forms} combinations: {', '.join(chosen)}.",)
 
 
 def yield_sentences(yields: Sequence[YieldOf]) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,6 +15,8 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities.registry import holds
 from notchflex.tolerancing.spec import AXES, INDICES, ToleranceSpec
 
+# Quantities that are pure numbers of at most 1; a limit beyond is one in percent.
+_PARTS = ("peak_strain", "outer_strain")
 FIRST = {"body": 0}
 """The number of the first entry along an axis, where it is not 1."""
 
@@ -100,6 +102,7 @@ def entries_of(
         what: What messages call it.
     """
     quantity, steps = REGISTERED[limit.quantity], len(path)
+    check_percent(limit.quantity, (limit.lower, limit.upper))
     step = steps if limit.step is None else limit.step
     if step > steps:
         raise InputError.OUT_OF_RANGE(
@@ -126,6 +129,16 @@ def entries_of(
             continue
         words = " ".join([_entry(limit.quantity, quantity.per, index), ", ".join(at)]).strip()
         yield Criterion(words, quantity, load, step - 1, index, lower, upper)
+
+
+def check_percent(name: str, limits: Iterable[float | None]) -> None:
+    """Raise if a limit of a strain is one in percent.
+
+    Raises:
+        InputError: It is beyond 1.
+    """
+    if name in _PARTS and any(1.0 < abs(one) < np.inf for one in limits if one is not None):
+        raise InputError.OUT_OF_RANGE(f"a {name} beyond 1 is more than 100 %; give 0.06 for 6 %.")
 
 
 def _places(limit: Limited, axis: str, size: int, what: str) -> Sequence[int]:

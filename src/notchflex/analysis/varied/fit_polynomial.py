@@ -108,7 +108,7 @@ def fit_polynomial(
             error = _errors(made, exact, checks, scale)
             of_parts = np.array([np.max(error[part], initial=0.0) for part in parts])
             if of_parts.max() <= wanted[0].tolerance:
-                good = made
+                good = made._replace(error=float(of_parts.max()))
             wrong = of_parts > tolerance
             if not wrong.any():
                 break

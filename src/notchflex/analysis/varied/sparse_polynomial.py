@@ -101,6 +101,7 @@ class SparsePolynomial(NamedTuple):
         which: Which of the unlike entries, block after block, each of them is.
         base: The vector in the middle.
         nodes: Exact vectors at all points that were evaluated, (points, m).
+        error: Largest error that was measured, in parts of the scale.
     """
 
     middle: Float[np.ndarray, " d"]
@@ -111,6 +112,7 @@ class SparsePolynomial(NamedTuple):
     which: Int[np.ndarray, " v"]
     base: Float[np.ndarray, " m"]
     nodes: Float[np.ndarray, "points m"]
+    error: float = np.inf
 
     def covers(self, numbers: Float[np.ndarray, "rows d"]) -> bool:
         """Whether numbers lie in the range that the polynomial was made for."""

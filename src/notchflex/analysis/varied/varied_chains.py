@@ -8,6 +8,7 @@ Where no polynomial is good enough, every robot is assembled by itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -32,7 +33,7 @@ from notchflex.solver.programs.static_structure import StaticStructure
 TOLERANCES = (1e-5, 1e-9)
 """Largest errors of an entry, in parts of its own size or, if larger, 1 % of that of its array.
 
-The second is met where a batch is large enough to pay for it.
+The second is met where it takes no more robots than a batch has, or other batches follow.
 """
 
 _FLOOR = 1e-2
@@ -121,26 +122,50 @@ def varied_chains(
     form = _Form(ready.chain_layout, ready.command_layout(commands), len(load))
     key = np.concatenate([form.command.pack(commands, leading=1).ravel(), [refinement]]).tobytes()
     earlier = _known(robots.robot, robots.names, form.chain, key) if known else []
-    polynomial = next((one for one in earlier if one.covers(table)), None)
-    if polynomial is None:
-        polynomial = _fitted(robots, load, refinement, form)
+    wanted = _wanted(robots)
+    found = next((one for one in earlier if one.serves(table, wanted[-1])), None)
+    if found is None:
+        polynomial = _fitted(robots, load, refinement, form, wanted)
         if polynomial is None:
             return None
-        earlier.append(polynomial)
+        found = _Known(polynomial, wanted[-1].most)
+        earlier.append(found)
+    polynomial = found.polynomial
     nodes = polynomial.nodes[:, : form.chain.size]
     structure = StaticStructure.of(form.chain, [ready.chain], nodes)
     return VariedChains(table, ready, polynomial, structure, form.command, form.steps)
 
 
+class _Known(NamedTuple):
+    """A polynomial of an earlier call.
+
+    Attributes:
+        polynomial: The polynomial.
+        most: How many robots could be assembled for it.
+    """
+
+    polynomial: SparsePolynomial
+    most: int
+
+    def serves(self, table: Float[np.ndarray, "robots d"], wanted: PolynomialAccuracy) -> bool:
+        """Whether a new one would be no better."""
+        good = self.polynomial.error <= wanted.tolerance or self.most >= wanted.most
+        return good and self.polynomial.covers(table)
+
+
 @lru_cache(maxsize=8)
-def _known(*key: Any) -> list[SparsePolynomial]:
+def _known(*key: Any) -> list[_Known]:
     """Polynomials that were found for a robot, names, and loads: the next draws may fit in."""
     del key
     return []
 
 
 def _fitted(
-    robots: VariedRobots, load: LoadPath, refinement: int, form: _Form
+    robots: VariedRobots,
+    load: LoadPath,
+    refinement: int,
+    form: _Form,
+    wanted: Sequence[PolynomialAccuracy],
 ) -> SparsePolynomial | None:
     names, table = robots.names, robots.table
 
@@ -182,7 +207,7 @@ def _fitted(
             list(robots.cliques()),
             lambda sizes: _scale(sizes, form),
             form.parts,
-            wanted=_wanted(robots),
+            wanted=wanted,
             checks=table[rows],
         )
     except _AnotherFormError:
@@ -196,13 +221,13 @@ def _fitted(
 
 
 def _wanted(robots: VariedRobots) -> list[PolynomialAccuracy]:
-    """Nodes cost as much as robots: few for a small batch, unless other batches follow."""
+    """Nodes cost as much as robots: no more than a batch has, unless other batches follow."""
     count = len(robots)
     follows = robots.ranges is not None and count >= _LEAST_ROBOTS
     usual, fine = TOLERANCES
     return [
         PolynomialAccuracy(usual, _MOST_NODES if follows else min(_MOST_NODES, count // 2)),
-        PolynomialAccuracy(fine, min(_MOST_NODES, count // 2)),
+        PolynomialAccuracy(fine, _MOST_NODES if follows else min(_MOST_NODES, count)),
     ]
 
 

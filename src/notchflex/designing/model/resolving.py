@@ -29,10 +29,9 @@ from notchflex.errors import InputError
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest
 from notchflex.robot.value_names import described_at, numbers_at
+from notchflex.tolerancing.criteria import check_percent
 
 _AXES = ("x", "y", "z")
-# Quantities that are pure numbers of at most 1; a limit beyond is one in percent.
-_PARTS = ("peak_strain", "outer_strain")
 
 
 def wishes_of(spec: DesignSpec, robot: Robot) -> tuple[Wish, ...]:
@@ -189,10 +188,7 @@ def _check_limits(wish: Wish) -> None:
     else:
         assert isinstance(asked, DesignConstraint)
         limits = [asked.equal, asked.lower, asked.upper]
-    if wish.asked.quantity in _PARTS and any(abs(one) > 1.0 for one in limits if one is not None):
-        raise InputError.OUT_OF_RANGE(
-            f"a {wish.asked.quantity} beyond 1 is more than 100 %; give 0.06 for 6 %."
-        )
+    check_percent(wish.asked.quantity, limits)
     if wish.take == "steps" and len(wish.rows) < 2:
         raise InputError.CONFLICT(f"{wish.title} is a single number, and has no steps or order.")
 

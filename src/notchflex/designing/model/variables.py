@@ -145,6 +145,10 @@ class Variables:
         return {one.load: number for one, number in pairs if one.load is not None}
 
 
+# Limits so many times below or above the value of the robot are in another unit.
+_OTHER_UNIT = 100.0
+
+
 def variables_of(
     robot: Robot, variables: Sequence[DesignVariable], states: Mapping[str, DesignState]
 ) -> Variables:
@@ -195,6 +199,13 @@ def _columns(
                 + ". Give it in that unit."
             )
     unit = described.unit
+    for value in found.values():
+        if value > _OTHER_UNIT * variable.upper > 0.0 or 0.0 < _OTHER_UNIT * value < variable.lower:
+            raise InputError.OUT_OF_RANGE(
+                f"`{variable.value}` is {value:g} {unit}".rstrip()
+                + f" in the robot, and may lie between {variable.lower:g} and {variable.upper:g}: "
+                f"give the limits in {unit or 'the unit of the robot file'}, or change the robot."
+            )
     if variable.along == "all":
         return [Column(variable.value, unit, *limits, {variable.value: 1.0})]
     if not variable.value.startswith("notch") or len(found) < 2:
@@ -204,7 +215,7 @@ def _columns(
         )
     if variable.along == "each":
         return [Column(path, unit, *limits, {path: 1.0}) for path in found]
-    degree = min(variable.degree, len(found) - 1)
+    degree = min(variable.degree or 1, len(found) - 1)
     at = np.linspace(0.0, 1.0, len(found))
     columns: list[Column] = []
     for k in range(degree + 1):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from notchflex.designing.search.problem import Evaluation, Problem, Vector
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.scaled import Scaled
 from notchflex.designing.search.squares import is_sum_of_squares, nearest_squares
+from notchflex.designing.search.trails import Met, Trail
 from notchflex.designing.search.trust_region import approach
 
 # SLSQP keeps an estimate of the curvature, which a kink (a notch that closes) spoils: it begins
@@ -39,25 +41,39 @@ class Found(NamedTuple):
         evaluation: The robot there, with derivatives; None if the search could not begin.
         stationary: Whether no small change improves it, to first order.
         iterations: Number of iterations.
+        trail: Scaled variables after each step.
     """
 
     z: Vector
     evaluation: Evaluation | None
     stationary: bool
     iterations: int
+    trail: tuple[Vector, ...] = ()
 
 
-def search_from(problem: Problem, z: Vector, iterations: int) -> Found:
+def search_from(
+    problem: Problem, z: Vector, iterations: int, settled: Sequence[Found] = ()
+) -> Found:
     """Search from a start by SLSQP.
 
     Args:
         problem: The problem.
         z: The start.
         iterations: Most iterations.
+        settled: Searches that have settled: this one ends at their robot where it meets their way.
 
     Returns:
         The best robot met.
     """
+    trail = Trail([one.trail for one in settled])
+    try:
+        found = _search(problem, z, iterations, trail)
+    except Met as met:
+        return settled[met.number]._replace(iterations=len(trail.steps))
+    return found._replace(trail=(*trail.steps, found.z))
+
+
+def _search(problem: Problem, z: Vector, iterations: int, trail: Trail) -> Found:
     first = problem.evaluate(z)
     first = None if first is None else problem.with_slopes(first, z)
     if first is None:
@@ -66,13 +82,13 @@ def search_from(problem: Problem, z: Vector, iterations: int) -> Found:
     if is_sum_of_squares(problem):
         z, first, settled = nearest_squares(problem, z, first)
         return Found(z, first, settled or is_stationary(problem, z, first), 0)
-    z, one, done = approach(problem, z, first, iterations)
+    z, one, done = approach(problem, z, first, iterations, trail)
     best = z, one
     if problem.worst(one) > _FAR:  # limits that contradict each other here
         return Found(z, one, False, done)
     for _ in range(_AGAIN):
         before = best
-        best, more = _slsqp(problem, *best, iterations - done)
+        best, more = _slsqp(problem, *best, iterations - done, trail)
         done += more
         stationary = is_stationary(problem, *best)
         if stationary or done >= iterations or not _gained(problem, before[1], best[1]):
@@ -103,17 +119,17 @@ def _gained(problem: Problem, before: Evaluation, after: Evaluation) -> bool:
 
 
 def _slsqp(
-    problem: Problem, z: Vector, first: Evaluation, iterations: int, *, elastic: bool = False
+    problem: Problem, z: Vector, first: Evaluation, iterations: int, trail: Trail
 ) -> tuple[tuple[Vector, Evaluation], int]:
-    scaled = Scaled(problem, first, z, elastic, (z, first))
+    scaled = Scaled(problem, first, z, best=(z, first))
     history: list[tuple[float, float]] = []
 
     def watch(y: np.ndarray) -> None:
         found = scaled.evaluation(y)
         if found is None:
             return
-        miss = 0.0 if elastic else problem.worst(found)
-        history.append((miss, scaled.value(y)))
+        trail.pass_by(np.clip(y[: problem.count], 0.0, 1.0))
+        history.append((problem.worst(found), scaled.value(y)))
         if len(history) <= _PATIENCE:
             return
         (before, value_before), (now, value) = history[-1 - _PATIENCE], history[-1]

@@ -29,6 +29,7 @@ from notchflex.designing.specification.asked import DesignConstraint, DesignObje
 from notchflex.errors import InputError
 
 Vector = Float[np.ndarray, " v"]
+_KEPT = 16
 
 
 @dataclass(frozen=True)
@@ -126,8 +127,22 @@ class Problem:
         variables = self.solver.variables
         return variables.lower + np.clip(z[: self.count], 0.0, 1.0) * variables.span
 
+    @cached_property
+    def _kept(self) -> dict[bytes, Evaluation | None]:
+        """Designs evaluated last: a search asks for where another one began or ended."""
+        return {}
+
     def evaluate(self, z: Vector) -> Evaluation | None:
         """Return the design at a scaled vector; None where there is no robot or no equilibrium."""
+        z = np.clip(z[: self.count], 0.0, 1.0)
+        key = z.tobytes()
+        if key not in self._kept:
+            if len(self._kept) >= _KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = self._evaluated(z)
+        return self._kept[key]
+
+    def _evaluated(self, z: Vector) -> Evaluation | None:
         try:
             point = self._solved(z)
             found = self.read(point.plain, z)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -12,12 +12,6 @@ from notchflex.designing.search.problem import Evaluation, Problem, Vector
 
 # What a sum is taken to be where there is no robot or no equilibrium, in sizes of the sum.
 _PENALTY = 1e3
-
-
-# What a limit that is missed by one size of its row costs, in sizes of the sum.
-_ELASTIC = 30.0
-# Robots that are kept: a search asks for sum, rows and their derivatives one after the other.
-_KEPT = 4
 
 
 @dataclass
@@ -36,18 +30,14 @@ class Scaled:
         problem: The problem.
         first: The robot where the search begins, with derivatives.
         start: Where that is.
-        elastic: Whether all limits give way together, at a price: then there is always a step.
         best: The best robot met so far, and its vector.
-        kept: Robots met last.
         linear: Where derivatives were asked last, and what they are.
     """
 
     problem: Problem
     first: Evaluation
     start: Vector
-    elastic: bool = False
     best: tuple[Vector, Evaluation] | None = None
-    kept: dict[bytes, Evaluation | None] = field(default_factory=dict[bytes, "Evaluation | None"])
     linear: tuple[bytes, Linear] | None = None
 
     def __post_init__(self) -> None:
@@ -70,35 +60,26 @@ class Scaled:
                 for bound, reading in zip(self.problem.bounds, first.bounded, strict=True)
             ]
         )
-        self.give = 0.0
-        if self.elastic:
-            rows = self._rows(np.append(self.start, np.zeros(len(self.problem.bounds) + 1)), first)
-            self.give = 1.01 * max(0.0, -float(rows["ineq"].min(initial=0.0)))
         self.linear = self.y.tobytes(), self._derivatives(first)
         self._good = self._value(self.y, first), self._rows(self.y, first)
 
     @property
     def y(self) -> Vector:
         """Where the search begins."""
-        more = [np.zeros(len(self.problem.bounds)), np.full(int(self.elastic), self.give)]
-        return np.concatenate([self.start, *more])
+        return np.concatenate([self.start, np.zeros(len(self.problem.bounds))])
 
     @property
     def limits(self) -> list[tuple[float | None, float | None]]:
         """Limits of the vector."""
-        give: list[tuple[float | None, float | None]] = [(0.0, None)] * self.elastic
-        return [(0.0, 1.0)] * self.problem.count + [(None, None)] * len(self.problem.bounds) + give
+        free: list[tuple[float | None, float | None]] = [(None, None)] * len(self.problem.bounds)
+        return [*((0.0, 1.0) for _ in range(self.problem.count)), *free]
 
     def evaluation(self, y: Vector) -> Evaluation | None:
         """Return the robot at a vector, perhaps without derivatives."""
-        key = y.tobytes()
-        if key not in self.kept:
-            if len(self.kept) > _KEPT:
-                del self.kept[next(iter(self.kept))]
-            self.kept[key] = found = self.problem.evaluate(y)
-            if found is not None and self._is_better(found):
-                self.best = y[: self.problem.count].copy(), found
-        return self.kept[key]
+        found = self.problem.evaluate(y)
+        if found is not None and self._is_better(found):
+            self.best = y[: self.problem.count].copy(), found
+        return found
 
     def value(self, y: Vector) -> float:
         """Return the sum; far above all others where there is no robot."""
@@ -126,7 +107,6 @@ class Scaled:
             if full is None:
                 assert self.linear is not None
                 return self.linear[1]
-            self.kept[key] = full
             if self.best is not None and self.best[1].point is full.point:
                 self.best = self.best[0], full
             self.linear = key, self._derivatives(full)
@@ -139,13 +119,11 @@ class Scaled:
         return is_better(self.problem, found, self.best[1])
 
     def _slack(self, y: Vector) -> Vector:
-        count = self.problem.count
-        return self.bound_zero + self.bound_size * y[count : count + len(self.problem.bounds)]
+        return self.bound_zero + self.bound_size * y[self.problem.count :]
 
     def _value(self, y: Vector, one: Evaluation) -> float:
         factors = np.array([bound.factor for bound in self.problem.bounds])
-        own = float(one.objective.values.sum() + factors @ self._slack(y)) / self.size
-        return own + _ELASTIC * float(y[-1]) if self.elastic else own
+        return float(one.objective.values.sum() + factors @ self._slack(y)) / self.size
 
     def _rows(self, y: Vector, one: Evaluation) -> dict[str, np.ndarray]:
         low, high, same = self._row_limits
@@ -157,10 +135,7 @@ class Scaled:
         for k, (bound, reading) in enumerate(zip(self.problem.bounds, one.bounded, strict=True)):
             least.append(bound.sign * (slack[k] - reading.values) / self.bound_size[k])
         equal = (numbers[same] - low[same]) / self.row_size[same]
-        if not self.elastic:
-            return {"eq": equal, "ineq": np.concatenate([np.zeros(0), *least])}
-        joined = np.concatenate([equal, -equal, *least])
-        return {"eq": np.zeros(0), "ineq": joined + float(y[-1])}
+        return {"eq": equal, "ineq": np.concatenate([np.zeros(0), *least])}
 
     def _derivatives(self, one: Evaluation) -> Linear:
         bounds, span = self.problem.bounds, self.problem.solver.variables.span
@@ -181,11 +156,7 @@ class Scaled:
             least.append(np.concatenate([by_z, own], axis=1))
         none = np.zeros((0, rows.shape[1]))
         gradient = np.concatenate(by) / self.size
-        if not self.elastic:
-            return Linear(gradient, {"eq": rows[same], "ineq": np.concatenate([none, *least])})
-        joined = np.concatenate([rows[same], -rows[same], *least])
-        joined = np.concatenate([joined, np.ones((len(joined), 1))], axis=1)
-        return Linear(np.append(gradient, _ELASTIC), {"eq": none, "ineq": joined})
+        return Linear(gradient, {"eq": rows[same], "ineq": np.concatenate([none, *least])})
 
     @property
     def _row_limits(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

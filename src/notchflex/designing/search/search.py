@@ -12,14 +12,7 @@ from notchflex.designing.search.nearest import nearest
 from notchflex.designing.search.problem import Problem, Progress, Vector
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.squares import is_followed
-from notchflex.designing.search.starts import (
-    Candidate,
-    draw,
-    evaluate_all,
-    ranked,
-    smooth,
-    spread_out,
-)
+from notchflex.designing.search.starts import starts
 from notchflex.designing.specification.spec import SearchOptions
 from notchflex.errors import InputError
 
@@ -71,6 +64,38 @@ class Searches:
         """The best of all."""
         return min(self.outcomes, key=lambda one: one.merit)
 
+    def of(self, number: int) -> list[Outcome]:
+        """Return where the searches of a form ended."""
+        return [one for one in self.outcomes if one.number == number]
+
+    def settled(self, number: int) -> list[Found]:
+        """Return the searches of a form that settled at different robots."""
+        found: list[Found] = []
+        for one in self.of(number):
+            same = any(_same(one.found, other) for other in found)
+            if one.found.stationary and one.found.trail and not same:
+                found.append(one.found)
+        return found
+
+    def has_agreed(self, number: int, count: int) -> bool:
+        """Whether nothing is to be gained from further searches of a form.
+
+        So many have settled at the best robot that it has, or a curve is followed.
+        """
+        best = min(self.of(number), key=lambda one: one.merit, default=None)
+        if best is None or best.merit[0] > 0.0:
+            return False
+        near = [one for one in self.of(number) if _same(one.found, best.found)]
+        return sum(one.found.stationary for one in near) >= count or self.has_followed(number)
+
+    def has_followed(self, number: int) -> bool:
+        """Whether nothing but curves is asked, and a robot of a form follows all well enough."""
+        return any(is_followed(one.problem, one.merit[1]) for one in self.of(number))
+
+
+def _same(one: Found, other: Found) -> bool:
+    return bool(np.abs(one.z - other.z).max(initial=0.0) < _SAME)
+
 
 def search(
     problems: Sequence[Problem], options: SearchOptions, progress: Progress | None
@@ -87,18 +112,21 @@ def search(
     """
     searches = Searches()
     told: Progress = progress or (lambda stage, done, total: None)
+    several = max(1, round(options.starts / len(problems)))
+    each = max(4, options.candidates // len(problems))
     try:
-        starts = _starts(problems, options, told)
-        each = {number: [one for one, _ in starts].count(number) for number, _ in starts}
-        for done, (number, z) in enumerate(starts):
-            told("searching", done, len(starts))
-            if _agreed(searches, number, max(2, (each[number] + 1) // 2)):
-                continue
-            found = search_from(problems[number], z, options.iterations)
-            if found.evaluation is not None:
-                searches.outcomes.append(Outcome(problems[number], number, z, found))
-                if is_followed(problems[number], found.evaluation.total):
+        for number, problem in enumerate(problems):
+            told("ranking robots", number, len(problems))
+            for done, z in enumerate(starts(problem, several, each, options.seed)):
+                told("searching", number * several + done, several * len(problems))
+                settled = searches.settled(number)
+                found = search_from(problem, z, options.iterations, settled)
+                if found.evaluation is not None:
+                    searches.outcomes.append(Outcome(problem, number, z, found))
+                if searches.has_agreed(number, max(2, (several + 1) // 2)):
                     break
+            if searches.has_followed(number):
+                break
         if searches.outcomes and searches.best.merit[0] > 0.0:
             told("searching what comes nearest", 0, 1)
             _approach(searches, options)
@@ -115,45 +143,6 @@ def search(
     if not searches.outcomes:
         raise _nothing(problems)
     return searches
-
-
-def _agreed(searches: Searches, number: int, count: int) -> bool:
-    """Tell whether so many searches of a form have settled at the best robot that it has."""
-    own = [one for one in searches.outcomes if one.number == number]
-    best = min(own, key=lambda one: one.merit, default=None)
-    if best is None or best.merit[0] > 0.0:
-        return False
-    near = [one for one in own if np.abs(one.found.z - best.found.z).max(initial=0.0) < _SAME]
-    return sum(one.found.stationary for one in near) >= count
-
-
-def _starts(
-    problems: Sequence[Problem], options: SearchOptions, told: Progress
-) -> list[tuple[int, Vector]]:
-    """Choose starts: the robot as it is and the best candidates, some of every form."""
-    each = max(4, options.candidates // len(problems))
-    several = max(1, round(options.starts / len(problems)))
-    starts: list[tuple[int, Vector]] = []
-    for number, problem in enumerate(problems):
-        told("ranking robots", number, len(problems))
-        here = problem.start
-        half = max(1, each // 2)
-        drawn = np.concatenate(
-            [
-                here[None],
-                smooth(problem, half, options.seed),
-                draw(each - half or 1, problem.count, options.seed),
-            ]
-        )
-        every = evaluate_all(problem, drawn if options.starts > 1 else here[None])
-        solved = [one for _, one in every if one is not None]
-        if solved:
-            problem.set_sizes(solved)
-        candidates = [Candidate(z, one) for z, one in every if one is not None]
-        own = [one for one in candidates if one.z is every[0][0]]
-        best = spread_out(ranked(problem, candidates[len(own) :]), several - len(own))
-        starts += [(number, one.z) for one in (*own, *best)]
-    return starts
 
 
 def _approach(searches: Searches, options: SearchOptions) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,8 @@ from notchflex.robot import Robot
 _NUMBER = re.compile(r"\[\d+\]")
 # What a limit that is missed by its own size weighs against the spread of the sums.
 _WEIGHT = 10.0
+# So many robots are drawn before the first search, or two for every variable.
+_FEW = 8
 # Starts lie this far from each other, in parts of the whole diagonal.
 _APART = 0.1
 
@@ -57,6 +59,42 @@ def smooth(problem: Problem, count: int, seed: int) -> Float[np.ndarray, "count 
         last = np.where(np.arange(len(ends))[:, None] % 2, last, first + 0.1 * (last - first))
         vectors[:, columns] = first + np.linspace(0.0, 1.0, len(columns)) * (last - first)
     return vectors
+
+
+def starts(problem: Problem, several: int, most: int, seed: int) -> Iterator[Vector]:
+    """Yield starts, far from each other, the most promising first.
+
+    The first two are chosen from the robot as it is and a few drawn ones, by one batch. The others
+    are drawn when they are asked for: where the first two searches agree they are not needed.
+
+    Args:
+        problem: The problem.
+        several: Most starts.
+        most: Most robots that are drawn.
+        seed: Seed of the draws.
+    """
+    here = problem.start
+    own = problem.evaluate(here)
+    known = [] if own is None else [Candidate(here, own)]
+    if several == 1 and own is not None:
+        problem.set_sizes([own])
+        yield here
+        return
+    few = min(most, max(_FEW, 2 * problem.count))
+    half = max(1, most // 2)
+    drawn = np.stack([smooth(problem, half, seed), draw(half, problem.count, seed)], axis=1)
+    drawn = drawn.reshape(-1, problem.count)  # either kind in turn
+    used: list[Candidate] = []
+    for part, wanted in ((drawn[:few], min(2, several)), (drawn[few:], several)):
+        more = [Candidate(z, one) for z, one in evaluate_all(problem, part) if one is not None]
+        known += more
+        if known and not used:
+            problem.set_sizes([one.evaluation for one in known])
+        must = known[:1] if own is not None and not used else []
+        order = [one for one in ranked(problem, known) if one not in (*must, *used)]
+        chosen = spread_out(order, wanted, [*must, *used])[len(used) :]
+        used += chosen
+        yield from (one.z for one in ranked(problem, chosen))
 
 
 def evaluate_all(
@@ -132,14 +170,15 @@ def ranked(problem: Problem, found: Sequence[Candidate]) -> list[Candidate]:
     return [found[number] for number in np.argsort(merit, kind="stable")]
 
 
-def spread_out(candidates: Sequence[Candidate], count: int) -> list[Candidate]:
-    """Choose the best candidates that are not too near to each other."""
-    chosen: list[Candidate] = []
-    rest: list[Candidate] = []
+def spread_out(
+    candidates: Sequence[Candidate], count: int, chosen: Sequence[Candidate]
+) -> list[Candidate]:
+    """Add to chosen candidates the best that are not too near to them and to each other."""
+    found, rest = list(chosen), []
     for one in candidates:
         apart = _APART * np.sqrt(max(len(one.z), 1))
-        near = any(np.linalg.norm(one.z - other.z) < apart for other in chosen)
-        (rest if near else chosen).append(one)
-        if len(chosen) == count:
-            return chosen
-    return [*chosen, *rest][:count]
+        near = any(np.linalg.norm(one.z - other.z) < apart for other in found)
+        (rest if near else found).append(one)
+        if len(found) >= count:
+            break
+    return [*found, *rest][: max(count, len(chosen))]

@@ -14,6 +14,7 @@ from scipy.optimize import linprog
 
 from notchflex.designing.search.problem import Evaluation, Problem, Vector
 from notchflex.designing.search.rows import TOLERANCE
+from notchflex.designing.search.trails import Trail
 
 # The box at first, at most and at last, in parts of the ranges of the variables.
 _FIRST, _MOST, _LAST = 0.15, 0.5, 1e-4
@@ -79,7 +80,7 @@ class _Model:
 
 
 def approach(
-    problem: Problem, z: Vector, first: Evaluation, iterations: int
+    problem: Problem, z: Vector, first: Evaluation, iterations: int, trail: Trail
 ) -> tuple[Vector, Evaluation, int]:
     """Step to where limits hold, or are missed by least.
 
@@ -88,6 +89,7 @@ def approach(
         z: The start, scaled.
         first: The robot there, with derivatives.
         iterations: Most steps.
+        trail: Told of every step; ends the search where another one has been.
 
     Returns:
         Where it ended, the robot there with derivatives, and the number of steps.
@@ -116,5 +118,6 @@ def approach(
             box = 0.4 * min(box, float(np.abs(step).max()))
             continue
         z, one = np.clip(z + step, 0.0, 1.0), full
+        trail.pass_by(z)
         box = min(_MOST, 2.0 * box) if part > _GOOD else box
     return z, one, done

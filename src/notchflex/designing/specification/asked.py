@@ -16,6 +16,9 @@ from notchflex.designing.specification.fields import (
 )
 from notchflex.robot.part import Float, ProblemError, part, quantity
 
+# A coordinate beyond is in another unit, mm.
+_FARTHEST = 1e4
+
 
 @part(kw_only=True, refuse=REFUSE)
 class Measured:
@@ -47,6 +50,12 @@ class Measured:
         Literal["each", "largest", "smallest", "sum", "mean", "range", "steps", "rms"] | None,
         Field(description='how several numbers are made one: "largest", "sum", "range", ...'),
     ] = None
+
+    @model_validator(mode="after")
+    def _two_states(self) -> "Measured":
+        if self.minus is not None and self.minus == self.state:
+            raise ProblemError([("minus", "is the state itself; give another state.")])
+        return self
 
 
 @part(kw_only=True, refuse=REFUSE)
@@ -143,6 +152,10 @@ class TargetCurve:
     def _one_form(self) -> "TargetCurve":
         if (self.points is None) == (self.curvature is None):
             raise ProblemError([("points", "or `curvature` is needed; give one of them.")])
+        far = max((abs(x) for one in self.points or () for x in one), default=0.0)
+        if far > _FARTHEST:
+            text = f"has a coordinate of {far:g}; give mm, at most {_FARTHEST:g} mm."
+            raise ProblemError([("points", text)])
         if self.curvature is not None:
             lengths = [one[0] for one in self.curvature]
             rises = all(a < b for a, b in itertools.pairwise(lengths))

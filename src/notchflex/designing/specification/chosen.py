@@ -18,7 +18,7 @@ class DesignVariable:
         upper: Greatest value allowed.
         along: For a value of the notches: "all" have the same, "each" has its own, or "polynomial"
             along the tube.
-        degree: Degree of the polynomial.
+        degree: Degree of the polynomial; 1 if not given.
     """
 
     value: Annotated[str, Field(description="path of the robot file, or state.NAME.tension[1]")]
@@ -28,11 +28,16 @@ class DesignVariable:
         Literal["all", "each", "polynomial"],
         Field(description='"all" notches have the same value, "each" its own, or "polynomial"'),
     ] = "all"
-    degree: Annotated[Int, Field(ge=1, le=6, description="degree of the polynomial")] = 1
+    degree: Annotated[
+        Int | None, Field(ge=1, le=6, description="degree of the polynomial; 1 if not given")
+    ] = None
 
     @model_validator(mode="after")
     def _in_order(self) -> "DesignVariable":
         check_order(self.lower, self.upper, "set the value in the robot file")
+        if self.degree is not None and self.along != "polynomial":
+            text = f'is for along = "polynomial", and along is "{self.along}"; change one of them.'
+            raise ProblemError([("degree", text)])
         return self
 
 

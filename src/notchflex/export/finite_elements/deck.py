@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from notchflex.export.finite_elements.half_tube import HalfTube
 from notchflex.export.finite_elements.material_cards import material_cards, with_cards
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.tendon_spans import TendonSpan
+from notchflex.export.finite_elements.tube_mesh import TubeMesh
 from notchflex.robot import Robot
 
 # A contact this many times stiffer (N/mm³) than the modulus over 1 mm lets faces overlap little.
@@ -19,7 +19,7 @@ _PER_LINE = 12
 
 def deck(
     robot: Robot,
-    mesh: HalfTube,
+    mesh: TubeMesh,
     spans: list[TendonSpan],
     options: DeckOptions,
     comment: str = "",
@@ -28,7 +28,7 @@ def deck(
 
     Args:
         robot: The robot.
-        mesh: The mesh of half of it.
+        mesh: The mesh of it, or of half of it.
         spans: The straight pieces of its tendons, with the whole tension.
         options: Mesh, contact and end moment.
         comment: What stands at the head.
@@ -51,7 +51,7 @@ def deck(
         lines += tip
     if options.contact:
         lines += list(_contact(mesh, robot))
-    lines += ["*BOUNDARY", "NCLAMP,1,3", "NPLANE,2,2"]
+    lines += ["*BOUNDARY", "NCLAMP,1,3"] + (["NPLANE,2,2"] if mesh.is_half else [])
     if extra:
         lines += ["NFIXED,1,3"]
     lines += ["*INITIAL CONDITIONS,TYPE=TEMPERATURE", "NALL,0."]
@@ -61,8 +61,11 @@ def deck(
     lines += ["*TEMPERATURE", "NALL,1."] + (["NFIXED,1."] if extra else [])
     if tip:
         first = len(mesh.place) + len(extra) + 1
-        lines += ["*CLOAD", f"{first + 1},2,{0.5 * options.tip_moment:.10g}"]
+        side = np.radians(robot.notches[0].direction_deg - mesh.x_deg)
+        across = mesh.share * options.tip_moment * np.array([-np.sin(side), np.cos(side)])
+        lines += ["*CLOAD", *(f"{first + 1},{k},{m:.10g}" for k, m in enumerate(across, 1) if m)]
     lines += ["*NODE FILE", "U,RF", "*EL FILE", "S,E"]
+    lines += ["*NODE PRINT,NSET=NCLAMP,TOTALS=ONLY", "RF"]
     lines += ["*NODE PRINT,NSET=NRINGS", "U", "*END STEP", ""]
     return "\n".join(lines)
 
@@ -79,12 +82,14 @@ def _set(name: str, numbers: Iterable[int]) -> Iterator[str]:
         yield ",".join(map(str, each[start : start + _PER_LINE])) + ","
 
 
-def _sets(mesh: HalfTube, has_plate: bool) -> list[str]:
+def _sets(mesh: TubeMesh, has_plate: bool) -> list[str]:
     clamped = set(mesh.layer(0).tolist())
-    plane = set(mesh.in_plane().tolist()) - clamped
-    if has_plate:  # the plate holds its own nodes
-        plane -= set(mesh.layer(-1).tolist())
-    lines = [*_set("NCLAMP", clamped), *_set("NPLANE", plane)]
+    lines = list(_set("NCLAMP", clamped))
+    if mesh.is_half:
+        plane = set(mesh.in_plane().tolist()) - clamped
+        if has_plate:  # the plate holds its own nodes
+            plane -= set(mesh.layer(-1).tolist())
+        lines += _set("NPLANE", plane)
     rings = ring_layers(mesh)
     for number, index in enumerate(rings):
         lines += _set(f"NRING{number}", mesh.layer(index).tolist())
@@ -94,7 +99,7 @@ def _sets(mesh: HalfTube, has_plate: bool) -> list[str]:
     return lines
 
 
-def ring_layers(mesh: HalfTube) -> list[int]:
+def ring_layers(mesh: TubeMesh) -> list[int]:
     """Return the layers in the middle of the uncut lengths, base first, by their index along z.
 
     The base is layer 0 where it has no length.
@@ -105,7 +110,7 @@ def ring_layers(mesh: HalfTube) -> list[int]:
     return [int(np.argmin(np.abs(height - z))) for z in middle]
 
 
-def _springs(mesh: HalfTube, spans: list[TendonSpan]) -> list[str]:
+def _springs(mesh: TubeMesh, spans: list[TendonSpan]) -> list[str]:
     """Springs of constant force: their tension follows the line between their moving ends."""
     lines: list[str] = []
     fixed = len(mesh.place)
@@ -114,7 +119,7 @@ def _springs(mesh: HalfTube, spans: list[TendonSpan]) -> list[str]:
         if span.fixed is not None:
             fixed += 1
             ends.insert(0, fixed)
-        force = 0.5 * span.tension  # half of the tube
+        force = mesh.share * span.tension
         name = f"SPAN{number}"
         lines += [f"*ELEMENT,TYPE=SPRINGA,ELSET={name}"]
         lines += [f"{len(mesh.elements) + number},{ends[0]},{ends[1]}"]
@@ -124,15 +129,20 @@ def _springs(mesh: HalfTube, spans: list[TendonSpan]) -> list[str]:
     return lines
 
 
-def _tip_plate(mesh: HalfTube, extra: int) -> list[str]:
-    """A rigid plate on the end of the tube, which turns about y alone."""
+def _tip_plate(mesh: TubeMesh, extra: int) -> list[str]:
+    """A rigid plate on the end of the tube; on half a tube it turns about y alone."""
     first = len(mesh.place) + extra + 1
     end = float(mesh.heights[-1])
-    return [
+    lines = [
         "*NODE",
         f"{first},0.,0.,{end:.10g}",
         f"{first + 1},0.,0.,{end:.10g}",
         f"*RIGID BODY,NSET=NTIP,REF NODE={first},ROT NODE={first + 1}",
+    ]
+    if not mesh.is_half:
+        return lines
+    return [
+        *lines,
         "*BOUNDARY",
         f"{first},2,2",
         f"{first + 1},1,1",
@@ -140,15 +150,12 @@ def _tip_plate(mesh: HalfTube, extra: int) -> list[str]:
     ]
 
 
-def _contact(mesh: HalfTube, robot: Robot) -> Iterator[str]:
+def _contact(mesh: TubeMesh, robot: Robot) -> Iterator[str]:
     """Both faces of every notch, over the outer half of the opening, where they meet."""
     modulus = with_cards(robot.material).elastic_modulus
-    outer = 2 * mesh.cell[:, 1] >= mesh.opening + (mesh.nodes.shape[1] - 1 - mesh.opening) // 2
-    number = np.arange(1, len(mesh.cell) + 1)
     names: list[tuple[str, str]] = []
-    for notch, (low, high) in enumerate(mesh.faces.tolist(), start=1):
-        below = number[outer & (mesh.cell[:, 2] == low // 2 - 1)]
-        above = number[outer & (mesh.cell[:, 2] == high // 2)]
+    for notch, opening in enumerate(mesh.openings, start=1):
+        below, above = mesh.faces_of(opening)
         if not (len(below) and len(above)):
             continue
         names.append((f"LOWER{notch}", f"UPPER{notch}"))

@@ -6,30 +6,42 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from notchflex.errors import InputError
 from notchflex.export.finite_elements.deck import ring_layers
-from notchflex.export.finite_elements.half_tube import HalfTube
+from notchflex.export.finite_elements.tube_mesh import TubeMesh
 
 
 class RingMotion(NamedTuple):
     """Rigid motions of the middle of the uncut lengths, base first (n + 1 rings).
 
     Attributes:
-        angle: Turn of each in the plane, toward the notches, rad.
+        rotation: Turn of each, (n + 1, 3, 3).
         position: Where its centre has moved to, mm, (n + 1, 3).
     """
 
-    angle: Float[np.ndarray, " rings"]
+    rotation: Float[np.ndarray, "rings 3 3"]
     position: Float[np.ndarray, "rings 3"]
 
     @property
+    def angle(self) -> Float[np.ndarray, " rings"]:
+        """Turn in the plane x-z, toward x, rad."""
+        return np.arctan2(self.rotation[:, 0, 2], self.rotation[:, 2, 2])
+
+    @property
     def notch_angle(self) -> Float[np.ndarray, " n"]:
-        """Turn between neighbouring rings, rad."""
+        """Turn between neighbouring rings of a robot that bends in the plane x-z, rad."""
         return np.diff(self.angle)
 
+    @property
+    def notch_turn(self) -> Float[np.ndarray, "n 3"]:
+        """Turn of each ring against the one before, as a vector in the frame of that, rad."""
+        relative = np.swapaxes(self.rotation[:-1], 1, 2) @ self.rotation[1:]
+        return Rotation.from_matrix(relative).as_rotvec()
 
-def read_rings(mesh: HalfTube, text: str) -> RingMotion:
+
+def read_rings(mesh: TubeMesh, text: str) -> RingMotion:
     """Return the motions of the rings from the last step of a .dat file of CalculiX.
 
     Args:
@@ -40,7 +52,7 @@ def read_rings(mesh: HalfTube, text: str) -> RingMotion:
         InputError: The file has no displacements of the rings.
     """
     moved = _displacements(text)
-    angle, position = [], []
+    rotation, position = [], []
     for index in ring_layers(mesh):
         numbers = mesh.layer(index)
         missing = [number for number in numbers.tolist() if number not in moved]
@@ -51,17 +63,13 @@ def read_rings(mesh: HalfTube, text: str) -> RingMotion:
             )
         start = mesh.place[numbers - 1]
         end = start + np.array([moved[number] for number in numbers.tolist()])
+        if mesh.is_half:  # the other half mirrors this one
+            start, end = (np.concatenate([one, one * [1.0, -1.0, 1.0]]) for one in (start, end))
         middle = np.array([0.0, 0.0, mesh.heights[index]])
-        # The other half mirrors this one: a turn in the plane x-z, and no motion across.
-        a, b = (start - middle)[:, [0, 2]], (end - end.mean(axis=0))[:, [0, 2]]
-        a = a - a.mean(axis=0)
-        sine = float(np.sum(a[:, 1] * b[:, 0] - a[:, 0] * b[:, 1]))
-        turn = np.arctan2(sine, float(np.sum(a * b)))
-        angle.append(turn)
-        rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-        centre = end.mean(axis=0)[[0, 2]] - rotation @ (start - middle).mean(axis=0)[[0, 2]]
-        position.append([centre[0], 0.0, centre[1]])
-    return RingMotion(np.array(angle), np.array(position))
+        turn = Rotation.align_vectors(end - end.mean(axis=0), start - start.mean(axis=0))[0]
+        rotation.append(turn.as_matrix())
+        position.append(end.mean(axis=0) - turn.apply(start.mean(axis=0) - middle))
+    return RingMotion(np.array(rotation), np.array(position))
 
 
 def _displacements(text: str) -> dict[int, list[float]]:

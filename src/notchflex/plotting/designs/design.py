@@ -87,10 +87,10 @@ def _variables(made: Design) -> Panel:
     items: list[Mark] = [
         Bars(after, names, [SKY] * len(chosen)),
         Span("x", 1.0, 1.0, BLACK),
-        dots(points, BLACK, 4.0, name="before", hollow=True, layer=4),
+        dots(points, BLACK, 4.0, hollow=True, layer=4),
     ]
-    label = "from least (0) to greatest (1) value"
-    return Panel(items, label, "", title="variables", legend=BELOW, x_range=(0.0, 1.15))
+    label = "from least (0) to greatest (1) value; circle: before"
+    return Panel(items, label, "", title="variables", x_range=(0.0, 1.15))
 
 
 def _numbers(one: WishResult) -> Panel:
