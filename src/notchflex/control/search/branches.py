@@ -16,7 +16,7 @@ from notchflex.control.search.find import find, meet
 from notchflex.control.search.problem import Attempt, Problem
 from notchflex.control.search.search_point import largest_violation, limit_rows
 from notchflex.control.search.smaller import smaller_tensions
-from notchflex.control.search.starts import corners, other_starts
+from notchflex.control.search.starts import corners, other_starts, taut_may_do
 from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]
@@ -133,14 +133,19 @@ def find_anyhow(
     """
     # Where other tendons move, a tendon slides within its dead band too.
     alone = bool(np.count_nonzero(start[problem.driven]) < 2)
-    best = first = meet(problem, before, start, goal, known)
+    taut = problem.driven & (start > problem.low)
+    own, few = problem._replace(driven=taut), 0 < taut.sum() < problem.driven.sum()
+    # Where a tendon turns round, one that is slack may seem to serve instead.
+    tried = few and known is not None and taut_may_do(problem, taut, goal, known)
+    best = first = meet(own if tried else problem, before, start, goal, known)
     solves = best.solves
-    taut = problem.driven & (start > 0.0)
-    if best.failure is not None and 0 < taut.sum() < problem.driven.sum():
-        # Where a tendon turns round, one that is slack may seem to serve instead.
-        own = problem._replace(driven=taut)
-        best = meet(own, before, start, goal, known)
+    if best.failure is not None and tried:
+        best = first = meet(problem, before, start, goal, known)
         solves += best.solves
+    if best.failure is not None and few:
+        if not tried:
+            best = meet(own, before, start, goal, known)
+            solves += best.solves
         if best.failure is not None:
             best = find(own, before, start, goal, known, over_bands=alone, patient=False)
             solves += best.solves
@@ -175,7 +180,6 @@ def find_anyhow(
     for corner in corners(problem, before, start, taut) if taut.sum() > 1 else ():
         if best.failure is None:
             break
-        own = problem._replace(driven=taut)
         other = find(own, before, corner, goal, over_bands=False, patient=False)
         solves += other.solves
         best = min(best, other, key=_quality)

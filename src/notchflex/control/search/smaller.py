@@ -24,12 +24,18 @@ _FURTHER, _MORE = 0.01, 4.0
 # From below, slopes lead to the end; this part of the way, so as not to pass it.
 _PART_OF_WAY = 0.9999
 _MOST_SOLVES = 30
+# Tendons that were slack and are pulled by this part of the largest tension at most are tried to do
+# without.
+_SMALL = 0.1
 # A tendon that has slid by less than this since the state before, mm, is at an end of the range in
 # which it sticks, or within.
 _NO_SLIP = 1e-6
 # Notches are taken to be pressed together where the target changes by less than this (mm, N or rad)
-# for a change of the tension by as much as itself.
+# for a change of the tension by what about closes a notch.
 _STUCK = 0.1
+# The end of the range in which the first contact sticks is passed by this part of it: then slopes
+# are those of a tendon that slides, and nothing lower holds.
+_PASSED = 1e-9
 
 
 def smaller_tensions(
@@ -55,7 +61,7 @@ def smaller_tensions(
     low, _ = problem.model.dead_band(before)
     for tendon in np.flatnonzero(problem.driven & (found.drive > problem.low)):
         sticks = problem.model.slip(before, found.response.state)[tendon] <= _NO_SLIP
-        if sticks or _steepness(problem, goal, found, tendon) * found.drive[tendon] <= _STUCK:
+        if sticks or _holds(problem, goal, found, int(tendon)):
             found = _lowered(problem, before, goal, found, int(tendon), float(low[tendon]))
     return found
 
@@ -66,7 +72,8 @@ def _without_others(
     """Meet the target by the tendons that were taut, if that takes less."""
     taut = problem.driven & (start > problem.low)
     slack = problem.driven & ~taut & (found.drive > problem.low)
-    if not slack.any() or not taut.any():
+    drives = found.drive
+    if not slack.any() or not taut.any() or drives[slack].max() > _SMALL * drives.max():
         return found
     own, least, solves = problem._replace(driven=taut), found, found.solves
     rest = np.where(problem.driven & ~taut, problem.low, found.drive)
@@ -89,6 +96,7 @@ def _lowered(
     """Lower one tension as far as the target stays met."""
     floor, best, solves = float(problem.low[tendon]), found, found.solves
     below, further = None, _FURTHER
+    edge *= 1.0 - _PASSED
     guess = edge if floor < edge < found.drive[tendon] else _just_below(best, tendon)
     for _ in range(_MOST_SOLVES):
         guess = max(guess, floor)
@@ -98,7 +106,7 @@ def _lowered(
         if there.failure is None:
             nudged = top - guess <= 2.0 * _EXACT * top
             best, top = there, guess
-            if guess <= floor:
+            if guess <= floor or (guess == edge and not _holds(problem, goal, best, tendon)):
                 break
             if not nudged:
                 guess = _just_below(best, tendon)
@@ -138,6 +146,11 @@ def _way_up(problem: Problem, goal: np.ndarray, there: Attempt, tendon: int) -> 
     """How much higher the tension must be to meet the target, by the slopes; NaN if unknown."""
     steep = _steepness(problem, goal, there, tendon)
     return there.error / steep if steep > 0.0 and there.response.converged else np.nan
+
+
+def _holds(problem: Problem, goal: np.ndarray, there: Attempt, tendon: int) -> bool:
+    """Whether the slopes by a tension are those of notches that are pressed together."""
+    return _steepness(problem, goal, there, tendon) * problem.unit <= _STUCK
 
 
 def _steepness(problem: Problem, goal: np.ndarray, there: Attempt, tendon: int) -> float:

@@ -8,7 +8,8 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Float
 
-from notchflex.control.search.problem import Problem
+from notchflex.control.program.response import Response
+from notchflex.control.search.problem import Problem, size_of
 
 # Just beyond the dead bands of the present drives, by this part of them,
 _BEYOND_BAND = 1e-3
@@ -16,6 +17,8 @@ _BEYOND_BAND = 1e-3
 _STARTS = (0.5, 0.1, 0.0)
 # from each tendon pulled alone by this part of what about closes a notch.
 _ALONE = 0.15
+# The part of the way to a target that slopes may leave, for drives to be worth trying.
+_MAY_DO = 0.5
 # Of more tendons than these not all combinations of sides are tried.
 _MOST_CORNERS = 3
 
@@ -46,6 +49,30 @@ def other_starts(
         alone = np.maximum(problem.low, 0.0)
         alone[tendon] += _ALONE * problem.unit
         yield alone, True
+
+
+def taut_may_do(
+    problem: Problem,
+    taut: Bool[np.ndarray, " t"],
+    goal: Float[np.ndarray, " m"],
+    known: Response,
+) -> bool:
+    """Whether slopes promise that tendons that are taut come near a target without the others.
+
+    Args:
+        problem: What is aimed at.
+        taut: Which tendons those are.
+        goal: The target; NaN where an entry is free.
+        known: Values and slopes of the state before.
+    """
+    rows = ~np.isnan(goal)
+    weights, entries = problem.weights[rows], problem.entries[rows]
+    miss = weights * (goal[rows] - known.values[entries])
+    slopes = weights[:, None] * known.sliding[entries][:, taut]
+    if not np.isfinite(slopes).all():
+        return False
+    step = np.linalg.lstsq(slopes, miss, rcond=None)[0]
+    return size_of(miss - slopes @ step) <= _MAY_DO * size_of(miss)
 
 
 def corners(
