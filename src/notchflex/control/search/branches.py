@@ -143,9 +143,8 @@ def find_anyhow(
         best = first = meet(problem, before, start, goal, known)
         solves += best.solves
     if best.failure is not None and few:
-        if not tried:
-            best = meet(own, before, start, goal, known)
-            solves += best.solves
+        best = best if tried else meet(own, before, start, goal, known)
+        solves += 0 if tried else best.solves
         if best.failure is not None:
             best = find(own, before, start, goal, known, over_bands=alone, patient=False)
             solves += best.solves
@@ -177,10 +176,8 @@ def find_anyhow(
         other = find(problem, before, few, goal, patient=False)
         solves += other.solves
         best = min(best, other, key=_quality)
-    for corner in corners(problem, before, start, taut) if taut.sum() > 1 else ():
-        if best.failure is None:
-            break
-        other = find(own, before, corner, goal, over_bands=False, patient=False)
+    if best.failure is not None and taut.sum() > 1:
+        other = _from_corners(own, before, start, goal, best)
         solves += other.solves
         best = min(best, other, key=_quality)
     if best.failure is Failure.SEARCH_STOPPED:
@@ -222,6 +219,20 @@ def _meet_from(
         if nearest.failure is None:
             break
     return nearest._replace(solves=solves)
+
+
+def _from_corners(
+    problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray, best: Attempt
+) -> Attempt:
+    """Search from just beyond all dead bands, on every side of them; return the best."""
+    solves = 0
+    for corner in corners(problem, before, start, problem.driven):
+        other = find(problem, before, corner, goal, over_bands=False, patient=False)
+        solves += other.solves
+        best = min(best, other, key=_quality)
+        if best.failure is None:
+            break
+    return best._replace(solves=solves)
 
 
 def _find_within(
