@@ -59,3 +59,14 @@ def test_nothing_moves_within_the_dead_band_and_something_beyond(unloads):
     for outside in (low - 1e-3, high + 1e-3):
         moved = made.solve(here.state, outside).values - here.values
         assert np.abs(moved).max() > 1e-4
+
+
+def test_a_dead_band_is_there_whatever_rounding_does_to_the_sliding_contact():
+    """The log ratio of a contact that slides misses its bound by rounding, to either side."""
+    made = model(WRIST, OUTPUTS)
+    state = made.first
+    for tension in np.linspace(0.3, 1.7, 57):
+        state = made.solve(state, np.array([tension])).state
+        low, high = made.dead_band(state)
+        assert low[0] < 0.995 * tension
+        assert high[0] >= tension

@@ -50,6 +50,8 @@ def differences(robot: Robot, other: Robot) -> list[str]:
 
 def mismatch(robot: Robot, other: Robot) -> str:
     """Describe in a few words how a robot differs from another one; "" where it does not."""
+    if robot is other:  # robots do not change
+        return ""
     changed = differences(robot, other)
     more = len(changed) - _MOST
     return ", ".join(changed[:_MOST]) + (f" and {more} more" if more > 0 else "")

@@ -12,14 +12,18 @@ from notchflex.sensing.model import SensingModel, Step
 from notchflex.solver.continuation import SolverState
 from notchflex.solver.programs.run import SolverRun
 
-# Lengths that are tried of a step.
+# Lengths that are tried of a step: of what slopes promise, and where that fails of any.
+_WHOLE = np.array([1.0])
 _FULL = np.array([1.0, 0.5, 0.2, 0.05, 0.01])
+_NEAR = np.array([1.02, 1.0, 0.98, 0.9])
 _REACH = np.array([2.0, 1.4, 1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001])
 _BETWEEN = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 _MOST_STEPS, _MOST_REACHES, _MOST_HALVINGS = 20, 16, 6
 # A fit that misses the readings by more than this, in squares of the noise for each number that
 # was read, is tried again from all over the range.
 _BAD_FIT, _STARTS = 12.0, 9
+# A whole step is taken where it brings this part of what slopes promise.
+_GOOD_GAIN = 0.5
 # The search ends where the misfit falls, or an extreme moves, by less than these parts.
 _SMALL_GAIN, _SMALL_MOVE = 1e-9, 1e-3
 # Ends of an interval are found to this part of the range.
@@ -136,8 +140,13 @@ def best(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate
         step = np.linalg.solve(normal, slopes.T @ at.deviations)
         size = np.abs(step).max()
         step *= min(1.0, 0.5 * problem.model.largest / max(size, 1e-300))
-        tried = problem.candidates(problem.clipped(at.force + np.outer(_FULL, step)))
-        new = min(tried, key=lambda one: one.misfit)
+        promised = at.misfit - ((at.deviations - slopes @ step) ** 2).sum()
+        new = at
+        for lengths in (_WHOLE, _FULL):
+            tried = problem.candidates(problem.clipped(at.force + np.outer(lengths, step)))
+            new = min(tried, key=lambda one: one.misfit)
+            if at.misfit - new.misfit >= _GOOD_GAIN * promised > 0.0:
+                break
         gain = at.misfit - new.misfit
         if gain <= 0.0:
             break
@@ -196,8 +205,13 @@ def extreme(
     beyond = None
     for _ in range(_MOST_REACHES):
         move = _step_along(problem, at, direction, most)
-        ahead, beyond = _farthest(problem, at, at.force + np.outer(_REACH, move), direction, most)
-        gain = direction @ (ahead.force - at.force)
+        ahead, gain = at, 0.0
+        for lengths in (_NEAR, _REACH):
+            forces = at.force + np.outer(lengths, move)
+            ahead, beyond = _farthest(problem, at, forces, direction, most)
+            gain = direction @ (ahead.force - at.force)
+            if gain > 0.0:
+                break
         at = ahead
         if gain <= _SMALL_MOVE * (direction @ (at.force - origin)):
             break

@@ -45,6 +45,7 @@ class _Places(NamedTuple):
         stroke: Its stroke, (t,).
         first_ratio: Log ratio of its first contact, (t,).
         first_bound: Largest of that, (t,).
+        first_slid: How far it has slid, (t,).
         bounds: Of all its contacts, one array per tendon.
     """
 
@@ -52,6 +53,7 @@ class _Places(NamedTuple):
     stroke: np.ndarray
     first_ratio: np.ndarray
     first_bound: np.ndarray
+    first_slid: np.ndarray
     bounds: tuple[np.ndarray, ...]
 
 
@@ -169,6 +171,13 @@ class DriveModel:
         ratio, bound = state[places.first_ratio], state[places.first_bound]
         return dead_band(self.drives(state), ratio, bound, by_stroke)
 
+    def slip(
+        self, before: Float[np.ndarray, " state"], after: Float[np.ndarray, " state"]
+    ) -> Float[np.ndarray, " t"]:
+        """Return how far every tendon has slid at its first contact from one state to another."""
+        first = self._places.first_slid
+        return np.abs(after[first] - before[first])
+
     def friction(self, state: Float[np.ndarray, " state"]) -> Float[np.ndarray, " t"]:
         """Return the logarithm of the largest tension ratio over all contacts of every tendon."""
         return np.array([state[places].sum() for places in self._places.bounds])
@@ -178,18 +187,20 @@ class DriveModel:
         long = self.prepared.long
         numbers: SolverState = jax.tree.unflatten(long.state.structure, long.state.indices)
         chain = self.prepared.chain
-        ratios, bounds = ([np.zeros(0, int)] * chain.tendons for _ in range(2))
+        ratios, bounds, slides = ([np.zeros(0, int)] * chain.tendons for _ in range(3))
         memory: Any = numbers.memory
-        for group, ratio, bound in zip(chain.groups, memory.log_ratio, memory.bound, strict=True):
+        every = zip(chain.groups, memory.log_ratio, memory.bound, memory.slid, strict=True)
+        for group, ratio, bound, slid in every:
             for column, tendon in enumerate(group.numbers):
                 edges = np.asarray(chain.contacts)[tendon]
                 edges = edges[edges >= 0]
                 ratios[tendon] = ratio[edges // 2, column, edges % 2]
                 bounds[tendon] = bound[edges // 2, column, edges % 2]
+                slides[tendon] = slid[edges // 2, column, edges % 2]
         point: Any = numbers.point
-        ratio, bound = (np.array([one[0] for one in every]) for every in (ratios, bounds))
+        ratio, bound, slid = (np.array([one[0] for one in of]) for of in (ratios, bounds, slides))
         drawn: Any = numbers.stroke
-        return _Places(point.base_tension, drawn, ratio, bound, tuple(bounds))
+        return _Places(point.base_tension, drawn, ratio, bound, slid, tuple(bounds))
 
     @cached_property
     def slices(self) -> dict[str, slice]:

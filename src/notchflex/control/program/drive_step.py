@@ -22,6 +22,9 @@ SLACK = 1e-10
 NO_SLOPE = 1e-12
 """Slopes whose square is this part of others move nothing."""
 
+# A contact that slides may exceed its bound by this part of it, by rounding.
+_ROUNDING = 1e-9
+
 # What a step weighs beside the error of the target, as a part of the slopes, for a target as far as
 # the drives reach.
 _DAMPING = 0.01
@@ -95,7 +98,7 @@ def dead_band(
         by_stroke: Which drives are strokes, (t,).
     """
     xp = array_module(drive)
-    still = by_stroke | (xp.abs(ratio) > bound)
+    still = by_stroke | (xp.abs(ratio) > (1.0 + _ROUNDING) * bound)
     low, high = (drive * xp.exp(-ratio + side * bound) for side in (-1.0, 1.0))
     low = xp.where(still, drive, xp.minimum(low, drive))
     return low, xp.where(still, drive, xp.maximum(high, drive))

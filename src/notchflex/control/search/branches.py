@@ -6,7 +6,6 @@ either branch: by pulling up to it, or by pulling beyond it and letting go.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,6 +15,8 @@ from notchflex.control.program.response import Response
 from notchflex.control.search.find import find, meet
 from notchflex.control.search.problem import Attempt, Problem
 from notchflex.control.search.search_point import largest_violation, limit_rows
+from notchflex.control.search.smaller import smaller_tensions
+from notchflex.control.search.starts import corners, other_starts, taut_may_do
 from notchflex.errors import Failure
 
 Approach = Literal["direct", "loading", "unloading", "least"]
@@ -24,14 +25,8 @@ Approach = Literal["direct", "loading", "unloading", "least"]
 _BEYOND = 0.05
 # Limits count as kept within this part of them.
 _KEPT = 1e-6
-# Where the search from the present drives fails, it starts again just beyond their dead bands, by
-# this part of them,
-_BEYOND_BAND = 1e-3
-# from these parts of them,
-_STARTS = (0.5, 0.1, 0.0)
-# from each tendon pulled alone by this part of what about closes a notch,
-_ALONE = 0.15
-# and from the best that it found without the drives that are smaller than this part of the largest,
+# Where the search from the present drives and others fails, it starts again from the best that it
+# found without the drives that are smaller than this part of the largest.
 _SMALL = 0.2
 # A target is out of reach where one of so many last searches brings less than this part of the
 # error.
@@ -74,6 +69,7 @@ def approach_target(
         known: Values and slopes of the state before, where they are known.
     """
     direct = find_anyhow(problem, before, start, goal, known)
+    direct = smaller_tensions(problem, before, start, goal, direct)
     ways = [Way(None, direct, direct.solves)]
     if approach == "direct" or not direct.response.converged:
         return ways[0]
@@ -89,6 +85,7 @@ def approach_target(
         if not between.converged or not _allowed(problem, between):
             continue
         last = find_anyhow(problem, between.state, via, goal, None)
+        last = smaller_tensions(problem, between.state, via, goal, last)
         right_way = (_change(problem, via, last.drive) < 0.0) is over
         if right_way or last.failure is not None:
             ways.append(Way(via, last, last.solves + 1))
@@ -136,13 +133,21 @@ def find_anyhow(
     """
     # Where other tendons move, a tendon slides within its dead band too.
     alone = bool(np.count_nonzero(start[problem.driven]) < 2)
-    best = first = meet(problem, before, start, goal, known)
+    taut = problem.driven & (start > problem.low)
+    own, few = problem._replace(driven=taut), 0 < taut.sum() < problem.driven.sum()
+    # Where a tendon turns round, one that is slack may seem to serve instead.
+    tried = few and known is not None and taut_may_do(problem, taut, goal, known)
+    best = first = meet(own if tried else problem, before, start, goal, known)
     solves = best.solves
-    taut = problem.driven & (start > 0.0)
-    if best.failure is not None and 0 < taut.sum() < problem.driven.sum():
-        # Where a tendon turns round, one that is slack may seem to serve instead.
-        best = meet(problem._replace(driven=taut), before, start, goal, known)
+    if best.failure is not None and tried:
+        best = first = meet(problem, before, start, goal, known)
         solves += best.solves
+    if best.failure is not None and few:
+        best = best if tried else meet(own, before, start, goal, known)
+        solves += 0 if tried else best.solves
+        if best.failure is not None:
+            best = find(own, before, start, goal, known, over_bands=alone, patient=False)
+            solves += best.solves
     if best.failure is None:
         return best._replace(solves=solves)
     best = find(problem, before, start, goal, known, over_bands=alone, patient=False)
@@ -151,7 +156,7 @@ def find_anyhow(
         other = find(problem, before, start, goal, known, over_bands=not alone, patient=False)
         solves += other.solves
         best = min(best, other, key=_quality)
-    others = [(best.drive, True), *_other_starts(problem, before, start)]
+    others = [(best.drive, True), *other_starts(problem, before, start)]
     if best.failure is not None:
         other = _meet_from(problem, before, [drive for drive, _ in others], goal, first, best.error)
         solves += other.solves
@@ -169,6 +174,10 @@ def find_anyhow(
     if best.failure is not None and problem.driven.sum() > 1:
         few = np.where(best.drive < _SMALL * best.drive.max(), problem.low, best.drive)
         other = find(problem, before, few, goal, patient=False)
+        solves += other.solves
+        best = min(best, other, key=_quality)
+    if best.failure is not None and taut.sum() > 1:
+        other = _from_corners(own, before, start, goal, best)
         solves += other.solves
         best = min(best, other, key=_quality)
     if best.failure is Failure.SEARCH_STOPPED:
@@ -212,6 +221,20 @@ def _meet_from(
     return nearest._replace(solves=solves)
 
 
+def _from_corners(
+    problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray, best: Attempt
+) -> Attempt:
+    """Search from just beyond all dead bands, on every side of them; return the best."""
+    solves = 0
+    for corner in corners(problem, before, start, problem.driven):
+        other = find(problem, before, corner, goal, over_bands=False, patient=False)
+        solves += other.solves
+        best = min(best, other, key=_quality)
+        if best.failure is None:
+            break
+    return best._replace(solves=solves)
+
+
 def _find_within(
     problem: Problem, before: np.ndarray, start: np.ndarray, goal: np.ndarray
 ) -> Attempt:
@@ -233,28 +256,6 @@ def _settled(problem: Problem, before: np.ndarray, best: Attempt, goal: np.ndarr
         if best.failure is not Failure.SEARCH_STOPPED:
             break
     return best._replace(solves=solves)
-
-
-def _other_starts(
-    problem: Problem, before: np.ndarray, start: np.ndarray
-) -> Iterator[tuple[np.ndarray, bool]]:
-    """Yield drives to start from, and whether the search leaves dead bands out.
-
-    Drives just beyond the dead band of each tendon, parts of all, and each tendon pulled alone.
-    """
-    driven = np.flatnonzero(problem.driven)
-    taut = [tendon for tendon in driven if start[tendon] > 0.0]
-    for tendon in taut if len(taut) > 1 else ():
-        for side, edge in zip((-1.0, 1.0), problem.model.dead_band(before), strict=True):
-            beyond = start.copy()
-            beyond[tendon] = (1.0 + side * _BEYOND_BAND) * edge[tendon]
-            yield beyond, False
-    for part in _STARTS:
-        yield part * start, True
-    for tendon in driven:
-        alone = np.maximum(problem.low, 0.0)
-        alone[tendon] += _ALONE * problem.unit
-        yield alone, True
 
 
 def _quality(attempt: Attempt) -> tuple[bool, bool, float]:
