@@ -151,10 +151,8 @@ class FibreLaw(SectionLaw):
         sums = _same_sums(slopes, self, fibres, memory, strain, curvature)
         by_strain, by_curvature = joint.step(curvature, sums, slopes)
         if not isinstance(memory, tuple):
-            own = _along(strain, curvature, fibres.arm)
-            transformed, slope = self._transformed(own, memory, self._curves(memory))
-            moved = _along(by_strain, by_curvature, held.arm)
-            memory = transformed + jax.lax.stop_gradient(slope) * moved
+            moves = strain, curvature, by_strain, by_curvature
+            memory = self._remember(fibres, memory, held.arm, moves)
         return Bending(
             curvature=curvature + by_curvature,
             moment=sums.moment + slopes.mixed * by_strain + slopes.bending * by_curvature,
@@ -167,10 +165,6 @@ class FibreLaw(SectionLaw):
         """Sums over the fibres of a section, or of many."""
         curves = self._curves(memory)
 
-        def some(array: Array) -> Array:
-            parts = jnp.reshape(array, (*array.shape[:-1], -1, _AT_ONCE))
-            return jnp.moveaxis(parts, -2, 0)
-
         def add(total: _Sums, some: tuple[Array, Array, Any]) -> tuple[_Sums, None]:
             arm, area, past = some
             own = _along(strain, curvature, arm)
@@ -182,9 +176,26 @@ class FibreLaw(SectionLaw):
             return jax.tree.map(jnp.add, total, added), None
 
         none = _Sums(*[jnp.zeros_like(strain)] * len(_Sums._fields))
-        every = some(fibres.arm), some(fibres.area), jax.tree.map(some, memory)
-        sums = jax.lax.scan(add, none, every)[0]
+        every = fibres.arm, fibres.area, memory
+        sums = jax.lax.scan(add, none, jax.tree.map(_in_parts, every))[0]
         return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
+
+    def _remember(
+        self, fibres: Fibres, memory: Array, held: Array, moves: tuple[Array, ...]
+    ) -> Array:
+        """Memory after the strains of the last step but one and what the last one adds."""
+        curves = self._curves(memory)
+        strain, curvature, by_strain, by_curvature = moves
+
+        def some(none: None, some: tuple[Array, Array, Array]) -> tuple[None, Array]:
+            arm, still, past = some
+            transformed, slope = self._transformed(_along(strain, curvature, arm), past, curves)
+            moved = _along(by_strain, by_curvature, still)
+            return none, transformed + jax.lax.stop_gradient(slope) * moved
+
+        every = jax.tree.map(_in_parts, (fibres.arm, held, memory))
+        found = jnp.moveaxis(jax.lax.scan(some, None, every)[1], 0, -2)
+        return jnp.reshape(found, memory.shape)
 
     def _transformed(self, strain: Array, past: Any, curves: list[_Curve]) -> tuple[Array, Array]:
         """Transformed strain of fibres after a strain, and its change with that strain."""
@@ -332,6 +343,12 @@ def _is_still(tangent: Any) -> bool:
 
 
 _same_sums.defjvp(_change_of_sums, symbolic_zeros=True)
+
+
+def _in_parts(array: Array) -> Array:
+    """Values of fibres in parts, which become the leading axis."""
+    parts = jnp.reshape(array, (*array.shape[:-1], -1, _AT_ONCE))
+    return jnp.moveaxis(parts, -2, 0)
 
 
 def _along(strain: Array, curvature: Array, arm: Array) -> Array:
