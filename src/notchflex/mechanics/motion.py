@@ -88,7 +88,7 @@ def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[A
     if array_module(matrix, other) is np:
         return matrix @ other
     every = matrix.reshape(*matrix.shape, *(1,) * (other.ndim - 1))
-    return (every * other).sum(axis=1)
+    return (every * other[None]).sum(axis=1)
 
 
 def angular(twist: Float[Array, "w ..."]) -> int:

@@ -139,7 +139,8 @@ class FibreLaw(SectionLaw):
         """Bend sections between their ends; the last of Newton's steps is differentiated."""
         fibres, ends = section.fibres, section.ends
         assert fibres is not None
-        weak, share = (0.0, 0.0) if ends is None else (ends.weak, ends.material_share)
+        none = jnp.zeros_like(reduced)
+        weak, share = (none, none) if ends is None else (ends.weak, ends.material_share)
         rigidity = self.elastic_modulus * section.second_moment_weak
         joint = _Joint(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
         start = reduced / (1.0 + weak)

@@ -250,10 +250,15 @@ def elastic_resultants(
     if ends is not None:
         across = across / (1.0 + ends.sway)
         along_x = along_x / (1.0 + ends.push)
+    sideways = elastic_modulus * section.second_moment_strong * about_x
+    torsion = shear_modulus * section.torsion_constant * free_twist
+    if ends is not None:
+        sideways = sideways + elastic_modulus * ends.oblique * twist
+        torsion = torsion + elastic_modulus * ends.oblique * strain[0]
     resultants = [
-        elastic_modulus * section.second_moment_strong * about_x,
+        sideways,
         elastic_modulus * section.second_moment_weak * about_y,
-        shear_modulus * section.torsion_constant * free_twist - section.shear_centre * across,
+        torsion - section.shear_centre * across,
         shear * along_x,
         across,
         elastic_modulus * section.area * stretch,
