@@ -112,42 +112,45 @@ class ArrayLowering:
         shape = np.broadcast_shapes(*(refs.shape for refs in arrays))
         if 0 in shape:
             return _empty(shape)
-        operands = [np.broadcast_to(self.loaded(refs), shape) for refs in arrays]
-        if not self._lanes_match([refs.reshape(-1) for refs in operands]):
+        flat = [np.broadcast_to(self.loaded(refs), shape).reshape(-1) for refs in arrays]
+        columns = self._matching(flat)
+        if columns is None:
+            operands = [refs.reshape(shape) for refs in flat]
             axis = self._best_axis(operands)
-            operands = [self.rows(refs, axis) for refs in operands]
-        flat = [refs.reshape(-1) for refs in operands]
+            flat = [self.rows(refs, axis).reshape(-1) for refs in operands]
+            columns = _distinct_columns(np.stack(flat) >> LANE_BITS)
         if len(flat[0]) == 1:  # most often; this is quicker
             single = [int(refs[0]) for refs in flat]
             node = self.nodes.make(op, tuple(one >> LANE_BITS for one in single))
             lane = max(one & LANE_MASK for one in single) if self.graph.length[node] > 1 else 0
             return np.array(reference(node, lane)).reshape(shape)
-        nodes = np.stack([refs >> LANE_BITS for refs in flat])
-        lanes = np.max([refs & LANE_MASK for refs in flat], axis=0)
-        first, where = _distinct_columns(nodes)
-        columns = nodes[:, first].T.tolist()
-        made = [self.nodes.make(op, tuple(column)) for column in columns]
-        results = np.array(made, np.int64)[where]
-        lanes = np.where(self.graph.length[results] > 1, lanes, 0)
-        return ((results << LANE_BITS) + lanes).reshape(shape)
+        every, (first, where) = np.stack(flat), columns
+        nodes = (every[:, first] >> LANE_BITS).T.tolist()
+        results = np.array([self.nodes.make(op, tuple(column)) for column in nodes], np.int64)
+        wide = (self.graph.length[results] > 1)[where]
+        lanes = np.where(wide, (every & LANE_MASK).max(axis=0), 0)
+        return ((results[where] << LANE_BITS) + lanes).reshape(shape)
 
-    def _lanes_match(self, flat: list[References]) -> bool:
-        """Return whether rows meet in the same lanes and most of their lanes are used."""
-        lengths = [self.graph.length[refs >> LANE_BITS] for refs in flat]
-        if all((length == 1).all() for length in lengths):
-            return True
-        longest = np.max(lengths, axis=0)
-        lane = np.max([refs & LANE_MASK for refs in flat], axis=0)
-        for refs, length in zip(flat, lengths, strict=True):
-            row = length > 1
-            if (row & ((length != longest) | ((refs & LANE_MASK) != lane))).any():
-                return False
+    def _matching(self, flat: list[References]) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the sets of rows that meet, as `_distinct_columns`.
+
+        None where they do not meet in the same lanes or most of their lanes are not used.
+        """
+        every = np.stack(flat)
+        nodes, lanes = every >> LANE_BITS, every & LANE_MASK
+        lengths = self.graph.length[nodes]
+        longest = lengths.max(axis=0)
+        columns = _distinct_columns(nodes)
+        if longest.max() == 1:
+            return columns
+        lane = lanes.max(axis=0)
+        if ((lengths > 1) & ((lengths != longest) | (lanes != lane))).any():
+            return None
         # Of every set of rows that meet: is the share of lanes in use large enough?
-        nodes = np.stack([refs >> LANE_BITS for refs in flat])
-        first, where = _distinct_columns(nodes)
-        used = np.unique(where.astype(np.int64) * (1 << 24) + lane)
-        counts = np.bincount(used >> 24, minlength=len(first))
-        return bool((counts >= _DENSE * longest[first]).all())
+        first, where = columns
+        used = {*zip(where.tolist(), lane.tolist(), strict=True)}
+        counts = np.bincount([row for row, _ in used], minlength=len(first))
+        return columns if (counts >= _DENSE * longest[first]).all() else None
 
     def _best_axis(self, operands: list[References]) -> int | None:
         """Return the axis along which most entries go from lane to lane."""
@@ -232,8 +235,12 @@ def _distinct_columns(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         key = (nodes[0] << 31) + nodes[1]
     else:
         key = (nodes[0] << 42) + (nodes[1] << 21) + nodes[2]
-    _, first, where = np.unique(key, return_index=True, return_inverse=True)
-    return first, where.ravel()
+    # Of the few columns that there are NumPy's search would take several times as long.
+    values = key.tolist()
+    first = dict(zip(reversed(values), range(len(values) - 1, -1, -1), strict=True))
+    ordered = sorted(first)
+    rank = {value: number for number, value in enumerate(ordered)}
+    return np.array([first[value] for value in ordered]), np.array([rank[one] for one in values])
 
 
 def _empty(shape: tuple[int, ...]) -> References:

@@ -87,8 +87,8 @@ def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[A
     """
     if array_module(matrix, other) is np:
         return matrix @ other
-    columns = matrix.T.reshape(*matrix.shape, *(1,) * (other.ndim - 1))
-    return cast("Array", sum(columns[k] * other[k : k + 1] for k in range(len(matrix))))
+    every = matrix.reshape(*matrix.shape, *(1,) * (other.ndim - 1))
+    return (every * other[None]).sum(axis=1)
 
 
 def angular(twist: Float[Array, "w ..."]) -> int:
@@ -250,7 +250,8 @@ def rotation_about(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
     """Rotation matrix of a rotation vector (rad); in space of many at once."""
     xp = array_module(vector)
     if vector.shape[-1] == 1:
-        return exponential(xp.concatenate([vector, xp.zeros(2)])).rotation
+        sine, cosine = sine_cosine(vector[0])
+        return xp.stack([cosine, sine, -sine, cosine]).reshape(2, 2)
     first, second, _ = _coefficients(_squared(vector))
     matrix = skew(vector)
     return constant(np.eye(3)) + _each(first) * matrix + _each(second) * (matrix @ matrix)

@@ -24,6 +24,7 @@ from notchflex.mechanics.flexure import (
     flattened,
     flexure_state,
     free_pose,
+    in_space,
     rod_at,
     stack,
     with_level,
@@ -334,8 +335,11 @@ def flexure_states(
     chain: Chain, modes: Float[Array, "n modes"], memory: Any, *, with_pose: bool
 ) -> FlexureState:
     """State of all flexures at once, after a memory of the material at every node."""
+    rods, law = chain.rods, chain.law
+    strain = in_space(jnp.einsum("nicm,nm->nic", rods.basis, modes))
+    response = law.respond_all(strain, rods.section, memory)
     state = partial(flexure_state, with_pose=with_pose)
-    return jax.vmap(state, in_axes=(0, None, 0, 0))(chain.rods, chain.law, memory, modes)
+    return jax.vmap(state, in_axes=(0, None, 0, 0, 0))(rods, law, memory, modes, response)
 
 
 def _elastic(rods: Rod, law: SectionLaw) -> Float[np.ndarray, "n modes modes"]:

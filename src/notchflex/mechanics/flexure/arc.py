@@ -108,6 +108,7 @@ def _ends(
         material_share=constant(MATERIAL_SHARE),
         sway=constant(sway),
         push=constant(push),
+        oblique=constant(0.0),
     )
     # M = E I kappa h/l changes by the force: 2 E I/(h l) where kappa = P_1/h.
     in_plane, sideways = (

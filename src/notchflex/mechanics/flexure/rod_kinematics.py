@@ -298,13 +298,15 @@ def _small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w mod
     return jnp.concatenate([turn, motion.rotation.T @ slope.translation])
 
 
-def node_poses(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
+def node_poses(
+    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
+) -> Motion:
     """Poses of the sections at the nodes of the strains, in the frame of the proximal body.
 
     Between the places of the turn its order is left out, and steps are summed up by the polynomials
     through their nodes: enough to judge a result by, not to compute it.
     """
-    own = integrate_rod(rod, modes)
+    own = integrate_rod(rod, modes) if own is None else own
     start = Motion(rod.start_rotation, rod.start_offset)
     turns = jnp.concatenate([jnp.zeros_like(rod.turn[:1]), rod.turn])
     onward = (rod.node_turn - turns[rod.node_place]) @ jnp.concatenate([jnp.ones(1), modes])

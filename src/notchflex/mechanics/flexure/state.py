@@ -17,7 +17,7 @@ from notchflex.mechanics.flexure.rod_kinematics import (
     rod_end,
     twist_slope,
 )
-from notchflex.mechanics.material import SectionLaw
+from notchflex.mechanics.material import Response, SectionLaw
 from notchflex.mechanics.motion import PLANE, Motion, angular, rotation_about
 
 
@@ -89,6 +89,7 @@ def flexure_state(
     law: SectionLaw,
     memory: Any,
     modes: Float[Array, " modes"],
+    response: Response | None = None,
     *,
     with_pose: bool,
 ) -> FlexureState:
@@ -99,6 +100,7 @@ def flexure_state(
         law: Its material.
         memory: Memory of the material at every node.
         modes: Amplitude of each strain mode.
+        response: What the law answers at every node, where it is known.
         with_pose: Whether pose and twist are wanted; where no force acts on a body they do not
             enter the balance.
 
@@ -110,7 +112,8 @@ def flexure_state(
         own = integrate_rod(rod, modes)
         pose, twist = relative_pose(rod, modes, own), twist_slope(rod, modes, own)
     elastic = rod.basis @ modes
-    response = jax.vmap(law.respond)(in_space(elastic), rod.section, memory)
+    if response is None:
+        response = law.respond_all(in_space(elastic), rod.section, memory)
     resultants = of_rod(rod, response.resultants)
     # A mode that only fills up the arrays is held by a stiffness of 1.
     internal = jnp.einsum("i,ic,icm->m", rod.length, resultants, rod.basis)

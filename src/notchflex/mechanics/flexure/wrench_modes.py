@@ -77,9 +77,27 @@ def wrench_modes(
     in_frame = np.einsum(
         "kji,mkcj->kmci", rotation, np.reshape(wrenches, (len(wrenches), -1, 2, 3))
     ).reshape(len(length), len(wrenches), 6)
-    strain = _compliance(section, poisson_ratio)[:, None] * in_frame
+    strain = _strains(section, poisson_ratio, in_frame)
     work = np.einsum("k,kmc,kmc->m", length, in_frame, strain)
     return np.moveaxis(strain * (np.where(of_force, whole, 1.0) / work)[:, None], 1, 2)
+
+
+def _strains(
+    section: FibreSection, poisson_ratio: float, resultants: Float[np.ndarray, "nodes modes 6"]
+) -> Float[np.ndarray, "nodes modes 6"]:
+    """Strains by resultants, times Young's modulus."""
+    compliance = _compliance(section, poisson_ratio)[:, None]
+    strain = compliance * resultants
+    if section.ends is None or not np.any(section.ends.oblique):
+        return strain
+    oblique = np.asarray(section.ends.oblique)[:, None]
+    # The inverse of the stiffness of sideways bending and torsion together.
+    part = 1.0 - oblique**2 * compliance[..., 0] * compliance[..., 2]
+    crossed = oblique * compliance[..., 0] * compliance[..., 2]
+    about_x = (strain[..., 0] - crossed * resultants[..., 2]) / part
+    twist = (strain[..., 2] - crossed * resultants[..., 0]) / part
+    strain[..., 0], strain[..., 2] = about_x, twist
+    return strain
 
 
 def _compliance(section: FibreSection, poisson_ratio: float) -> Float[np.ndarray, "nodes 6"]:

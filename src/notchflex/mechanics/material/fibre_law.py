@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.material.fibre_section import Fibres, FibreSection
-from notchflex.mechanics.material.law import Bending, SectionLaw
+from notchflex.mechanics.material.law import Bending, Response, SectionLaw
 
 # Newton's method ends at this imbalance, as a part of the strain of bending, or after many tries.
 _BALANCED, _MOST_TRIES = 1e-13, 16
@@ -76,6 +76,28 @@ class _Joint(NamedTuple):
         return free / (self.own + self.soft * free)
 
 
+class _Curve(NamedTuple):
+    """Transformed strain over strain: where each kink lies, and by how much the slope changes."""
+
+    low: list[Array]
+    high: list[Array]
+    change: list[Array]
+
+    @classmethod
+    def of(cls, low: Array, high: Array, change: Array) -> _Curve:
+        """Return the curve of kinks given as arrays."""
+        return cls(*([part[kink] for kink in range(len(change))] for part in (low, high, change)))
+
+    def at(self, strain: Array) -> tuple[Array, Array]:
+        """Transformed strain, and its slope."""
+        transformed, slope = jnp.zeros_like(strain), jnp.zeros_like(strain)
+        for low, high, change in zip(*self, strict=True):
+            beyond = strain - jnp.clip(strain, low, high)
+            transformed = transformed + change * beyond
+            slope = slope + jnp.where(beyond != 0.0, change, 0.0)
+        return transformed, slope
+
+
 class FibreLaw(SectionLaw):
     """Fibres that transform; everything but bending about the weak axis is elastic.
 
@@ -107,11 +129,18 @@ class FibreLaw(SectionLaw):
         """Moment halfway between loading and unloading."""
         return self.bent(curvature, dataclasses.replace(section, ends=None), ()).moment
 
-    def bent(self, reduced: Float[Array, ""], section: FibreSection, memory: Any) -> Bending:
-        """Bend the section between its ends; the last of Newton's steps is differentiated."""
+    def respond_all(
+        self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
+    ) -> Response:
+        """All sections together: mapped one by one they would be traced three times as long."""
+        return self.respond(strain, section, memory)
+
+    def bent(self, reduced: Float[Array, "*shape"], section: FibreSection, memory: Any) -> Bending:
+        """Bend sections between their ends; the last of Newton's steps is differentiated."""
         fibres, ends = section.fibres, section.ends
         assert fibres is not None
-        weak, share = (0.0, 0.0) if ends is None else (ends.weak, ends.material_share)
+        none = jnp.zeros_like(reduced)
+        weak, share = (none, none) if ends is None else (ends.weak, ends.material_share)
         rigidity = self.elastic_modulus * section.second_moment_weak
         joint = _Joint(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
         start = reduced / (1.0 + weak)
@@ -119,16 +148,12 @@ class FibreLaw(SectionLaw):
         everything = self, fibres, memory, joint, scale, start
         still = jax.tree.map(jax.lax.stop_gradient, everything)
         strain, curvature, slopes = _settled(*still)
-        _, held, past, fixed, *_ = still
-        sums = jax.tree.map(
-            _derived_from, slopes, self.sum_fibres(fibres, memory, strain, curvature)
-        )
+        _, held, _, fixed, *_ = still
+        sums = _same_sums(slopes, self, fibres, memory, strain, curvature)
         by_strain, by_curvature = joint.step(curvature, sums, slopes)
         if not isinstance(memory, tuple):
-            own = strain + curvature * fibres.arm
-            slope = self._transformed(jax.lax.stop_gradient(own), past)[1]
-            moved = by_strain + by_curvature * held.arm
-            memory = self._transformed(own, memory)[0] + jax.lax.stop_gradient(slope) * moved
+            moves = strain, curvature, by_strain, by_curvature
+            memory = self._remember(fibres, memory, held.arm, moves)
         return Bending(
             curvature=curvature + by_curvature,
             moment=sums.moment + slopes.mixed * by_strain + slopes.bending * by_curvature,
@@ -138,51 +163,61 @@ class FibreLaw(SectionLaw):
         )
 
     def sum_fibres(self, fibres: Fibres, memory: Any, strain: Array, curvature: Array) -> _Sums:
-        """Sums over the fibres."""
-
-        def some(array: Array) -> Array:
-            return jnp.reshape(array, (-1, _AT_ONCE))
+        """Sums over the fibres of a section, or of many."""
+        curves = self._curves(memory)
 
         def add(total: _Sums, some: tuple[Array, Array, Any]) -> tuple[_Sums, None]:
             arm, area, past = some
-            own = strain + curvature * arm
-            transformed, slope = self._transformed(own, past)
+            own = _along(strain, curvature, arm)
+            transformed, slope = self._transformed(own, past, curves)
             force, tangent = area * (own - transformed), area * (1.0 - slope)
             turning = tangent * arm
             parts = force, force * arm, tangent, turning, turning * arm
-            added = _Sums(*(jnp.sum(part) for part in parts))
+            added = _Sums(*(jnp.sum(part, axis=-1) for part in parts))
             return jax.tree.map(jnp.add, total, added), None
 
-        none = _Sums(*(jnp.zeros_like(strain) for _ in _Sums._fields))
-        every = some(fibres.arm), some(fibres.area), jax.tree.map(some, memory)
-        sums = jax.lax.scan(add, none, every)[0]
+        none = _Sums(*[jnp.zeros_like(strain)] * len(_Sums._fields))
+        every = fibres.arm, fibres.area, memory
+        sums = jax.lax.scan(add, none, jax.tree.map(_in_parts, every))[0]
         return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
 
-    def _transformed(self, strain: Array, past: Any) -> tuple[Array, Array]:
+    def _remember(
+        self, fibres: Fibres, memory: Array, held: Array, moves: tuple[Array, ...]
+    ) -> Array:
+        """Memory after the strains of the last step but one and what the last one adds."""
+        curves = self._curves(memory)
+        strain, curvature, by_strain, by_curvature = moves
+
+        def some(none: None, some: tuple[Array, Array, Array]) -> tuple[None, Array]:
+            arm, still, past = some
+            transformed, slope = self._transformed(_along(strain, curvature, arm), past, curves)
+            moved = _along(by_strain, by_curvature, still)
+            return none, transformed + jax.lax.stop_gradient(slope) * moved
+
+        every = jax.tree.map(_in_parts, (fibres.arm, held, memory))
+        found = jnp.moveaxis(jax.lax.scan(some, None, every)[1], 0, -2)
+        return jnp.reshape(found, memory.shape)
+
+    def _transformed(self, strain: Array, past: Any, curves: list[_Curve]) -> tuple[Array, Array]:
         """Transformed strain of fibres after a strain, and its change with that strain."""
         if isinstance(past, tuple):
-            return self._curve(strain, *self._halfway())
-        (lower, by_lower), (upper, by_upper) = (
-            self._curve(strain, *kinks) for kinks in zip(self.low, self.high, strict=True)
-        )
+            return curves[0].at(strain)
+        (lower, by_lower), (upper, by_upper) = (curve.at(strain) for curve in curves)
         # One condition for value and slope: a fibre that rests on a curve, as where friction holds
         # its notch, must be differentiated as what its slope says.
         on_upper, on_lower = past >= upper - _ON_CURVE, past <= lower + _ON_CURVE
         transformed = jnp.where(on_lower, lower, jnp.where(on_upper, upper, past))
         return transformed, jnp.where(on_lower, by_lower, jnp.where(on_upper, by_upper, 0.0))
 
+    def _curves(self, memory: Any) -> list[_Curve]:
+        """The lower and the upper curve; of fibres without memory the one halfway."""
+        if isinstance(memory, tuple):
+            return [_Curve.of(*self._halfway(), self.change)]
+        return [_Curve.of(*kinks, self.change) for kinks in zip(self.low, self.high, strict=True)]
+
     def _halfway(self) -> tuple[Array, Array]:
         """Kinks of the curve halfway between loading and unloading."""
         return jnp.mean(self.low, axis=0), jnp.mean(self.high, axis=0)
-
-    def _curve(self, strain: Array, low: Array, high: Array) -> tuple[Array, Array]:
-        """Transformed strain on a curve, and its slope."""
-        transformed, slope = jnp.zeros_like(strain), jnp.zeros_like(strain)
-        for kink in range(self.change.shape[0]):
-            beyond = strain - jnp.clip(strain, low[kink], high[kink])
-            transformed = transformed + self.change[kink] * beyond
-            slope = slope + jnp.where(beyond != 0.0, self.change[kink], 0.0)
-        return transformed, slope
 
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
@@ -234,9 +269,6 @@ def _settle(
 
     All together, so that one condition stops the search; the sections may have leading axes.
     """
-    balance = law.sum_fibres
-    for _ in start.shape:
-        balance = jax.vmap(balance)
 
     def proceed(search: tuple[Array, ...]) -> Array:
         *_, least, tries = search
@@ -248,7 +280,7 @@ def _settle(
         """Try a step: the next one where the imbalance falls, half of it where not."""
         strain, curvature, by_strain, by_curvature, sums, least, tries = search
         trial = strain + by_strain, curvature + by_curvature
-        found = balance(fibres, memory, *trial)
+        found = law.sum_fibres(fibres, memory, *trial)
         size = joint.size(trial[1], found, scale)
         falls = size < least
         new = *trial, *joint.step(trial[1], found, found), found, size
@@ -280,12 +312,46 @@ def _(size: int, batched: Any, law: FibreLaw, *sections: Any) -> tuple[Any, Any]
 
 
 @jax.custom_jvp
-def _derived_from(value: Array, varied: Array) -> Array:
-    """A value with the derivatives of another that equals it, and need not be computed."""
-    del varied
-    return value
+def _same_sums(sums: _Sums, *of: Any) -> _Sums:
+    """Return sums over fibres that are known, with the derivatives of summing up again.
+
+    Nothing is summed up, or traced, where nothing is differentiated.
+    """
+    del of
+    return sums
 
 
-@_derived_from.defjvp
-def _(primals: tuple[Array, Array], tangents: tuple[Array, Array]) -> tuple[Array, Array]:
-    return primals[0], tangents[1]
+def _change_of_sums(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[_Sums, _Sums]:
+    """Derivatives along what varies alone."""
+    (sums, *of), (_, *moved) = primals, tangents
+    leaves, tree = jax.tree.flatten(of)
+    by = jax.tree.leaves(moved, is_leaf=_is_still)
+    varies = [place for place, one in enumerate(by) if not _is_still(one)]
+
+    def again(*varied: Array) -> _Sums:
+        every = list(leaves)
+        for place, one in zip(varies, varied, strict=True):
+            every[place] = one
+        law, *rest = jax.tree.unflatten(tree, every)
+        return law.sum_fibres(*rest)
+
+    at, along = [leaves[place] for place in varies], [by[place] for place in varies]
+    return sums, jax.jvp(again, at, along)[1]
+
+
+def _is_still(tangent: Any) -> bool:
+    return isinstance(tangent, jax.custom_derivatives.SymbolicZero)
+
+
+_same_sums.defjvp(_change_of_sums, symbolic_zeros=True)
+
+
+def _in_parts(array: Array) -> Array:
+    """Values of fibres in parts, which become the leading axis."""
+    parts = jnp.reshape(array, (*array.shape[:-1], -1, _AT_ONCE))
+    return jnp.moveaxis(parts, -2, 0)
+
+
+def _along(strain: Array, curvature: Array, arm: Array) -> Array:
+    """Strain of fibres by that of the neutral axis and the curvature."""
+    return strain[..., None] + curvature[..., None] * arm

@@ -26,6 +26,8 @@ class NotchEnds(Pytree):
         material_share: Share of `weak` that follows the material; the rest stays elastic.
         sway: In shear sideways.
         push: In shear in the plane of bending.
+        oblique: Moment about x by the twist, and torsion moment by the curvature about x, over
+            Young's modulus, mm^4; its square is below the product of both stiffnesses.
     """
 
     weak: Float[Array, "*shape"]
@@ -37,11 +39,12 @@ class NotchEnds(Pytree):
     material_share: Float[Array, "*shape"]
     sway: Float[Array, "*shape"] | float = 0.0
     push: Float[Array, "*shape"] | float = 0.0
+    oblique: Float[Array, "*shape"] | float = 0.0
 
     @classmethod
     def rigid(cls, like: Float[Array, "*shape"]) -> NotchEnds:
         """Return ends that add nothing, in the shape of an array."""
-        return cls(*(np.zeros(np.shape(like)) for _ in range(9)))  # pyright: ignore
+        return cls(*(np.zeros(np.shape(like)) for _ in range(10)))  # pyright: ignore
 
     def flattening(self, curvature: Float[Array, ""]) -> Float[Array, ""]:
         """By how much the distances of the fibres shrink at a curvature: q."""

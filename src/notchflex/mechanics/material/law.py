@@ -115,10 +115,24 @@ class SectionLaw(Pytree, ABC):
             curvature = _between_ends(self, section, reduced)
         return Bending(curvature, self.moment(curvature, section), memory)
 
-    def respond(self, strain: Float[Array, " 6"], section: FibreSection, memory: Any) -> Response:
-        """Resultants of a cross-section under given strains (beyond those of the free tube)."""
-        elastic = self.elastic(strain, section)
-        ends, curvature = section.ends, strain[1]
+    def respond_all(
+        self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
+    ) -> Response:
+        """Resultants of many cross-sections."""
+        respond = self.respond
+        for _ in strain.shape[:-1]:
+            respond = jax.vmap(respond)
+        return respond(strain, section, memory)
+
+    def respond(
+        self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
+    ) -> Response:
+        """Resultants of a cross-section under given strains (beyond those of the free tube).
+
+        Of many where the law bends many at once.
+        """
+        elastic = self.elastic(jnp.moveaxis(strain, -1, 0), section)
+        ends, curvature = section.ends, strain[..., 1]
         if ends is None:
             bending = self.bent(curvature, section, memory)
             moment, slope = bending.moment, bending.slope
@@ -129,7 +143,8 @@ class SectionLaw(Pytree, ABC):
             if slope is not None:
                 by_q = (ends.odd + 2.0 * ends.even * curvature) / q
                 slope = (slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
-        return Response(jnp.where(_WEAK, moment, elastic), bending.memory, slope)
+        resultants = jnp.where(_WEAK, moment[..., None], elastic)
+        return Response(resultants, bending.memory, slope)
 
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
@@ -235,10 +250,15 @@ def elastic_resultants(
     if ends is not None:
         across = across / (1.0 + ends.sway)
         along_x = along_x / (1.0 + ends.push)
+    sideways = elastic_modulus * section.second_moment_strong * about_x
+    torsion = shear_modulus * section.torsion_constant * free_twist
+    if ends is not None:
+        sideways = sideways + elastic_modulus * ends.oblique * twist
+        torsion = torsion + elastic_modulus * ends.oblique * strain[0]
     resultants = [
-        elastic_modulus * section.second_moment_strong * about_x,
+        sideways,
         elastic_modulus * section.second_moment_weak * about_y,
-        shear_modulus * section.torsion_constant * free_twist - section.shear_centre * across,
+        torsion - section.shear_centre * across,
         shear * along_x,
         across,
         elastic_modulus * section.area * stretch,

@@ -11,8 +11,8 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.mechanics.flexure import Rod, fibre_stretch, of_rod
-from notchflex.mechanics.flexure.rod_kinematics import node_poses, relative_pose, rod_end
+from notchflex.mechanics.flexure import FlexureState, Rod, fibre_stretch, of_rod
+from notchflex.mechanics.flexure.rod_kinematics import node_poses, rod_end
 from notchflex.mechanics.motion import Motion
 from notchflex.solver.element import Unknowns
 from notchflex.solver.residual import Evaluation
@@ -28,7 +28,9 @@ def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Arra
     internal = at.flexure.resultants[..., bending]
     required = _along_wall(chain, unknowns, at)
     if at.wrenches is not None:
-        required = required + jax.vmap(_required)(chain.rods, unknowns.modes, at.wrenches.resultant)
+        required = required + jax.vmap(_required)(
+            chain.rods, unknowns.modes, at.flexure, at.wrenches.resultant
+        )
     robots = jnp.any(chain.rods.padding_mask == 0.0, axis=-1)
     counts = (robots[:, None] & (chain.rods.length > 0.0))[..., None]
     carried = 1.0 * jnp.any(chain.rods.basis[..., bending, :] != 0.0, axis=(1, 3))[:, None]
@@ -40,10 +42,12 @@ def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Arra
 
 
 def _required(
-    rod: Rod, modes: Float[Array, " modes"], wrench: Float[Array, " w"]
+    rod: Rod, modes: Float[Array, " modes"], flexure: FlexureState, wrench: Float[Array, " w"]
 ) -> Float[Array, "nodes w"]:
     """Wrench on all that is beyond each node, about the node, along its section's axes."""
-    body, nodes = relative_pose(rod, modes), node_poses(rod, modes)
+    assert flexure.pose is not None  # wrenches act on bodies
+    assert flexure.configuration is not None
+    body, nodes = flexure.pose, node_poses(rod, modes, flexure.configuration)
     if rod.linear_kinematics is not None:
         # A linear beam takes its moments on the free shape, under forces as the body has them.
         is_small = rod.linear_kinematics > 0.0

@@ -10,7 +10,8 @@ place where finite elements have it. The two walls of the strip are curved bars:
   the root by $c\tan^2\varphi\,t/t_w$;
 * pulled across the tube, a wall straightens like an arch, clamped $\kappa\sqrt{t t_w}$
   beyond the tips;
-* pushed sideways, both walls bend like the posts of a frame, clamped likewise.
+* pushed sideways, both walls bend like the posts of a frame, clamped likewise; moments out of the
+  plane move the walls against each other (`sideways.py`).
 
 The shear areas of strip and root are 5/6 of the whole. The constants were fitted, all at once, to
 the cells of finite elements in `tests/reference/fem_strip_cells.csv` and `fem_u_link_cells.csv`
@@ -37,6 +38,15 @@ from notchflex.mechanics.flexure.notch_rod import (
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.flexure.roots.sideways import (
+    ROUND,
+    SHARP,
+    Sideways,
+    Walls,
+    plane_compliance,
+    turned_compliance,
+    with_sideways,
+)
 from notchflex.mechanics.flexure.wrench_modes import wrench_modes
 from notchflex.mechanics.material import FibreSection, NotchEnds
 from notchflex.mechanics.motion import Motion, rotation_about
@@ -52,13 +62,11 @@ _ROUND_END = 0.662
 # Second moment of a root over that of the strip at the tip, sharp or round, and its twisting c.
 _BENDING_SHARP, _BENDING_ROUND, _TWIST = 2.098, 2.695, 2.243
 # How far beyond the tips walls are clamped, over the root of the thicknesses of strip and wall.
-_CLAMP, _CLAMP_SIDEWAYS = 0.818, 0.93
+_CLAMP, _CLAMP_SIDEWAYS = 0.818, 0.97
 # Power of the strip's over the wall's thickness by which the lengths of the root grow.
 _POWER = 0.152
 # Shear of a body below a triangular notch: length over the notch's height, of the whole tube.
 _WEDGE = 4.893
-# Twist of a root by sideways loads over that of the strip, over t / t_w.
-_TORSION = 0.42
 _SHEAR_AREA = 5.0 / 6.0
 _STEEPEST = 0.95  # sin² of the angle at which a wall is at most met
 _RIGID = 1e6  # area of a root that does not shear, over that of the strip
@@ -76,6 +84,7 @@ class RootedStrip(NamedTuple):
         sheared: Length of a tube that shears like the wall there, mm.
         middle: Height of its middle above the proximal face, mm.
         hand: 1 where the proximal wall is on the bend's side, -1 on the opposite one.
+        sideways: Constants of the answer to loads out of the plane.
         width_factor: Width of the walls over that of the tube's walls there.
     """
 
@@ -87,6 +96,7 @@ class RootedStrip(NamedTuple):
     sheared: float
     middle: float
     hand: float
+    sideways: Sideways
     width_factor: float = 1.0
 
 
@@ -103,6 +113,7 @@ def sharp_strip(notch: StripNotch, tube: Tube) -> RootedStrip:
         sheared=_WEDGE * notch.height,
         middle=notch.height + notch.rise,
         hand=-1.0,
+        sideways=SHARP,
         width_factor=factor,
     )
 
@@ -119,6 +130,18 @@ def round_strip(notch: ULink, tube: Tube) -> RootedStrip:
         sheared=0.0,
         middle=notch.height + 0.5 * notch.strip_thickness,
         hand=1.0 if notch.proximal_slot == "away" else -1.0,
+        sideways=ROUND,
+    )
+
+
+def _walls(strip: RootedStrip, tube: Tube) -> Walls:
+    """The strip's two walls."""
+    return Walls(
+        outer=tube.outer_radius,
+        inner=tube.inner_radius,
+        width=strip.width_factor * (tube.outer_radius - tube.inner_radius),
+        thickness=strip.thickness,
+        length=strip.free_length + 2.0 * strip.beyond,
     )
 
 
@@ -164,6 +187,9 @@ def rooted_strip_rod(
     start, end = (_poses(strip, *_course(np.array([at]), ends)) for at in (0.0, ends[-1]))
     start, end = (Motion(one.rotation[0], one.translation[0]) for one in (start, end))
     poses = _poses(strip, *course)
+    plane = plane_compliance(poses, points.weight, section, middle, poisson_ratio)
+    turned = turned_compliance(_walls(strip, tube), plane, strip.sideways, poisson_ratio)
+    section = with_sideways(section, points.weight, course[2], turned, poisson_ratio)
     moments, forces = 3 + 3 * refinement, 1 + 2 * refinement
     basis = wrench_modes(
         poses,
@@ -257,7 +283,7 @@ def _section(
         axial=constant(
             np.where(along_wall, 0.0, _SHEAR_AREA * np.where(root, 1.0, 1.0 + arch) - 1.0)
         ),
-        torsion=constant(np.where(root, _TORSION * strip.thickness / wall - 1.0, 0.0)),
+        torsion=constant(nought),
         odd=constant(nought),
         even=constant(nought),
         material_share=constant(nought + 1.0),  # the root yields where the strip does
