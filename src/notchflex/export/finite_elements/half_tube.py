@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from notchflex.export.finite_elements.layers import check_shape, edge_angle, layers_of
 from notchflex.export.finite_elements.options import DeckOptions
-from notchflex.export.finite_elements.tube_mesh import Opening, TubeMesh, numbered
+from notchflex.export.finite_elements.tube_mesh import GridOpening, TubeMesh, numbered
 from notchflex.robot import Robot
 
 
@@ -41,7 +41,7 @@ def half_tube(robot: Robot, options: DeckOptions) -> TubeMesh:
         ],
         axis=-1,
     )
-    openings = [Opening(2 * options.spine, options.opening, low, high) for low, high in faces]
+    openings = [GridOpening(2 * options.spine, options.opening, low, high) for low, high in faces]
     x_deg = notches[0].direction_deg
     return numbered(place, height, openings, is_half=True, x_deg=x_deg)
 

@@ -20,7 +20,7 @@ _NODES = np.array(
 )[:, [1, 0, 2]]
 
 
-class Opening(NamedTuple):
+class GridOpening(NamedTuple):
     """Where a notch is open on the grid.
 
     Attributes:
@@ -57,7 +57,7 @@ class TubeMesh:
     place: Float[np.ndarray, "nodes 3"]
     elements: Int[np.ndarray, "m 20"]
     cell: Int[np.ndarray, "m 3"]
-    openings: tuple[Opening, ...]
+    openings: tuple[GridOpening, ...]
     is_half: bool
     x_deg: float
 
@@ -81,7 +81,7 @@ class TubeMesh:
         numbers = self.nodes[:, [0, -1], :].ravel()
         return numbers[numbers > 0]
 
-    def faces_of(self, opening: Opening) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " b"]]:
+    def faces_of(self, opening: GridOpening) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " b"]]:
         """Return the elements below and above a notch whose faces may meet, by their numbers.
 
         They lie behind the outer half of its faces.
@@ -107,7 +107,7 @@ class TubeMesh:
 def numbered(
     place: Float[np.ndarray, "a b c 3"],
     heights: Float[np.ndarray, " c"],
-    openings: Sequence[Opening],
+    openings: Sequence[GridOpening],
     *,
     is_half: bool,
     x_deg: float,

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from notchflex.errors import InputError
 from notchflex.export.finite_elements.layers import check_shape, edge_angle, layers_of
 from notchflex.export.finite_elements.options import DeckOptions
-from notchflex.export.finite_elements.tube_mesh import Opening, TubeMesh, numbered
+from notchflex.export.finite_elements.tube_mesh import GridOpening, TubeMesh, numbered
 from notchflex.robot import ArcNotch, Robot
 
 # Elements round the tube for those that half a tube has in its plane.
@@ -46,14 +46,14 @@ def whole_tube(robot: Robot, options: DeckOptions, tendons: Sequence[int]) -> Tu
     radius = np.linspace(robot.tube.inner_radius, robot.tube.outer_radius, 2 * options.wall + 1)
     around = 4 * int(np.ceil(_ROUND * (options.spine + options.opening) / 2.0))
     sides = [np.radians(robot.tendon[number].direction_deg) for number in tendons]
-    openings: list[Opening] = []
+    openings: list[GridOpening] = []
     shifts: list[np.ndarray] = []
     for number, (notch, (low, high)) in enumerate(zip(notches, faces, strict=True), start=1):
         edge = np.asarray(edge_angle(notch, robot, radius))
         first, last = _edges(notch, float(edge[-1]), around, options)
         knots = _knots(notch, edge, (first, last), sides, around)
         shifts.append(_lines(knots, around, f"notch {number} of {robot.name}"))
-        openings.append(Opening(2 * last, around - (last - first), low, high))
+        openings.append(GridOpening(2 * last, around - (last - first), low, high))
     every = np.repeat(np.stack(shifts), 2, axis=0)  # (2 n, radii, half elements)
     flat = every.reshape(len(every), -1)
     shift = np.stack([np.interp(height, edges_at, one) for one in flat.T])

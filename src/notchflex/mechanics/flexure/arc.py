@@ -68,7 +68,13 @@ def _(notch: ArcNotch, tube: Tube, refinement: int = 0, site: Site | None = None
     bending, twist = 2 + refinement, 1 + refinement
     centre = float(section.shear_centre)
     modes = legendre_modes(
-        points, bending, bending, twist, tendon_modes=1, shear_centre=centre, shear=shear
+        points,
+        bending,
+        bending,
+        twist,
+        tendon_modes=1 if refinement == 0 else bending,
+        shear_centre=centre,
+        shear=shear,
     )
     free = STRAIGHT + np.radians(notch.precurvature_deg) * modes.basis[..., 0]
     axis = NeutralAxis(points, start=shifted(-centroid), end=shifted(centroid), strain=free)
