@@ -31,4 +31,4 @@ for one in found.photographs:
     off = max(one.notch_angle_deviation)
     print(f"{Path(one.source).name}: {one.reason or 'measured'}, angles to {57.3 * off:.1f} deg")
 interval = fitted.intervals["friction.coefficient"]
-print(f"friction between {interval.lower:.2f} and {interval.upper:.2f} (drawn with 0.18)")
+print(f"friction between {interval.lower:.3f} and {interval.upper:.3f} (drawn with 0.18)")

@@ -15,13 +15,12 @@ import numpy as np
 import notchflex as nf
 from notchflex.photographs.overlay import write_overlay
 
-ROOT = Path(__file__).resolve().parents[2]
-IMAGES = ROOT / "docs" / "images"
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
 from photographs.renderer import render
 from photographs.test_board import BOARD, SCENE, laid
 
+IMAGES = Path(__file__).resolve().parents[1] / "images"
 ANGLES_DEG = (14.0, 22.0, 18.0, 9.0, 16.0)
 
 

@@ -113,8 +113,17 @@ def test_the_drawing_is_the_board_in_its_size(tmp_path, dictionary, capsys):
 
 
 def test_boards_and_scales_that_are_refused(tmp_path, capsys):
-    for text in ("", "4", "4x3", "4x3,marker=5", "4x3,marker=a,gap=1", "4x3,marker=5,gap=1,x=2",
-                 "4x3,marker=5,marker=5,gap=1", "4x3,marker=nan,gap=1", "-1x3,marker=5,gap=1"):  # fmt: skip
+    for text in (
+        "",
+        "4",
+        "4x3",
+        "4x3,marker=5",
+        "4x3,marker=a,gap=1",
+        "4x3,marker=5,gap=1,x=2",
+        "4x3,marker=5,marker=5,gap=1",
+        "4x3,marker=nan,gap=1",
+        "-1x3,marker=5,gap=1",
+    ):
         with refused("BAD_SYNTAX"):
             board_of(text)
     for text, code in (

@@ -72,8 +72,8 @@ def measure(
         float | None,
         converted(_scale, "PX/MM"),
         Parameter(
-            help="Pixels of the photographs per mm, at the robot; by default the scale follows from "
-            "the outer diameter alone."
+            help="Pixels of the photographs per mm, at the robot; by default the scale follows "
+            "from the outer diameter alone."
         ),
     ] = None,
     board: Annotated[
@@ -82,7 +82,7 @@ def measure(
             metavar="LAYOUT",
             help="Board of markers beside the robot, which gives scale and tilt: columns x rows, "
             "side and gap of the markers in mm, such as `4x3,marker=5,gap=1.5`; "
-            "`notchflex board` draws it."
+            "`notchflex board` draws it.",
         ),
     ] = None,
     correct: Annotated[
@@ -159,7 +159,10 @@ def measure(
         from notchflex.photographs import board_of, measure_cut
         from notchflex.photographs import measure as measured
 
-        ruler: dict[str, Any] = {"scale": scale, "board": None if board is None else board_of(board)}
+        ruler: dict[str, Any] = {
+            "scale": scale,
+            "board": None if board is None else board_of(board),
+        }
         if cut:
             as_cut = measure_cut(photographs, chosen, turn_deg=turn, progress=progress, **ruler)
             return write_cut(as_cut, outputs, output, write_robot, files)

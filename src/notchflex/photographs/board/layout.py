@@ -118,8 +118,8 @@ class Board:
         """Return which cells of every marker are white, with its black border, (m, c, c)."""
         made = self.opencv_dictionary()
         side = made.markerSize + 2
-        markers = range(self.columns * self.rows)
-        return np.array([made.generateImageMarker(number, side, borderBits=1) for number in markers]) > 0
+        numbers = range(self.columns * self.rows)
+        return np.array([made.generateImageMarker(one, side, borderBits=1) for one in numbers]) > 0
 
     def svg(self) -> str:
         """Return a drawing in its true size, in mm, with a white border."""
@@ -176,10 +176,16 @@ def board_of(text: str) -> Board:
     given: dict[str, Any] = {key.strip(): value.strip() for key, value in keys.items()}
     columns, cross, rows = grid.partition("x")
     known = {"marker", "gap", "dictionary"}
-    if not (cross and columns.isdecimal() and rows.isdecimal()) or not {
-        "marker",
-        "gap",
-    } <= set(given) <= known or len(given) < len(others):
+    if (
+        not (cross and columns.isdecimal() and rows.isdecimal())
+        or not {
+            "marker",
+            "gap",
+        }
+        <= set(given)
+        <= known
+        or len(given) < len(others)
+    ):
         raise InputError.BAD_SYNTAX(
             f"{text!r} is no board; give columns x rows, and marker and gap in mm, {_WAYS}"
         )

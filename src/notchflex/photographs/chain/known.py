@@ -37,9 +37,7 @@ class Known:
 
     def tilt(self, direction: float) -> float:
         """Return the tilt of a tube that lies in the plane, by its direction, rad."""
-        return math.atan(
-            self.slope[0] * math.cos(direction) + self.slope[1] * math.sin(direction)
-        )
+        return math.atan(self.slope[0] * math.cos(direction) + self.slope[1] * math.sin(direction))
 
     def smaller(self, factor: float) -> Known:
         """Return the same for a photograph that was made smaller by a factor."""
