@@ -101,7 +101,7 @@ class Board:
         Raises:
             InputError: OpenCV is not installed, or the set has fewer markers than the board.
         """
-        need("cv2", "photographs", "boards of markers")
+        need("cv2", "photographs", "a board of markers")
         import cv2
 
         name = self.dictionary if self.dictionary.startswith("april") else self.dictionary.upper()
@@ -172,8 +172,10 @@ def board_of(text: str) -> Board:
         '4x3,marker=5,gap=1.5'
     """
     grid, *others = (part.strip() for part in text.split(","))
-    keys = dict(part.partition("=")[::2] for part in others)
-    given: dict[str, Any] = {key.strip(): value.strip() for key, value in keys.items()}
+    given: dict[str, Any] = {}
+    for part in others:
+        key, _, value = part.partition("=")
+        given[key.strip()] = value.strip()
     columns, cross, rows = grid.partition("x")
     known = {"marker", "gap", "dictionary"}
     if (

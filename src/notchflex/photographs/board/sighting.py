@@ -121,13 +121,10 @@ def _fitted(points: Numbers, seen: Numbers) -> tuple[Numbers, Numbers] | None:
         near = (numbers[6] - _NEAR) / _NEAR_SPREAD
         return np.concatenate([off, numbers[4:6] / _SLOPE, [near]])
 
-    best = _least(residuals, np.array([*start, 0.0, 0.0, _NEAR]))
-    for _ in range(2):  # seen from far away, a plane that is tilted the other way looks alike
-        other = best.x.copy()
-        other[4:6] *= -1.0
-        mirrored = _least(residuals, other)
-        if mirrored.cost < best.cost:
-            best, mirrored = mirrored, best
+    first_found = _least(residuals, np.array([*start, 0.0, 0.0, _NEAR]))
+    # Seen from far away, a plane that is tilted the other way looks alike.
+    other = first_found.x * [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0]
+    best, mirrored = sorted((first_found, _least(residuals, other)), key=lambda one: one.cost)
     off = np.linalg.norm(_projected(best.x, points) - seen, axis=1)
     side = float(np.linalg.norm(points[1] - points[0])) * math.exp(best.x[3])
     if off.max() > _MOST_OFF * side:
