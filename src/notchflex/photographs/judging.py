@@ -33,7 +33,7 @@ def doubt(located: Located, deviation: Numbers, noise: float) -> str:
     """
     # Where parts are missing, view and cut are those of something else.
     reasons = (
-        _of_size(located),
+        _of_scale(located),
         missing(located.model, located.fit),
         _of_view(located),
         _of_spread(located, deviation, noise),
@@ -41,25 +41,25 @@ def doubt(located: Located, deviation: Numbers, noise: float) -> str:
     return next((reason for reason in reasons if reason), "")
 
 
-def _of_size(located: Located) -> str:
-    width = 2.0 * located.model.table.outer * math.exp(located.fit.numbers[3])
+def _of_scale(located: Located) -> str:
+    numbers, known = located.fit.numbers, located.model.known
+    width = 2.0 * located.model.table.outer * math.exp(numbers[3])
     if width < LEAST_WIDTH:
         return f"the tube is {width:.0f} pixels wide; it needs {LEAST_WIDTH:.0f} or more, go nearer"
+    if known.contradicted(numbers):
+        more = 100.0 * math.expm1(numbers[3] - math.log(known.scale))
+        return (
+            f"the outer diameter gives a scale {more:+.1f} % off the one that is given or that the "
+            "board gives; check the diameter, and that the board lies in the plane of the robot"
+        )
     return ""
 
 
 def _of_view(located: Located) -> str:
     fit, table = located.fit, located.model.table
-    _, _, _, log_scale, roll, tilt, _, kerf, cut = fit.numbers[:NUMBERS]
+    roll, tilt, _, kerf, cut = fit.numbers[4:NUMBERS]
     if abs(math.remainder(roll, math.pi)) > math.radians(25) or abs(tilt) > math.radians(18):
         return "the robot is not seen from the side: it is rolled or tilted too far"
-    known = located.model.known
-    if known.contradicted(fit.numbers):
-        more = 100.0 * math.expm1(log_scale - math.log(known.scale))
-        return (
-            f"the outer diameter gives a scale {more:+.1f} % off the one that is given or that the "
-            "board gives; check the diameter, and that the board lies in the plane of the robot"
-        )
     if max(abs(kerf), abs(cut)) > 2.0 * _MADE * table.outer:
         return "the notches differ from the robot file; check its depths and heights"
     return ""
