@@ -26,6 +26,7 @@ NAMES = [
     "Differentiable", "differentiable", "TipResponse", "tip_response",
     "bodies_from_angles", "SharedStroke", "Closing", "ClosingStatus", "Kink",
     "ConvergenceError", "ErrorCode", "Failure", "Settings",
+    "Board",
     "BodyForce", "save_path", "read_path", "read_table",
     "reach", "follow", "read_targets", "Reach", "Following", "Limits", "TargetSearch", "Targets",
     "Controller", "ControlStatus", "Observer",

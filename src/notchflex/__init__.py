@@ -153,6 +153,7 @@ _HOME = {
     ),
     **dict.fromkeys(
         (
+            "Board",
             "MeasuredCut",
             "MeasuredPhotograph",
             "MeasuredPhotographs",

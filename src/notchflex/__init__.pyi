@@ -81,6 +81,7 @@ from notchflex.mechanics.flexure import modulus_from_single_notch as modulus_fro
 from notchflex.mechanics.section import Section as Section
 from notchflex.mechanics.section import annular_sector as annular_sector
 from notchflex.mechanics.section import annular_segment as annular_segment
+from notchflex.photographs import Board as Board
 from notchflex.photographs import MeasuredCut as MeasuredCut
 from notchflex.photographs import MeasuredPhotograph as MeasuredPhotograph
 from notchflex.photographs import MeasuredPhotographs as MeasuredPhotographs

@@ -26,6 +26,7 @@ from reference_data import choose, reference
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = {int(file.name[:2]): file for file in sorted((ROOT / "examples").glob("*.py"))}
+LONG = (19,)
 ANGLE = 1e-8  # rad; what the tables and oracles are met to elsewhere
 
 
@@ -47,7 +48,10 @@ def test_each_has_its_number_and_asks_a_question():
         assert 13 <= len(text.splitlines()) <= 50, file.name
 
 
-@pytest.mark.parametrize("number", FILES)
+@pytest.mark.parametrize(
+    "number",
+    [pytest.param(one, marks=pytest.mark.nightly) if one in LONG else one for one in FILES],
+)
 def test_page_shows_the_example_and_what_it_prints(number):
     page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
     _, printed = ran(number)
@@ -314,3 +318,13 @@ def test_sweep_of_designs():
     assert rows["total_angle_deg"].is_between(55.0, 65.0).all()
     assert len(rows) == names["found"].counts["accepted"]
     assert f"{len(rows)} of 4096" in printed
+
+
+@pytest.mark.nightly
+def test_angles_from_photographs():
+    """The interval holds the friction that bent the wrist, and the angles those that were drawn."""
+    names, _ = ran(19)
+    for one, angles in zip(names["found"].photographs, names["path"].notch_angle, strict=True):
+        np.testing.assert_allclose(one.notch_angle, angles, atol=np.radians(0.3))
+    interval = names["interval"]
+    assert 0.17 < interval.lower < 0.18 < interval.upper < 0.19

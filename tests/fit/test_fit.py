@@ -53,6 +53,16 @@ def test_constants_are_found_again_without_noise():
         assert found.values[name] == pytest.approx(value, rel=1e-5)
 
 
+def test_interval_of_one_constant_whose_limits_are_whole_numbers():
+    """At both ends, twice the misfit is higher by what 95 % allow, evaluated there directly."""
+    seen = simulate_measurements(WRIST, nf.pull(0.4, 1.5, steps=3), deviation=NOISE, seed=2)
+    found = calibrate(WRIST, seen, ["friction.coefficient"], starts=1)
+    interval, cost = found.intervals["friction.coefficient"], found.problem
+    for end in (interval.lower, interval.upper):
+        rise = 2.0 * (cost(np.array([end])).value - cost(found.best.values).value)
+        assert rise == pytest.approx(found.allowed_rise("friction.coefficient"), rel=0.05)
+
+
 def test_intervals_hold_the_truth_and_are_as_wide_as_the_noise_makes_them(noisy):
     for name, interval in noisy.intervals.items():
         assert interval.lower < TRUE[name] < interval.upper

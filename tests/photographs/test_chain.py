@@ -73,7 +73,7 @@ def cluttered():
 
 
 def test_a_fit_from_points_dragged_by_hand():
-    found = measure_picture(cluttered(), TABLE, "wrist", BY_HAND)
+    found = measure_picture(cluttered(), TABLE, "wrist", chain=BY_HAND)
     assert found.reason == ""
     np.testing.assert_allclose(found.notch_angle, ANGLES, atol=np.radians(0.15))
     assert np.abs(found.chain - BY_HAND).max() < 12.0

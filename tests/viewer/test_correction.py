@@ -1,6 +1,10 @@
 """The page on which fits to photographs are corrected by hand."""
 
+import signal
+import subprocess
+import sys
 import threading
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -9,8 +13,9 @@ import pytest
 from chromium import PATIENCE
 from notchflex.cli.app import run
 from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.measure import refused_photograph
+from notchflex.photographs.measure import measure_picture, refused_photograph
 from notchflex.photographs.measured import MeasuredPhotographs
+from photographs.renderer import render
 from photographs.test_chain import ANGLES, BY_HAND, ROBOT, SCENE, cluttered
 
 pytest.importorskip("viser", reason="the extra `viewer` is not installed")
@@ -59,6 +64,44 @@ def test_points_are_dragged_then_fitted_then_accepted(unmeasured, capsys):
     assert capsys.readouterr().out == ""  # where `-o -` writes the CSV
     assert [one.reason for one in found.photographs] == ["", LEFT_OUT]
     assert len(found.columns()["photograph"]) == 1
+
+
+def test_what_was_accepted_before_ctrl_c_is_kept(unmeasured, monkeypatch, tmp_path, capsys):
+    """The first photograph was accepted, the second was shown: one row is written, code 130."""
+    from notchflex.viewer.correction.correction import NOT_LOOKED_AT, Correction
+
+    fitted = measure_picture(cluttered(), chain_table(ROBOT), "wrist", chain=BY_HAND)
+
+    def accepted(page, count):
+        for number in range(count):
+            page.results[number] = replace(fitted, source=page.results[number].source)
+            page.accept()
+        page._tasks.add(interrupted)
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    page = Correction(unmeasured, port=18740)
+    accepted(page, 1)
+    found = page.run()
+    assert not page.done
+    assert [one.reason for one in found.photographs] == ["", NOT_LOOKED_AT]
+
+    monkeypatch.setattr("notchflex.photographs.measure", lambda *_, **__: unmeasured)
+    served = Correction.run
+    words = ["measure", *(one.source for one in unmeasured.photographs)]
+    words += ["--robot", "pacheco2021-a", "--correct", "--port", "18760"]
+    for count, table in ((0, tmp_path / "none.csv"), (1, tmp_path / "one.csv")):
+
+        def run_and_stop(page, count=count):
+            accepted(page, count)
+            return served(page)
+
+        monkeypatch.setattr(Correction, "run", run_and_stop)
+        assert run([*words, "-o", str(table)]) == 130
+        assert table.exists() == (count == 1)
+    assert len(table.read_text().splitlines()) == 2
+    assert "photograph 2 of 2" in capsys.readouterr().err
 
 
 def test_the_verb_refuses_what_has_no_page(tmp_path, capsys):
@@ -114,3 +157,36 @@ def test_in_a_browser(browser, unmeasured):
         while not correction.done:
             correction.leave_out()
         thread.join(30.0)
+
+
+@pytest.mark.browser
+@pytest.mark.nightly
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGINT for another process")
+def test_ctrl_c_after_a_click_in_a_browser(browser, tmp_path):
+    """The program is interrupted while it shows the second photograph; the first is written."""
+    files, table = [str(tmp_path / f"wrist_{number}N.png") for number in (1, 2)], tmp_path / "m.csv"
+    for file in files:
+        cv2.imwrite(file, render(ROBOT, ANGLES, SCENE))
+    words = [sys.executable, "-m", "notchflex", "measure", *files, "--robot", "pacheco2021-a"]
+    words += ["--pattern", "wrist_{tension}N", "--correct", "--port", "18780", "-o", str(table)]
+    program = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    page = browser.new_page(viewport={"width": 1000, "height": 640})
+    page.set_default_timeout(PATIENCE)
+    try:
+        line = next(line for line in program.stderr if "http://" in line)
+        address = next(word for word in line.split() if word.startswith("http://"))
+        page.goto(address)
+        page.get_by_text("1 of 2").wait_for()
+        page.wait_for_timeout(3000)
+        page.get_by_role("button", name="Accept").click()
+        page.get_by_text("2 of 2").wait_for()
+        program.send_signal(signal.SIGINT)
+        _, errors = program.communicate(timeout=60.0)
+        assert program.returncode == 130
+        assert "Traceback" not in errors
+        rows = table.read_text().splitlines()
+        assert len(rows) == 2
+        assert "wrist_1N.png" in rows[1]
+    finally:
+        page.close()
+        program.kill()

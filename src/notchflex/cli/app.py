@@ -103,6 +103,10 @@ VERBS = {
         "    notchflex measure straight.jpg turned.jpg --robot pacheco2021-a --cut --turn 20 \\\n"
         "        -o cut.csv --write-robot as-cut.toml",
     ),
+    "board": (
+        "Draw a board of markers that gives photographs their scale.",
+        "notchflex board 4x3,marker=5,gap=1.5 -o board.svg",
+    ),
     "tolerance": (
         "Find out what tolerances do: worst case, yield, which dimension to control.",
         "notchflex new limits --tolerance\n"

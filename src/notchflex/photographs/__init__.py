@@ -1,8 +1,17 @@
 """Photographs: the notch angles of bent robots, the notches of straight ones, with deviations."""
 
+from notchflex.photographs.board.layout import Board, board_of
 from notchflex.photographs.cut.measure_cut import measure_cut
 from notchflex.photographs.cut.measured_cut import MeasuredCut
 from notchflex.photographs.measure import measure
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 
-__all__ = ["MeasuredCut", "MeasuredPhotograph", "MeasuredPhotographs", "measure", "measure_cut"]
+__all__ = [
+    "Board",
+    "MeasuredCut",
+    "MeasuredPhotograph",
+    "MeasuredPhotographs",
+    "board_of",
+    "measure",
+    "measure_cut",
+]

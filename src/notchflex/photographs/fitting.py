@@ -178,8 +178,17 @@ def priors(model: OutlineModel, numbers: Numbers) -> tuple[Numbers, Numbers]:
     centre[4], spread[4] = turn, _PRIOR_ROLL
     spread[5] = _PRIOR_TILT
     centre[6], spread[6] = _NEAR / outer, _PRIOR_NEAR / outer
+    known = model.known
+    if known.has_scale:
+        centre[3], spread[3] = math.log(known.scale), known.scale_deviation
+    if math.isfinite(known.slope_deviation):
+        centre[5], spread[5] = known.tilt(float(numbers[2])), known.slope_deviation
+    if known.perspective_deviation < spread[6]:
+        centre[6], spread[6] = known.perspective, known.perspective_deviation
     spread[7], spread[8] = _PRIOR_KERF * outer, _PRIOR_CUT * outer
     n = model.table.notches
+    if len(numbers) > NUMBERS + n:  # where every notch is measured, its file says little of it
+        spread[7] = _PRIOR_OWN * outer
     spread[NUMBERS + n :] = _PRIOR_OWN * outer
     spread[NUMBERS + 2 * n : NUMBERS + 3 * n] = _PRIOR_ANY * outer
     return centre, spread

@@ -19,6 +19,7 @@ MOST_SPREAD = math.radians(0.5)
 
 _MOST_NOISE = 1.0
 _RIVAL = 12.0  # by how much the misfit of another shape must be larger
+_OTHER = math.radians(0.7)  # by how much the angles of another shape differ
 _MADE = 0.04  # of the outer diameter: how far notches may differ from the robot file
 
 
@@ -30,20 +31,33 @@ def doubt(located: Located, deviation: Numbers, noise: float) -> str:
         deviation: Standard deviations of its angles, rad.
         noise: Robust spread of its edges, px.
     """
+    # Where parts are missing, view and cut are those of something else.
     reasons = (
-        _of_view(located),
+        _of_scale(located),
         missing(located.model, located.fit),
+        _of_view(located),
         _of_spread(located, deviation, noise),
     )
     return next((reason for reason in reasons if reason), "")
 
 
-def _of_view(located: Located) -> str:
-    fit, table = located.fit, located.model.table
-    _, _, _, log_scale, roll, tilt, _, kerf, cut = fit.numbers[:NUMBERS]
-    width = 2.0 * table.outer * math.exp(log_scale)
+def _of_scale(located: Located) -> str:
+    numbers, known = located.fit.numbers, located.model.known
+    width = 2.0 * located.model.table.outer * math.exp(numbers[3])
     if width < LEAST_WIDTH:
         return f"the tube is {width:.0f} pixels wide; it needs {LEAST_WIDTH:.0f} or more, go nearer"
+    if known.contradicted(numbers):
+        more = 100.0 * math.expm1(numbers[3] - math.log(known.scale))
+        return (
+            f"the outer diameter gives a scale {more:+.1f} % off the one that is given or that the "
+            "board gives; check the diameter, and that the board lies in the plane of the robot"
+        )
+    return ""
+
+
+def _of_view(located: Located) -> str:
+    fit, table = located.fit, located.model.table
+    roll, tilt, _, kerf, cut = fit.numbers[4:NUMBERS]
     if abs(math.remainder(roll, math.pi)) > math.radians(25) or abs(tilt) > math.radians(18):
         return "the robot is not seen from the side: it is rolled or tilted too far"
     if max(abs(kerf), abs(cut)) > 2.0 * _MADE * table.outer:
@@ -61,7 +75,7 @@ def _of_spread(located: Located, deviation: Numbers, noise: float) -> str:
             "deg (standard deviation)"
         )
     for worse, differs in located.rival:
-        if worse < _RIVAL:
+        if worse < _RIVAL and differs > _OTHER:
             return (
                 "two shapes fit nearly alike; their angles differ by up to "
                 f"{math.degrees(differs):.1f} deg"

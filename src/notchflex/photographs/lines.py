@@ -20,7 +20,6 @@ FIRST_SPREAD = (0.3, 0.08)
 """Spreads of the shift and of the turn of a line before they are known, px."""
 
 _LEAST_SPREAD, _MOST_SPREAD = (0.06, 0.04), 2.0  # px
-_ALL_SHIFT = 0.7  # px
 _LEAST_POINTS = 5
 _ROBUST = 2.5  # spreads: lines farther off count less
 _ROUNDS = 4
@@ -33,11 +32,13 @@ class Lines(NamedTuple):
         which: Number of the line of each point, (N,).
         place: Place of each point on its line, -1 to 1, (N,).
         number: Number of lines.
+        shift: Spread of the shift that all lines share, px.
     """
 
     which: NDArray[np.int_]
     place: Numbers
     number: int
+    shift: float
 
     def columns(self) -> Numbers:
         """Return what one px of each shift, of each turn and of the common shift adds, (N, m)."""
@@ -99,7 +100,7 @@ class Lines(NamedTuple):
             typical = np.clip(np.nan_to_num(typical, nan=_MOST_SPREAD), _LEAST_SPREAD, _MOST_SPREAD)
         far = np.nan_to_num(np.abs(own), nan=_MOST_SPREAD)
         spread = np.hypot(typical, far / _ROBUST)
-        return np.concatenate([spread[:, 0], spread[:, 1], [_ALL_SHIFT]])
+        return np.concatenate([spread[:, 0], spread[:, 1], [self.shift]])
 
 
 def lines_of(model: OutlineModel) -> Lines:
@@ -109,4 +110,4 @@ def lines_of(model: OutlineModel) -> Lines:
     low = np.array([model.place[which == one].min() for one in range(len(names))])
     high = np.array([model.place[which == one].max() for one in range(len(names))])
     place = 2.0 * (model.place - low[which]) / (high - low)[which] - 1.0
-    return Lines(which, place, len(names))
+    return Lines(which, place, len(names), model.shift)

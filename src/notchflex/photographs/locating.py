@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from notchflex.photographs.board.ruler import Look
 from notchflex.photographs.chain.axis_points import BASE, axis_points, on_axis_points
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
@@ -32,13 +33,13 @@ _SAME = math.radians(1.5)
 
 
 class Located(NamedTuple):
-    """The best fit of a robot, its model, and the next best that differs from it.
+    """The best fit of a robot, its model, and how all fits differ from it.
 
     Attributes:
         fit: The best.
         model: The outline that was fitted.
-        rival: By how much more other fits whose angles differ miss the edges (`misfit`), with the
-            largest difference, rad.
+        rival: By how much more every fit misses the edges (`misfit`), with the largest difference
+            of its angles from those of the best, rad.
         factor: By how much the photograph was made smaller for it.
     """
 
@@ -48,12 +49,15 @@ class Located(NamedTuple):
     factor: float
 
 
-def locate(table: ChainTable, contrast: Contrast, given: Sequence[Numbers] = ()) -> Located | None:
+def locate(
+    table: ChainTable, contrast: Contrast, look: Look, given: Sequence[Numbers] = ()
+) -> Located | None:
     """Find a robot in a photograph; None if nothing there looks like a tube of its proportions.
 
     Args:
         table: The robot.
         contrast: Contrast of the photograph.
+        look: What is known of its scale and tilt.
         given: Numbers from which fits are started; if there are none, starts are searched.
     """
     height, width = contrast.value.shape
@@ -66,8 +70,9 @@ def locate(table: ChainTable, contrast: Contrast, given: Sequence[Numbers] = ())
     coarse += on_axis_points(table, axis_points(table, coarse[0])[::-1])[:1]
     wide = 2.0 * table.outer * math.exp(coarse[0][3])
     fine = min(1.0, _FINE_WIDTH / wide)
+    known = look.known(coarse[0][:2] + middle).smaller(fine)
     contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
-    model = OutlineModel(table, base=BASE * table.outer)
+    model = OutlineModel(table, base=BASE * table.outer, known=known)
     fits = _fine(model, contrast, middle, [_scaled(numbers, fine) for numbers in coarse])
     whole = [fit for fit in fits if not missing(model, fit)] or fits
     first = min(whole, key=lambda fit: cost(fit, model))
@@ -79,7 +84,7 @@ def locate(table: ChainTable, contrast: Contrast, given: Sequence[Numbers] = ())
         (one - least, _differ(best.numbers, fit.numbers))
         for one, fit in zip(misfits, whole, strict=True)
     ]
-    return Located(best, model, tuple(one for one in rivals if one[1] > _SAME), fine)
+    return Located(best, model, tuple(rivals), fine)
 
 
 def _fine(

@@ -13,6 +13,8 @@ from threadpoolctl import threadpool_limits
 
 from notchflex.analysis import tip_from_angles
 from notchflex.errors import InputError
+from notchflex.photographs.board.layout import Board
+from notchflex.photographs.board.ruler import NO_RULER, Ruler
 from notchflex.photographs.chain.axis_points import axis_points, on_axis_points
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
@@ -38,13 +40,15 @@ def measure(
     loads: str | os.PathLike[str] | None = None,
     pattern: str | None = None,
     exif: bool = False,
+    scale: float | None = None,
+    board: Board | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> MeasuredPhotographs:
     """Measure the angle of every notch in photographs of a robot from the side.
 
     The outline of the robot, as its file describes it, is fitted to the edges in each photograph:
-    angles, place, scale, roll and tilt. The scale follows from the outer diameter. A photograph
-    in which anything is doubtful is refused with its reason.
+    angles, place, scale, roll and tilt. The scale follows from the outer diameter, or also from a
+    number or a board. A photograph in which anything is doubtful is refused with its reason.
 
     Args:
         photographs: One file or several: PNG, JPEG or TIFF.
@@ -55,6 +59,9 @@ def measure(
             `{pull}` for a label of the pull: `"wrist_{pull}_{tension}N.jpg"`.
         exif: Whether UserComment or ImageDescription in the EXIF of each photograph gives the
             tension: `tension=1.2 N`, and a label of the pull if wanted: `tension=1.2 N; pull=2`.
+        scale: Pixels of the photographs per mm at the robot, known to 0.3 %.
+        board: Board of markers beside the robot, in the plane in which it bends: it gives the
+            scale and the tilt.
         progress: Called with the stage, how many photographs are done, and how many there are.
 
     Returns:
@@ -62,7 +69,7 @@ def measure(
 
     Raises:
         InputError: A file is no photograph, the robot is of another kind, a photograph has no
-            loads, or `opencv-python-headless` is not installed.
+            loads, scale or board are invalid, or `opencv-python-headless` is not installed.
 
     Example:
         >>> import notchflex as nf
@@ -73,11 +80,11 @@ def measure(
     names = [os.fspath(name) for name in ([photographs] if one else photographs)]
     if not names:
         raise InputError.NO_DATA("there is no photograph to measure; name one or more")
-    table = chain_table(robot)
+    table, ruler = chain_table(robot), Ruler(scale, board)
     given = loads_of(names, robot, loads, pattern, exif)
     measured: list[MeasuredPhotograph] = []
     for number, name in enumerate(names):
-        measured.append(measure_picture(read_photograph(name), table, name))
+        measured.append(measure_picture(read_photograph(name), table, name, ruler))
         if progress is not None:
             progress("measuring", number + 1, len(names))
     return MeasuredPhotographs(robot, tuple(measured), given)
@@ -86,7 +93,11 @@ def measure(
 # Of matrices this small, threads of the linear algebra only cost.
 @threadpool_limits.wrap(limits=1)
 def measure_picture(
-    picture: NDArray[np.uint8], table: ChainTable, name: str, chain: Numbers | None = None
+    picture: NDArray[np.uint8],
+    table: ChainTable,
+    name: str,
+    ruler: Ruler = NO_RULER,
+    chain: Numbers | None = None,
 ) -> MeasuredPhotograph:
     """Measure a photograph that was read, (height, width, 3).
 
@@ -94,6 +105,7 @@ def measure_picture(
         picture: Blue, green and red.
         table: The robot.
         name: What the photograph is called.
+        ruler: What gives the scale.
         chain: Points of the tube axis from which the fit is started, px, (n + 2, 2), as in
             `MeasuredPhotograph.chain`; without them the robot is searched.
 
@@ -103,7 +115,10 @@ def measure_picture(
     picture, factor = smaller(picture)
     middle = (np.array([picture.shape[1], picture.shape[0]]) - 1.0) / 2.0
     given = () if chain is None else on_axis_points(table, (chain + 0.5) * factor - 0.5 - middle)
-    located = locate(table, contrast(picture), given)
+    look = ruler.look(picture, factor)
+    if isinstance(look, str):
+        return refused_photograph(name, table, look)
+    located = locate(table, look.hidden(contrast(picture)), look, given)
     if located is None:
         return refused_photograph(name, table, NO_TUBE)
     factor *= located.factor

@@ -48,8 +48,8 @@ def missing(model: OutlineModel, fit: Fit) -> str:
     inner = (model.kind == SPINE) & (model.which * model.table.side[notch] > 0.0) & looked
     if inner.any() and share(inner) < _LEAST_INNER:
         return (
-            "the notches are not as deep as in the robot file: their inner edges are not seen "
-            "there; check depth and cut"
+            "the inner edges of the notches are not seen where the robot file has them; check "
+            "depth and cut"
         )
     if fit.score < _LEAST_SCORE:
         return f"only {100 * fit.score:.0f} % of the outline is found in the photograph"

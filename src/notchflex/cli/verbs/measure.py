@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -13,7 +13,7 @@ from notchflex.cli.arguments.conversion import converted, flag
 from notchflex.cli.arguments.robots import Settings, chosen_robot, robot_files
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, Quiet, output_file
 from notchflex.cli.tables.measured_cut import write_cut
-from notchflex.cli.terminal import DONE, NOT_CONVERGED
+from notchflex.cli.terminal import DONE, INTERRUPTED, NOT_CONVERGED
 from notchflex.errors import InputError
 from notchflex.results.files.writing import check_folder, check_output
 from notchflex.viewer import HOST, PORT, check_host, check_installed
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 def _angle(text: str) -> float:
     return number(text, "an angle in deg, such as 20")
+
+
+def _scale(text: str) -> float:
+    return number(text, "a scale in px/mm, such as 75.3")
 
 
 def measure(
@@ -62,6 +66,23 @@ def measure(
             metavar="FOLDER",
             help="Write each photograph with its fitted outline as PNG into this folder; with `-o "
             "NAME.csv` NAME-overlays by default.",
+        ),
+    ] = None,
+    scale: Annotated[
+        float | None,
+        converted(_scale, "PX/MM"),
+        Parameter(
+            help="Pixels of the photographs per mm, at the robot; by default the scale follows "
+            "from the outer diameter alone."
+        ),
+    ] = None,
+    board: Annotated[
+        str | None,
+        Parameter(
+            metavar="LAYOUT",
+            help="Board of markers beside the robot, which gives scale and tilt: columns x rows, "
+            "side and gap of the markers in mm, such as `4x3,marker=5,gap=1.5`; "
+            "`notchflex board` draws it.",
         ),
     ] = None,
     correct: Annotated[
@@ -135,18 +156,25 @@ def measure(
     chosen = chosen_robot(robot, settings)
     with terminal.bars("measuring") as progress:
         terminal.use_compile_cache()
+        from notchflex.photographs import board_of, measure_cut
         from notchflex.photographs import measure as measured
-        from notchflex.photographs import measure_cut
 
+        ruler: dict[str, Any] = {
+            "scale": scale,
+            "board": None if board is None else board_of(board),
+        }
         if cut:
-            as_cut = measure_cut(photographs, chosen, turn_deg=turn, progress=progress)
+            as_cut = measure_cut(photographs, chosen, turn_deg=turn, progress=progress, **ruler)
             return write_cut(as_cut, outputs, output, write_robot, files)
         found = measured(
-            photographs, chosen, loads=loads, pattern=pattern, exif=exif, progress=progress
+            photographs, chosen, loads=loads, pattern=pattern, exif=exif, progress=progress, **ruler
         )
+    done = True
     if correct:
-        found = _corrected(found, port or PORT, open_browser)
+        found, done = _corrected(found, ruler, port or PORT, open_browser)
     _write(found, outputs, output, files)
+    if not done:
+        return INTERRUPTED
     return DONE if not found.refused else NOT_CONVERGED
 
 
@@ -161,17 +189,32 @@ def _check_page(correct: bool, cut: bool, port: int | None, open_browser: bool) 
         check_host(HOST, port or PORT)
 
 
-def _corrected(found: MeasuredPhotographs, port: int, open_browser: bool) -> MeasuredPhotographs:
-    """Serve the page until every photograph was accepted or left out."""
+def _corrected(
+    found: MeasuredPhotographs, ruler: dict[str, Any], port: int, open_browser: bool
+) -> tuple[MeasuredPhotographs, bool]:
+    """Serve the page until every photograph was accepted or left out, or until Ctrl-C.
+
+    Returns:
+        What was accepted, and whether every photograph was looked at.
+    """
+    from notchflex.photographs.board.ruler import Ruler
     from notchflex.viewer.correction.correction import Correction
 
-    page = Correction(found, port=port)
-    terminal.note(f"correct the fits on {page.address} (Ctrl+C ends, nothing is written)")
+    page = Correction(found, Ruler(**ruler), port=port)
+    terminal.note(f"correct the fits on {page.address} (Ctrl+C ends, what was accepted is written)")
     if open_browser:
         import webbrowser
 
         webbrowser.open(page.address)
-    return page.run()
+    corrected = page.run()
+    if page.number == 0:
+        raise KeyboardInterrupt
+    if not page.done:
+        terminal.note(
+            f"ended at photograph {page.number + 1} of {len(found)}; what was accepted before is "
+            "kept."
+        )
+    return corrected, page.done
 
 
 def _check_options(cut: bool, turn: tuple[float, ...], robot: str | None, loaded: bool) -> None:

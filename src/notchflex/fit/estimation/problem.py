@@ -46,8 +46,8 @@ class FitProblem:
             )
         self.samples, self.objective, self.unknowns = samples, objective, samples.unknowns
         self.noise: Noise | None = None
-        self.lower = np.array([one.lower for one in self.unknowns])
-        self.upper = np.array([one.upper for one in self.unknowns])
+        self.lower = np.array([one.lower for one in self.unknowns], float)
+        self.upper = np.array([one.upper for one in self.unknowns], float)
 
     def __call__(self, values: Vector) -> Cost | None:
         """Return the objective; None if the model has no solution, or no finite derivatives."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from notchflex.photographs.chain.camera import Frame, View
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
+from notchflex.photographs.chain.known import NOTHING, Known
 
 SIDE, FACE, SPINE = 0, 1, 2
 """Kinds of outline: the sides of a ring, its ends, the two edges of a spine."""
@@ -53,6 +54,8 @@ class OutlineModel:
         per_face: Points on each end of a ring.
         base: Length of the straight tube before the first notch that is looked at, mm.
         corner: Part of an end next to the spine that is not used, outer radii.
+        shift: How far blur and shading may shift all edges alike, px (standard deviation).
+        known: What is known of the view.
     """
 
     table: ChainTable
@@ -60,6 +63,8 @@ class OutlineModel:
     per_face: int = 16
     base: float = 1.0
     corner: float = 0.12
+    shift: float = 0.7
+    known: Known = NOTHING
 
     def __post_init__(self) -> None:
         """Number all points: kind, ring or notch, side or end, place along it."""

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from notchflex.errors import InputError
+from notchflex.photographs.board.layout import Board
+from notchflex.photographs.board.ruler import Ruler
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
 from notchflex.photographs.cut.depths import depths
 from notchflex.photographs.cut.measured_cut import LENGTHS, MeasuredCut
@@ -29,6 +31,8 @@ def measure_cut(
     robot: Robot,
     *,
     turn_deg: float | Sequence[float] = (),
+    scale: float | None = None,
+    board: Board | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> MeasuredCut:
     """Measure height, depth and uncut length of every notch in photographs of the straight robot.
@@ -42,6 +46,8 @@ def measure_cut(
         robot: The robot in all of them; its notches are arcs and bend in one plane.
         turn_deg: By how much the robot was turned about its axis for each photograph after the
             first, from the first on, deg; known to about 0.3 deg.
+        scale: Pixels of the photographs per mm at the robot, known to 0.3 %.
+        board: Board of markers beside the robot.
         progress: Called with the stage, how many photographs are done, and how many there are.
 
     Returns:
@@ -49,7 +55,8 @@ def measure_cut(
 
     Raises:
         InputError: A file is no photograph, the robot is of another kind, the number of turns
-            differs from the number of photographs, or `opencv-python-headless` is not installed.
+            differs from the number of photographs, scale or board are invalid, or
+            `opencv-python-headless` is not installed.
 
     Example:
         >>> import notchflex as nf
@@ -60,10 +67,10 @@ def measure_cut(
     one = isinstance(photographs, (str, os.PathLike))
     names = [os.fspath(name) for name in ([photographs] if one else photographs)]
     turns = _turns(len(names), turn_deg)
-    table = chain_table(robot)
+    table, ruler = chain_table(robot), Ruler(scale, board)
     fits: list[StraightFit] = []
     for number, name in enumerate(names):
-        fits.append(fit_straight(read_photograph(name), table, name))
+        fits.append(fit_straight(read_photograph(name), table, name, ruler))
         if progress is not None:
             progress("measuring", number + 1, len(names))
     return combined(table, fits, turns)

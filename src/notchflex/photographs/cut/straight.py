@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from notchflex.photographs.board.ruler import NO_RULER, Ruler
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 from notchflex.photographs.chain.outline import OutlineModel, spine_edge
@@ -33,6 +34,9 @@ _CORNER = 0.35  # outer radii: blurred corners beside spines shift ends
 _BENT = "the robot is bent; photograph it straight"
 _MOST_ANGLE = math.radians(12.0)
 _STEP = 1e-5  # mm, rad
+_SHIFT = 0.2
+"""How far blur and shading shift all edges of a photograph alike, px: by that the tube looks wider
+and all notches look lower, or the other way round. Nothing else in the photograph tells it."""
 
 
 class StraightFit(NamedTuple):
@@ -55,12 +59,17 @@ class StraightFit(NamedTuple):
 
 # Of matrices this small, threads of the linear algebra only cost.
 @threadpool_limits.wrap(limits=1)
-def fit_straight(picture: NDArray[np.uint8], table: ChainTable, name: str) -> StraightFit:
+def fit_straight(
+    picture: NDArray[np.uint8], table: ChainTable, name: str, ruler: Ruler = NO_RULER
+) -> StraightFit:
     """Fit heights, depths and places of all notches to a photograph, (height, width, 3)."""
     n = table.notches
     picture, factor = smaller(picture)
-    whole = contrast(picture)
-    located = locate(table, whole)
+    look = ruler.look(picture, factor)
+    if isinstance(look, str):
+        return _refused(refused_photograph(name, table, look), n)
+    whole = look.hidden(contrast(picture))
+    located = locate(table, whole, look)
     if located is None:
         return _refused(refused_photograph(name, table, NO_TUBE), n)
     if np.abs(located.fit.numbers[NUMBERS:]).max() > 1.5 * _MOST_ANGLE:
@@ -74,7 +83,8 @@ def fit_straight(picture: NDArray[np.uint8], table: ChainTable, name: str) -> St
     middle = (np.array(image.value.shape[::-1]) - 1.0) / 2.0
     reach = max(_LAST, _REACH * wide * fine)
     reaches = [reach, reach, reach, *(_ROUNDS * [_LAST])]
-    model = replace(located.model, corner=_CORNER)
+    known = located.model.known.smaller(fine / located.factor)
+    model = replace(located.model, corner=_CORNER, shift=_SHIFT, known=known)
     fit = _best(
         [refine(model, image, start, reaches, middle, NEAR) for start in _tilted(table, numbers)],
         model,

@@ -12,6 +12,7 @@ from html import escape
 import numpy as np
 
 from notchflex.errors import InputError
+from notchflex.photographs.board.ruler import NO_RULER, Ruler
 from notchflex.photographs.chain.axis_points import straight_chain
 from notchflex.photographs.chain.chain_table import chain_table
 from notchflex.photographs.measure import measure_picture, refused_photograph
@@ -23,6 +24,7 @@ from notchflex.viewer.server import HOST, PORT, bracketed, check_host, check_ins
 from notchflex.viewer.tasks import Tasks
 
 LEFT_OUT = "left out by hand"
+NOT_LOOKED_AT = "not looked at before the page was ended"
 
 _HELP = (
     "Drag the points onto the axis of the tube: one before the first notch, one where that notch "
@@ -38,6 +40,7 @@ class Correction:
 
     Args:
         found: What was measured without corrections.
+        ruler: What gives the scale.
         host: Address to serve on.
         port: Port to serve on, or the next one that is free.
 
@@ -45,10 +48,18 @@ class Correction:
         InputError: The extra `viewer` is not installed, or nothing can be served there.
     """
 
-    def __init__(self, found: MeasuredPhotographs, *, host: str = HOST, port: int = PORT) -> None:
+    def __init__(
+        self,
+        found: MeasuredPhotographs,
+        ruler: Ruler = NO_RULER,
+        *,
+        host: str = HOST,
+        port: int = PORT,
+    ) -> None:
         check_installed()
         check_host(host, port)
         self.found, self.number = found, 0
+        self._ruler = ruler
         self.results = list(found.photographs)
         self._table = chain_table(found.robot)
         self._tasks = Tasks()
@@ -80,11 +91,21 @@ class Correction:
         return self.number >= len(self.results)
 
     def run(self) -> MeasuredPhotographs:
-        """Serve the page until every photograph was accepted or left out; return the results."""
+        """Serve the page until every photograph was accepted or left out; return the results.
+
+        After Ctrl-C, what was accepted and left out by then is kept (`done` tells); the photograph
+        that is shown and those behind it are `NOT_LOOKED_AT`.
+        """
         try:
             while not self.done:
                 if (task := self._tasks.take(0.5)) is not None:
                     task()
+        except KeyboardInterrupt:
+            # A fit of the photograph that is shown was not accepted.
+            self.results[self.number :] = [
+                refused_photograph(one.source, self._table, NOT_LOOKED_AT)
+                for one in self.results[self.number :]
+            ]
         finally:
             with contextlib.redirect_stdout(io.StringIO()):  # a CSV may go there
                 self.server.stop()
@@ -96,7 +117,7 @@ class Correction:
         now = self.results[self.number]
         chain = self.plane.chain
         try:
-            fitted = measure_picture(self.picture, self._table, now.source, chain)
+            fitted = measure_picture(self.picture, self._table, now.source, self._ruler, chain)
         except InputError as problem:
             self.message = str(problem)
             self._update()

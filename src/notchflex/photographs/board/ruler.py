@@ -1,0 +1,88 @@
+"""What gives the scale of photographs: the robot itself, a number, or a board beside it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from notchflex.errors import InputError
+from notchflex.photographs.board.layout import Board
+from notchflex.photographs.board.sighting import Sighting, sight
+from notchflex.photographs.chain.chain_table import Numbers
+from notchflex.photographs.chain.known import NOTHING, Known
+from notchflex.photographs.contrast import Contrast
+
+_KNOWN = 0.003
+"""How well a scale that is given as a number is known, as a part of it."""
+
+
+@dataclass(frozen=True)
+class Ruler:
+    """What is known of the scale of all photographs beside the outer diameter of the robot.
+
+    Attributes:
+        scale: Pixels of the photographs per mm, at the robot; None if it is not given.
+        board: Board beside the robot, in the plane in which it bends.
+    """
+
+    scale: float | None = None
+    board: Board | None = None
+
+    def __post_init__(self) -> None:
+        """Check both.
+
+        Raises:
+            InputError: Both are given, or one is no scale or no board.
+        """
+        scale: Any = self.scale
+        if scale is not None:
+            if self.board is not None:
+                raise InputError.CONFLICT("a board gives the scale too; leave out scale or board")
+            if isinstance(scale, bool) or not isinstance(scale, (int, float, np.number)):
+                raise InputError.WRONG_TYPE(f"scale must be a number of px/mm, not {scale!r}")
+            if not 0.0 < scale < math.inf:
+                raise InputError.OUT_OF_RANGE(f"scale must be above 0 px/mm, not {scale:g}")
+        if self.board is not None:
+            self.board.opencv_dictionary()
+
+    def look(self, picture: NDArray[np.uint8], factor: float) -> Look | str:
+        """Look for the board in a photograph, (height, width, 3); return why it is not found.
+
+        Args:
+            picture: The photograph.
+            factor: By how much it was made smaller.
+        """
+        if self.scale is not None:
+            return Look(Known(self.scale * factor, _KNOWN))
+        if self.board is None:
+            return Look()
+        seen = sight(picture, self.board)
+        return seen if isinstance(seen, str) else Look(board=seen)
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a ruler says about one photograph.
+
+    Attributes:
+        everywhere: What is known at every place.
+        board: The board that is seen.
+    """
+
+    everywhere: Known = NOTHING
+    board: Sighting | None = None
+
+    def known(self, place: Numbers) -> Known:
+        """Return what is known of a robot at a place of the photograph, px."""
+        return self.everywhere if self.board is None else self.board.known(place)
+
+    def hidden(self, contrast: Contrast) -> Contrast:
+        """Return the contrast of the photograph without the board."""
+        return contrast if self.board is None else self.board.hidden(contrast)
+
+
+NO_RULER = Ruler()
