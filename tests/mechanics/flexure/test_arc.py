@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import legvander
+from scipy.integrate import cumulative_simpson
 
 import notchflex as nf
 from notchflex._jax import jax
@@ -13,6 +14,7 @@ from notchflex.mechanics.flexure import Rod, fibre_stretch, relative_pose, rod, 
 from notchflex.mechanics.flexure import flexure_state as plain_flexure_state
 from notchflex.mechanics.material import section_law
 from notchflex.mechanics.motion import Motion, exponential
+from notchflex.mechanics.section import SECTION_OF_CUT
 
 flexure_state = jax.jit(plain_flexure_state, static_argnames="with_pose")
 
@@ -151,6 +153,43 @@ def test_fibre_stretch_is_pachecos_wall_arc() -> None:
     strain = shape.reference_strain + shape.basis @ np.array([theta])
     length = shape.length @ strain @ np.asarray(fibre_stretch(np.array([arm, 0.0])))
     assert float(length) == pytest.approx(0.8 - theta * arm, rel=1e-14)
+
+
+def pulled_by_a_straight_tendon(tension: float, arm: float, height: float = 0.8) -> float:
+    """Angle of one notch whose tendon spans the gap straight: its arm changes along the notch.
+
+    Curvature is moment over stiffness at 2,001 points of the neutral axis, found by repetition.
+    """
+    cut = SECTION_OF_CUT["on-axis"](0.81, 0.70, 1.40)
+    ybar, stiffness = float(cut.centroid), 10000.0 * float(cut.second_moment_weak)
+    along = np.linspace(0.0, height, 2001)
+    curvature = np.zeros_like(along)
+    for _ in range(200):
+        angle = cumulative_simpson(curvature, x=along, initial=0)
+        x = cumulative_simpson(np.sin(angle), x=along, initial=0) - ybar
+        z = cumulative_simpson(np.cos(angle), x=along, initial=0)
+        end = angle[-1]
+        edge = np.array([x[-1], z[-1]]) + (arm + ybar) * np.array([np.cos(end), -np.sin(end)])
+        pull = np.array([arm, 0.0]) - edge
+        pull *= tension / np.hypot(*pull)
+        moment = np.abs((edge[0] - x) * pull[1] - (edge[1] - z) * pull[0])
+        curvature = 0.5 * (curvature + moment / stiffness)
+    return float(angle[-1])
+
+
+@pytest.mark.parametrize(("refinement", "within"), [(0, 2e-5), (1, 1e-10)])
+def test_refinement_adds_modes_under_a_straight_tendon(refinement: int, within: float) -> None:
+    # One mode is exact for a constant arm only: it misses by 8.2e-6 rad at 1.4 N, three by 1.7e-11.
+    robot = nf.Robot(
+        name="one notch",
+        tube=TUBE,
+        notch=(notch(),),
+        tendon=(nf.Tendon(radius=0.60, end_body=1, path="straight"),),
+        material=nf.Linear(10000.0),
+        friction=nf.Frictionless(),
+    )
+    state = nf.solve(robot, nf.Load(tension=1.4), refinement=refinement)
+    assert abs(state.total_angle - pulled_by_a_straight_tendon(1.4, 0.60)) < within
 
 
 def test_nothing_else_is_a_notch() -> None:

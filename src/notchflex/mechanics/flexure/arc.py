@@ -2,9 +2,10 @@
 
 The rod runs along the neutral axis, ybar from the tube axis toward the spine, and keeps its length
 h there; s = h - ybar theta at the tube axis (eq. 3) and the closing angle h / (r_o + ybar) follow.
-Under a tendon alone its moment is constant, so one mode of bending is exact and its amplitude is
-the elastic angle. Other loads add a linear part of bending, both for the strong axis, and torsion
-about the shear centre. Shear and stretch, small in a short arc, are left out.
+Under a tendon along the wall its moment is constant, so one mode of bending is exact and its
+amplitude is the elastic angle; for a straight tendon refinement adds more. Other loads add a linear
+part of bending, both for the strong axis, and torsion about the shear centre. Shear and stretch,
+small in a short arc, are left out.
 
 With elastic ends (`ends = "shell"`) the compliance of the rings is spread over the arc, and the
 neutral axis moves to where an axial force and bending do not couple. A force across the tube also
