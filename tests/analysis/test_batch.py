@@ -85,7 +85,7 @@ def test_what_makes_no_batch(wrist, robots, loads, outputs, said):
 @pytest.mark.parametrize("rows", [1, 7, 64, 65, 600, 1030])
 @pytest.mark.parametrize("cores", [1, 3])
 def test_rows_come_back_in_order_however_they_are_cut(wrist, rows, cores):
-    loads, seen = nf.pull(0.1, 2.0, steps=rows), []
+    loads, seen = nf.pull(0.1, 2.0 if rows > 1 else 0.1, steps=rows), []
     found = nf.solve_batch(wrist, loads, cores=cores, progress=lambda *done: seen.append(done))
     # Solved one at a time they are the same to the last bit: lanes do not touch each other.
     some = np.unique([0, rows // 2, rows - 1])

@@ -65,6 +65,6 @@ def test_loads_without_tendons_are_one_step_of_slack_tendons(given):
 
 def test_following_alone_with_body_forces_leaves_the_tip_as_it_is():
     loads = ExternalLoads(body_force=(BodyForceOption(1, (0.0, 0.0, 1.0), None),), following=True)
-    external = loads.on(nf.pull(0.0, 1.0, 1)).external[0]
+    external = loads.on(nf.pull(0.0, 1.0, 2)).external[0]
     assert not external.following
     assert external.body_forces == (nf.BodyForce(1, (0, 0, 1), following=True),)

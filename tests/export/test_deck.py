@@ -164,7 +164,7 @@ def test_short_rings_between_turned_notches_are_warned_of(tmp_path):
         robot = turned(uncut_length=uncut)
         path = nf.simulate(robot, nf.Load(tension=[0.5, 0.2]))
         report = nf.export_robot(path, tmp_path / "a.inp", COARSE)
-        assert any("open to one side" in one for one in report.warnings) is warned
+        assert any("opens to another side" in one for one in report.warnings) is warned
 
 
 def test_tendons_of_a_whole_tube_lie_on_their_sides():

@@ -42,6 +42,13 @@ def test_dimensions_outside_the_range_are_named():
     assert sentence in path_warnings(shallow)
 
 
+def test_short_rings_between_notches_that_open_to_different_sides_are_named():
+    turned = wrist().with_value("notch[2].direction_deg", 90.0)
+    (sentence,) = unchecked_dimensions(turned)
+    assert sentence.startswith("notches 1, 2, 3: a neighbour opens to another side")
+    assert "1.2 mm" in sentence
+
+
 @pytest.mark.parametrize(("ends", "most"), [("shell", 8.0), ("rigid", 16.0)])
 def test_an_elastic_stop(margin, ends, most):
     robot = wrist(closing="elastic", ends=ends)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from notchflex import __version__
@@ -14,12 +12,11 @@ from notchflex.export.finite_elements.meshes import mesh_of
 from notchflex.export.finite_elements.options import DeckOptions
 from notchflex.export.finite_elements.tendon_spans import TendonSpan, tendon_spans
 from notchflex.loads.external import NOTHING
+from notchflex.mechanics.chain import unchecked_dimensions
 from notchflex.results import EquilibriumPath
 from notchflex.results.same_robot import robot_digest
-from notchflex.robot import ArcNotch, Linear, Robot
+from notchflex.robot import ArcNotch, Linear
 
-# Rings of 1.9 diameters agree with the chain to 2 %, in whatever direction the next notch opens.
-_LONG_RING = 1.5
 _WHICH = {
     True: "mm, N, MPa. Half of the tube: x toward the notches, y across, z along; y = 0 is a plane "
     "of symmetry, z = 0 is held. Forces in this file are half of those of the tube.",
@@ -80,16 +77,6 @@ def _check_state(path: EquilibriumPath, step: int) -> None:
         )
 
 
-def _has_short_rings_between_turned(robot: Robot) -> bool:
-    pairs = pairwise(one for one in robot.notches if isinstance(one, ArcNotch))
-    return any(
-        (a.direction_deg - b.direction_deg) % 360.0 != 0.0
-        and "shell" in (a.ends, b.ends)
-        and a.uncut_length < _LONG_RING * robot.tube.outer_diameter
-        for a, b in pairs
-    )
-
-
 def _warnings(subject: Subject) -> tuple[str, ...]:
     robot = subject.robot
     found: list[str] = []
@@ -103,12 +90,7 @@ def _warnings(subject: Subject) -> tuple[str, ...]:
             "The chain of this robot has rigid ends beside its notches, and finite elements have "
             'not: set notch.ends = "shell" to compare the two.'
         )
-    if _has_short_rings_between_turned(robot):
-        found.append(
-            "The elastic ends of the chain take neighbouring notches to open to one side: where "
-            f"they do not, and less than {_LONG_RING:g} diameters of uncut tube lie between them, "
-            "the finite elements bend further, up to twice as far where 0.4 diameters do."
-        )
+    found += [f"The elastic ends of the chain: {one}" for one in unchecked_dimensions(robot)]
     if subject.path is not None and any(tendon.path == "wall-arc" for tendon in robot.tendon):
         found.append(
             "The tendon of the deck runs straight from edge to edge of a notch, not along the arc "

@@ -85,7 +85,7 @@ class Profile:
         for side, word, limits in ((-1.0, "below", self.lower), (1.0, "above", self.upper)):
             limit = float(limits[self.number])
             end, reason = self._end(side, limit, rise, scale, points)
-            ends.append(end)
+            ends.append(None if end is None else float(end))
             if end is None:
                 at = f" (limit {limit:.6g})" if np.isfinite(limit) else ""
                 reasons.append(reason or f"nothing in the data holds it from {word}{at}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure import Site, unchecked
-from notchflex.robot import Robot
+from notchflex.robot import Notch, Robot
 
 
 def sites_of(robot: Robot) -> tuple[Site | None, ...]:
@@ -13,7 +13,7 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
 
     The base is held by a rigid plate at its length before the first notch. The ring behind the last
     notch is free. Where neighbours differ, each takes the ring between them as if both were its own
-    kind.
+    kind and opened to its own side.
 
     Args:
         robot: The robot, n notches.
@@ -28,14 +28,23 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     last = len(notches) - 1
     ratio = robot.material.poisson_ratio
 
+    def neighbours(index: int) -> tuple[int, int]:
+        return max(index - 1, 0), min(index + 1, last)
+
     def site(index: int) -> Site:
         before, behind = lengths[index], lengths[index + 1]
-        proximal = Side("clamped" if index == 0 else "between", before)
-        return Site(proximal, Side("free" if index == last else "between", behind), ratio)
+        turned = [_is_turned(notches[index], notches[one]) for one in neighbours(index)]
+        proximal = Side("clamped" if index == 0 else "between", before, turned[0])
+        distal = Side("free" if index == last else "between", behind, turned[1])
+        return Site(proximal, distal, ratio)
 
     return tuple(
         site(index) if notch.has_elastic_ends else None for index, notch in enumerate(notches)
     )
+
+
+def _is_turned(notch: Notch, other: Notch) -> bool:
+    return (notch.direction_deg - other.direction_deg) % 360.0 != 0.0
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:

@@ -13,7 +13,9 @@ class Side(NamedTuple):
             ring beyond the last notch).
         length: Uncut length c from the edge of the notch to the next notch, to the plate or to
             the free end, mm.
+        turned: Whether the notch beyond the ring opens to another side of the tube.
     """
 
     boundary: Literal["between", "clamped", "free"]
     length: float
+    turned: bool = False

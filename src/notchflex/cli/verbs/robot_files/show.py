@@ -48,12 +48,15 @@ def show(
         from notchflex.analysis import closing, tip_from_angles
         from notchflex.analysis.notch_table import notch_table
         from notchflex.analysis.uncertainty.closing_bands import closing_bands, closing_document
+        from notchflex.mechanics.chain import unchecked_dimensions
         from notchflex.results.files.json import document_head
 
         table = closing(chosen)
         notches = notch_table(chosen, table)
         straight = np.zeros((1, chosen.number_of_notches))
         length = float(tip_from_angles(chosen, straight)[0][0, 2])
+    for sentence in unchecked_dimensions(chosen):
+        terminal.warn(sentence)
     if plot is not None:
         from notchflex.plotting.drawings.dimensioned import save_dimensioned
 
