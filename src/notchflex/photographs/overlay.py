@@ -41,9 +41,10 @@ def write_overlay(
     found: MeasuredPhotograph,
     lines: Sequence[str] = (),
 ) -> None:
-    """Draw the fitted outline and the angles over a photograph, and write it as PNG.
+    """Draw the fitted outline over a photograph with the angles, and write it as PNG.
 
-    Green points lie on an edge, orange ones on none. The photograph is made smaller.
+    Green points lie on an edge, orange ones on none. The photograph is made smaller, and the angles
+    stand above it.
 
     Args:
         target: The file.
@@ -68,12 +69,9 @@ def write_overlay(
     lines = [f"refused: {found.reason}"] if found.reason else lines or _lines(found)
     colour = _REFUSED if found.reason else (255, 255, 255)
     height = round(26 * size)
+    band = round((len(lines) + 0.4) * height)  # above the picture, so that it hides nothing
+    small = cv2.copyMakeBorder(small, band, 0, 0, 0, cv2.BORDER_CONSTANT, value=(40, 40, 40))
     for number, text in enumerate(lines, 1):
-        corner = (
-            (0, round((number - 0.85) * height)),
-            (small.shape[1], round((number + 0.25) * height)),
-        )
-        cv2.rectangle(small, *corner, (40, 40, 40), -1)
         cv2.putText(
             small, text, (height // 2, number * height), cv2.FONT_HERSHEY_SIMPLEX,
             0.62 * size, colour, max(1, round(size)), cv2.LINE_AA,
