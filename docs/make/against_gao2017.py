@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from differences import Difference, difference, joined, told
+from differences import Difference, difference, joined, table_of
 
 import gao2017
 import notchflex as nf
@@ -56,7 +56,7 @@ def differences(refinement: int) -> list[Difference]:
 
 def tables() -> dict[str, str]:
     """Return what stands on the page."""
-    return {"gao2017": told(differences(0)), "gao2017_finer": told(differences(1))}
+    return {"gao2017": table_of(differences(0)), "gao2017_finer": table_of(differences(1))}
 
 
 def pictures(folder: Path) -> None:

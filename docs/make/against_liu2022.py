@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from differences import Difference, difference, joined, told
+from differences import Difference, difference, joined, table_of
 
 import notchflex as nf
 from liu2022 import liu, pulled
@@ -48,7 +48,7 @@ def differences() -> list[Difference]:
 
 def tables() -> dict[str, str]:
     """Return what stands on the page."""
-    return {"liu2022": told(differences())}
+    return {"liu2022": table_of(differences())}
 
 
 def pictures(folder: Path) -> None:

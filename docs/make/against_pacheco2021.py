@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from differences import Difference, difference, joined, told
+from differences import Difference, difference, joined, table_of
 
 import notchflex as nf
 from loads import tensions
@@ -76,7 +76,7 @@ def simpler(name: str, wrist: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
 
 def tables() -> dict[str, str]:
     """Return what stands on the page."""
-    return {"pacheco2021": told(differences())}
+    return {"pacheco2021": table_of(differences())}
 
 
 def pictures(folder: Path) -> None:

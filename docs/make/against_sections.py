@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from differences import Difference, difference, told
+from differences import Difference, difference, table_of
 
 import notchflex as nf
 from notchflex.mechanics.flexure.u_link_geometry import CurvedEnd
@@ -38,4 +38,4 @@ def differences() -> list[Difference]:
 
 def tables() -> dict[str, str]:
     """Return what stands on the page."""
-    return {"sections": told(differences())}
+    return {"sections": table_of(differences())}

@@ -42,7 +42,7 @@ def joined(rows: list[Difference]) -> list[Difference]:
     return list(found.values())
 
 
-def told(rows: list[Difference]) -> str:
+def table_of(rows: list[Difference]) -> str:
     """Return the table in Markdown; what is below 1e-12 is rounding and said to be that."""
     return table(
         ("compared", "numbers", "worst difference"),

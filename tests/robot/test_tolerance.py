@@ -93,5 +93,5 @@ def test_what_is_no_tolerance(line: str, name: str, words: str):
 
 @pytest.mark.parametrize("table", [5, "notch.depth", [0.1]])
 def test_what_is_no_table(table: object):
-    with pytest.raises(nf.InputError, match="is no table"):
+    with pytest.raises(nf.InputError, match="is not a table"):
         nf.load_robot("pacheco2021-a").replace(tolerance=table)

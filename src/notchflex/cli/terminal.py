@@ -222,17 +222,17 @@ def rate(text: str) -> Generator[Callable[[int, int, int, int], None] | None]:
         TextColumn("{task.description}"),
         BarColumn(),
         TaskProgressColumn(),
-        TextColumn("{task.fields[told]}"),
+        TextColumn("{task.fields[status]}"),
     )
     start = monotonic()
     with Progress(*columns, console=messages(), transient=True) as progress:
-        task = progress.add_task(text, total=None, told="")
+        task = progress.add_task(text, total=None, status="")
 
         def show(done: int, total: int, unsolved: int, before: int) -> None:
             each = (monotonic() - start) / max(done - before, 1)
             left = str(timedelta(seconds=round(each * (total - done))))
-            told = f"{1.0 / max(each, 1e-9):.3g} rows/s, {left} left, {unsolved} unsolved"
-            progress.update(task, completed=done, total=total, told=told)
+            status = f"{1.0 / max(each, 1e-9):.3g} rows/s, {left} left, {unsolved} unsolved"
+            progress.update(task, completed=done, total=total, status=status)
 
         yield show
 

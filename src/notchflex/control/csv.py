@@ -47,7 +47,7 @@ def read_targets(source: str | os.PathLike[str], robot: Robot) -> Targets:
     unknown = [name for name in table.header if name not in columns]
     if unknown:
         raise InputError.TABLE_COLUMNS(
-            f"{table.name}: {unknown[0]!r} is no column of targets; there are "
+            f"{table.name}: {unknown[0]!r} is not a column of targets; there are "
             f"{', '.join(_shown(columns))}"
         )
     shapes = target_shapes(robot)

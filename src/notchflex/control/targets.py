@@ -79,7 +79,7 @@ def aim_at(
         weights: By quantity, what an error of one unit (mm, N, rad) counts; 1 where not given.
 
     Raises:
-        InputError: A weight of what is no target, not positive, or beyond `LARGEST_WEIGHT`.
+        InputError: A weight of what is not a target, not positive, or beyond `LARGEST_WEIGHT`.
     """
     weights = _check_weights(weights, targets)
     index: list[np.ndarray] = []
@@ -233,6 +233,6 @@ def _check_rotations(rotations: Float[np.ndarray, "k 3 3"]) -> None:
     error = np.abs(whole @ np.swapaxes(whole, 1, 2) - np.eye(3)).max(initial=0.0)
     if error > _ROTATION_ERROR or (np.linalg.det(whole) < 0.0).any():
         raise InputError.OUT_OF_RANGE(
-            "a target of tip_rotation is no rotation matrix: its rows must be of length 1, at "
+            "a target of tip_rotation is not a rotation matrix: its rows must be of length 1, at "
             "right angles and right-handed"
         )

@@ -30,17 +30,17 @@ def curves_missed(outcome: Outcome) -> tuple[str, ...]:
     """Return a sentence for every curve with points that the axis does not reach."""
     one = outcome.found.evaluation
     assert one is not None
-    told: list[str] = []
+    sentences: list[str] = []
     for curve in {id(w.curve): w.curve for w in outcome.problem.wishes if w.curve}.values():
         far = one.point.plain.curve(curve).values
         missed = np.flatnonzero(far > curve.within) + 1
         if len(missed):
             shown = ", ".join(map(str, missed[:10].tolist())) + (" ..." if len(missed) > 10 else "")
-            told.append(
+            sentences.append(
                 f"curve.{curve.name} is not reached at {len(missed)} of {len(far)} points "
                 f"({shown}), up to {short(float(far.max()))} mm away; asked {curve.within:g} mm."
             )
-    return tuple(told)
+    return tuple(sentences)
 
 
 def chosen_form(spec: DesignSpec, robot: Robot, forms: int) -> tuple[str, ...]:
@@ -174,16 +174,19 @@ def _missed(outcome: Outcome) -> tuple[str, ...]:
             before = worst.get(id(row.wish), (0.0, number))
             worst[id(row.wish)] = max(before, (float(missed[number]), number))
             wishes[id(row.wish)] = row.wish
-    told: list[str] = []
+    sentences: list[str] = []
     for _, number in sorted(worst.values(), reverse=True):
         row = problem.rows[number]
-        told.append(_miss(row, float(one.rows.values[number])))
+        sentences.append(_miss(row, float(one.rows.values[number])))
     start = (
         "One constraint cannot be met"
-        if len(told) == 1
+        if len(sentences) == 1
         else "These constraints contradict each other"
     )
-    return (f"{start} within the limits of the variables; the robot that comes nearest:", *told)
+    return (
+        f"{start} within the limits of the variables; the robot that comes nearest:",
+        *sentences,
+    )
 
 
 def _miss(row: Row, value: float) -> str:

@@ -27,9 +27,9 @@ def cut_document(found: MeasuredCut) -> dict[str, Any]:
         {"photograph": one.source, "turn_deg": math.degrees(turn), **_view(one)}
         for one, turn in zip(found.photographs, found.turns, strict=True)
     ]
-    told: dict[str, Any] = {"measured": found.measured, "photographs": photographs}
-    told |= found.columns() if found.measured else {"reason": found.reason}
-    return {**document_head(found.robot), **told}
+    document: dict[str, Any] = {"measured": found.measured, "photographs": photographs}
+    document |= found.columns() if found.measured else {"reason": found.reason}
+    return {**document_head(found.robot), **document}
 
 
 def _entry(one: MeasuredPhotograph) -> dict[str, Any]:

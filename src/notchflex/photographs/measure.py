@@ -68,7 +68,7 @@ def measure(
         Angles and tip with standard deviations, or the reason, for each photograph.
 
     Raises:
-        InputError: A file is no photograph, the robot is of another kind, a photograph has no
+        InputError: A file is not a photograph, the robot is of another kind, a photograph has no
             loads, scale or board are invalid, or `opencv-python-headless` is not installed.
 
     Example:

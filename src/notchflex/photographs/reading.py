@@ -22,7 +22,7 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """Return a photograph as blue, green, red of 8 bits, (height, width, 3).
 
     Raises:
-        InputError: There is no such file, it is no photograph, or it is too large or too small.
+        InputError: There is no such file, it is not a photograph, or it is too large or too small.
     """
     need("cv2", "photographs", "measuring photographs")
     name = os.fspath(source)
@@ -32,7 +32,7 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
     image = _decoded(data) if min(size) > 0 else None
     if image is None or image.ndim != 3:
         raise InputError.FILE_FORMAT(
-            f"{name} is no photograph that can be read; give a PNG, JPEG or TIFF file"
+            f"{name} is not a photograph that can be read; give a PNG, JPEG or TIFF file"
         )
     _check_size(name, image.shape[1], image.shape[0])
     return image

@@ -37,6 +37,6 @@ def is_whole(data: memoryview) -> bool:
     place = _place(data)
     if place is None:
         return False
-    told = bytes(data[place : place + 8])
+    stored = bytes(data[place : place + 8])
     data[place : place + 8] = BLANK.encode()
-    return told == b"%08x" % zlib.crc32(data)
+    return stored == b"%08x" % zlib.crc32(data)

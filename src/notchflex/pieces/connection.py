@@ -67,14 +67,14 @@ def local_cluster(workers: int) -> Generator[Any]:
 
 
 def check_address(address: str) -> None:
-    """Raise if a text is no address of a scheduler.
+    """Raise if a text is not an address of a scheduler.
 
     Raises:
         InputError: It is not written as HOST:PORT.
     """
     if not _ADDRESS.fullmatch(address):
         raise InputError.BAD_SYNTAX(
-            f"{address!r} is no address of a scheduler; write it like tcp://10.0.0.1:8786."
+            f"{address!r} is not an address of a scheduler; write it like tcp://10.0.0.1:8786."
         )
 
 

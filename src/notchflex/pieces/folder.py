@@ -39,7 +39,7 @@ def manifest_in(folder: str | os.PathLike[str], kind: str) -> Manifest:
     Raises:
         InputError: There is none, or it cannot be read.
     """
-    file, what = manifest_file(folder, kind), f"{folder} is no folder of a {kind}"
+    file, what = manifest_file(folder, kind), f"{folder} is not a folder of a {kind}"
     if not Path(folder).is_dir():
         raise InputError.FILE_NOT_FOUND(f"{what}: there is no such folder.")
     if not file.exists():

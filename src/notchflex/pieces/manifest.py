@@ -71,10 +71,10 @@ class Manifest:
             wanted: The kind that it must be of.
 
         Raises:
-            InputError: It is no manifest of this kind, or one of another format.
+            InputError: It is not a manifest of this kind, or one of another format.
         """
         damaged = InputError.FILE_DAMAGED(
-            f"{where} is no manifest of a {wanted}, or was changed; remove its folder, or take "
+            f"{where} is not a manifest of a {wanted}, or was changed; remove its folder, or take "
             "another one."
         )
         try:

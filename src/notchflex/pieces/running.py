@@ -75,7 +75,7 @@ def on_cluster(client: Any, task: Task, folder: str, pieces: Iterable[int]) -> G
 
     def submit(numbers: Iterable[int]) -> None:
         for piece in numbers:
-            # A piece is no pure function: its file may be gone while its result is remembered.
+            # A piece is not a pure function: its file may be gone while its result is remembered.
             future = client.submit(_work, recipe, text, folder, piece, pure=False)
             running[future] = piece
             future.add_done_callback(finished.put)

@@ -43,6 +43,6 @@ class SobolPart:
         while start > engine.num_generated:
             engine.fast_forward(min(start - engine.num_generated, _FORWARD))
         self._engine = engine
-        with warnings.catch_warnings():  # that the first draw is no power of two
+        with warnings.catch_warnings():  # that the first draw is not a power of two
             warnings.simplefilter("ignore", UserWarning)
             return engine.random(stop - start)

@@ -202,7 +202,7 @@ def check_robot(state: object, robot: Robot) -> None:
 
     Raises:
         InputError: It belongs to another one, and the message names the values that differ; or it
-            is no state.
+            is not a state.
     """
     if not isinstance(state, State | SavedState):
         raise InputError.WRONG_TYPE(

@@ -200,7 +200,7 @@ def _rule(record: dict[str, Any], place: _Place) -> str:
         if got != got:  # only NaN differs from itself
             return "it must be a number"
         if kind == "greater_than_equal" and got <= 0.0 < limit < 1.0:
-            return f"it must be greater than 0{unit}"  # a negative length is no small length
+            return f"it must be greater than 0{unit}"  # a negative length is not a small length
         percent = "; 0.04 is 4 %" if kind == "less_than_equal" and "strain" in place.name else ""
         return f"it must be {_BOUNDS[kind][0]} {limit:g}{unit}{percent}"
     if kind == "number_wanted":

@@ -24,7 +24,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
         The robot; it remembers the text of its file, so that `save_robot` keeps the comments.
 
     Raises:
-        RobotFileError: There is no such robot or file, it is no TOML, or a value in it is not
+        RobotFileError: There is no such robot or file, it is not TOML, or a value in it is not
             allowed; the message names the file, the key and, for TOML syntax, the line.
 
     Example:
@@ -53,7 +53,7 @@ def robot_from_text(text: str, shown: str = "robot file") -> Robot:
         shown: What messages call the text.
 
     Raises:
-        InputError: The text is no TOML, or a value in it is not allowed.
+        InputError: The text is not TOML, or a value in it is not allowed.
     """
     return remember_source(from_table(parse_toml(text, shown)), text)
 
@@ -82,7 +82,7 @@ def _find(name_or_path: str | os.PathLike[str]) -> Path:
 
 def _read_text(path: Path, shown: str) -> str:
     try:
-        # -sig: some editors begin a file with a byte order mark, which is no TOML
+        # -sig: some editors begin a file with a byte order mark, which is not TOML
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise RobotFileError.FILE_NOT_FOUND(f"{shown}: there is no such file.") from None
@@ -115,7 +115,7 @@ def parse_toml(
         error_class: The class of the error.
 
     Raises:
-        InputError: The text is no TOML; the message names the line.
+        InputError: The text is not TOML; the message names the line.
     """
     try:
         return tomllib.loads(text)

@@ -283,7 +283,7 @@ def source_of(robot: Robot) -> str | None:
 def remember_source(robot: Robot, text: str | None) -> Robot:
     """Keep the text of a robot's file beside it, so that its comments survive a rewrite.
 
-    It is no field: two robots with the same values are equal whatever their files say.
+    It is not a field: two robots with the same values are equal whatever their files say.
     """
     object.__setattr__(robot, "_source", text)
     return robot

@@ -69,7 +69,7 @@ def read_tolerances(table: Any) -> Any:
     ):
         return tuple(cast("Sequence[Tolerance]", table))
     if not isinstance(table, Mapping):
-        text = "is no table; write [tolerance] and below it lines such as notch.depth = 0.01."
+        text = "is not a table; write [tolerance] and below it lines such as notch.depth = 0.01."
         raise ProblemError([("", text)])
     found: dict[str, Tolerance] = {}
     problems: list[tuple[str, str]] = []
@@ -107,7 +107,7 @@ def _entry_problems(name: str, entry: dict[str, Any]) -> Iterator[str]:
             if not _PERCENT.fullmatch(value):
                 yield f'has the text "{value}"; {_HOW}.'
         elif isinstance(value, bool) or not isinstance(value, (int, float)):
-            yield f"has {key} = {value!r}, which is no number; {_HOW}."
+            yield f"has {key} = {value!r}, which is not a number; {_HOW}."
         elif not 0.0 <= value < math.inf:
             yield f"has {key} = {value}; give a finite number of 0 or more, without a sign."
     if "sd" not in entry and not {"plus", "minus"} <= entry.keys():

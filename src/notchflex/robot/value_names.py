@@ -129,7 +129,7 @@ def number_at(robot: Robot, path: str) -> float:
         path: Its name, as for `Robot.with_value`.
 
     Raises:
-        InputError: There is no such value, it is no number that may change little by little, or
+        InputError: There is no such value, it is not a number that may change little by little, or
             several notches have unlike ones.
     """
     if not isinstance(path, str):  # pyright: ignore[reportUnnecessaryIsInstance]

@@ -22,7 +22,7 @@ from notchflex.solver.residual import evaluate
 
 
 class SubstepHistory(NamedTuple):
-    """How a solved state was come to from the one before, told by `Advance`.
+    """How the solver reached a state from the one before, from `LoadStepResult`.
 
     Attributes:
         between: The state before the last part of the load.

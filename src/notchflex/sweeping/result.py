@@ -282,7 +282,7 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
         The sweep: `lazy` and `to_xarray` are its rows.
 
     Raises:
-        InputError: It is no folder of a sweep, or polars is not installed.
+        InputError: It is not a folder of a sweep, or polars is not installed.
     """
     need("polars", "data", "read_sweep")
     manifest = SweepManifest(manifest_in(directory, KIND).document)

@@ -95,7 +95,7 @@ def plan_and_robot(
     """Return a plan and the robot that it names.
 
     Raises:
-        InputError: It is no plan, or its file or its robot cannot be read.
+        InputError: It is not a plan, or its file or its robot cannot be read.
     """
     if isinstance(plan, Mapping):
         plan = plan_from_table(plan)

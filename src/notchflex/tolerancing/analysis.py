@@ -92,11 +92,11 @@ def tolerance_analysis(
     if not study.sources:
         raise InputError.NO_DATA("nothing deviates: all tolerances are 0; give one that is not.")
     effects = linear_effects(study)
-    told = {name: _told(progress, name) for name in ("drawing", "sensitivity", "tolerances")}
+    report = {name: _reporter(progress, name) for name in ("drawing", "sensitivity", "tolerances")}
     if folder is None:
-        drawn = _draw(study, draws, seed, told["drawing"])
+        drawn = _draw(study, draws, seed, report["drawing"])
     else:
-        drawn = draw_in_pieces(study, asked, draws, seed, folder, _of_pieces(told["drawing"]))
+        drawn = draw_in_pieces(study, asked, draws, seed, folder, _of_pieces(report["drawing"]))
     return ToleranceAnalysis(
         robot=robot,
         paths=study.paths,
@@ -106,8 +106,8 @@ def tolerance_analysis(
         sources=tuple(one.name for one in study.sources),
         linear=effects,
         drawn=drawn,
-        sobol=sobol(study, draws, seed, told["sensitivity"]),
-        control=control(study, draws, asked.wanted_yield, seed, told["tolerances"]),
+        sobol=sobol(study, draws, seed, report["sensitivity"]),
+        control=control(study, draws, asked.wanted_yield, seed, report["tolerances"]),
         wanted_yield=asked.wanted_yield,
         seed=seed,
     )
@@ -137,12 +137,12 @@ def tolerances_for(
     return robot.replace(tolerance=asked.tolerances).tolerance, ()
 
 
-def _told(progress: Stage | None, stage: str) -> Callable[[int, int], None] | None:
+def _reporter(progress: Stage | None, stage: str) -> Callable[[int, int], None] | None:
     return None if progress is None else partial(progress, stage)
 
 
-def _of_pieces(told: Callable[[int, int], None] | None) -> Progress | None:
-    return None if told is None else lambda done, count, *_: told(done, count)
+def _of_pieces(report: Callable[[int, int], None] | None) -> Progress | None:
+    return None if report is None else lambda done, count, *_: report(done, count)
 
 
 def _draw(

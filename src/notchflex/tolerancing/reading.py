@@ -81,7 +81,7 @@ def spec_of(table: Mapping[str, Any], robot: Robot) -> ToleranceSpec:
 def _table(table: Mapping[str, Any], key: str, before: str = "") -> dict[str, Any]:
     found = table.get(key, {})
     if not isinstance(found, dict):
-        raise InputError.WRONG_TYPE(f"`{before}{key}` is no table; write [{before}{key}].")
+        raise InputError.WRONG_TYPE(f"`{before}{key}` is not a table; write [{before}{key}].")
     return cast("dict[str, Any]", found)
 
 
@@ -101,7 +101,7 @@ def _limits(table: Mapping[str, Any]) -> Iterator[AcceptanceLimit]:
     for number, one in enumerate(cast("list[Any]", given), start=1):
         where = f"accept[{number}]"
         if not isinstance(one, dict):
-            raise InputError.WRONG_TYPE(f"`{where}` is no table; write [[accept]].")
+            raise InputError.WRONG_TYPE(f"`{where}` is not a table; write [[accept]].")
         keys = cast("dict[str, Any]", one)
         _known(keys, LIMIT_KEYS, where)
         if "quantity" not in keys:

@@ -186,11 +186,11 @@ def explore_in_pieces(
     task = WorkspaceTask(alone, largest, number, pretension, seed)
     each = 2 * LEVELS
 
-    def told(done: int, total: int, *_: int) -> None:
+    def report(done: int, total: int, *_: int) -> None:
         if progress is not None:
             progress(done // each, total // each)
 
-    folder.run(task, cores=explorer.cores, progress=told)
+    folder.run(task, cores=explorer.cores, progress=report)
     codes = np.zeros(4, int)
     every: dict[str, np.ndarray] = {}
     for piece in range(task.manifest.pieces):

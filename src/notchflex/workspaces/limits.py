@@ -58,7 +58,7 @@ def limits_of(given: Mapping[str, object] | None) -> tuple[Limit, ...]:
             None for none.
 
     Raises:
-        InputError: No such quantity, a bound that is no number, or bounds that are reversed.
+        InputError: No such quantity, a bound that is not a number, or bounds that are reversed.
     """
     if given is None:
         return ()

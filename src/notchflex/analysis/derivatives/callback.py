@@ -74,7 +74,7 @@ class VectorSolver:
 
     def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
         """The path at some values; the last one is kept, as its derivatives are asked for next."""
-        if not np.isfinite(flat).all():  # a tension that is no number would mean a slack tendon
+        if not np.isfinite(flat).all():  # a tension that is not a number would mean a slack tendon
             raise InputError.NOT_FINITE("values must be finite numbers")
         key = flat.tobytes()
         if key not in self._last:

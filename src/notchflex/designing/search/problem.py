@@ -166,7 +166,7 @@ class Problem:
         self.failures[reason] = self.failures.get(reason, 0) + 1
 
     def read(self, point: Point, z: Vector) -> Evaluation | None:
-        """Return what is asked of a solved robot; None where it is no number."""
+        """Return what is asked of a solved robot; None where it is not a number."""
         terms, total = self._terms(point, z)
         bounded = tuple(self._joined([one.wish.every(point)]) for one in self.bounds)
         has_slopes = point.slopes_of is not None
@@ -213,7 +213,7 @@ class Problem:
             for reading in readings
         )
         if not good:
-            self._failed("a quantity that is asked is no number, as where a notch never closes")
+            self._failed("a quantity that is asked is not a number, as where a notch never closes")
         return good
 
     @cached_property

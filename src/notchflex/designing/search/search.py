@@ -111,14 +111,14 @@ def search(
         InputError: No robot between the limits can be solved; the message says why.
     """
     searches = Searches()
-    told: Progress = progress or (lambda stage, done, total: None)
+    report: Progress = progress or (lambda stage, done, total: None)
     several = max(1, round(options.starts / len(problems)))
     each = max(4, options.candidates // len(problems))
     try:
         for number, problem in enumerate(problems):
-            told("ranking robots", number, len(problems))
+            report("ranking robots", number, len(problems))
             for done, z in enumerate(starts(problem, several, each, options.seed)):
-                told("searching", number * several + done, several * len(problems))
+                report("searching", number * several + done, several * len(problems))
                 settled = searches.settled(number)
                 found = search_from(problem, z, options.iterations, settled)
                 if found.evaluation is not None:
@@ -128,10 +128,10 @@ def search(
             if searches.has_followed(number):
                 break
         if searches.outcomes and searches.best.merit[0] > 0.0:
-            told("searching what comes nearest", 0, 1)
+            report("searching what comes nearest", 0, 1)
             _approach(searches, options)
         if searches.outcomes and not searches.best.found.stationary:
-            told("searching on", 0, 1)
+            report("searching on", 0, 1)
             best = searches.best
             if best.merit[0] == 0.0:
                 found = search_on(best.problem, best.found, options.iterations)

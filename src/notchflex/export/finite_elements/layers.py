@@ -18,7 +18,7 @@ def check_shape(robot: Robot) -> list[ArcNotch]:
     """Return the notches of a robot that the mesh can be made of.
 
     Raises:
-        InputError: A notch is no arc, or has a precurvature, or its cut leaves a solid strip.
+        InputError: A notch is not an arc, or has a precurvature, or its cut leaves a solid strip.
     """
     notches: list[ArcNotch] = []
     for number, notch in enumerate(robot.notches, start=1):

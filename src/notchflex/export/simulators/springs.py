@@ -88,7 +88,7 @@ def fit_spring(
         stiffness: Stiffness of the free flexure, N mm/rad, where the samples say nothing.
     """
     low, high = float(angle.min(initial=0.0)), float(angle.max(initial=0.0))
-    # Rounding is no motion to a side.
+    # Rounding is not a motion to a side.
     low, high = (0.0 if abs(end) < _LEAST_TURN else end for end in (low, high))
     if high - low < _LEAST_TURN:
         return linear_spring(stiffness)

@@ -13,14 +13,14 @@ def check_window(cut: NotchCut, outer: float) -> tuple[float, float, float]:
     """Return start, end [mm] and half the angle [rad] of a radial cut.
 
     Raises:
-        InputError: It is no window with straight ends.
+        InputError: It is not a window with straight ends.
     """
     if len(cut.corners) == 4:
         (start, _), (low, bottom), (high, also), (end, _) = cut.corners
         if (start, end, bottom) == (low, high, also):
             return start, end, math.acos(bottom / outer)
     raise InputError.UNSUPPORTED(
-        "a radial cut that is no window with straight ends has no solid; export a flat pattern."
+        "a radial cut that is not a window with straight ends has no solid; export a flat pattern."
     )
 
 

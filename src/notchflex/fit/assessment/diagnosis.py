@@ -150,7 +150,7 @@ def _noise(found: Calibration) -> Iterator[str]:
         )
     if not found.is_likelihood:
         kind = type(found.problem.objective).__name__
-        yield f"{kind} is no likelihood: it gives no intervals. LeastSquares does."
+        yield f"{kind} is not a likelihood: it gives no intervals. LeastSquares does."
     elif found.tells_no_noise:
         yield (
             "No more numbers were measured than constants fitted, and nothing tells their noise: "

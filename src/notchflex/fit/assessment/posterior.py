@@ -85,8 +85,8 @@ def sample_posterior(
         progress: Called with the name of the task, how much of it is done, and how much there is.
 
     Raises:
-        InputError: The objective is no likelihood, the data are too few, a number is too small, or
-            numpyro is not installed (extra `bayes`).
+        InputError: The objective is not a likelihood, the data are too few, a number is too small,
+            or numpyro is not installed (extra `bayes`).
     """
     _check(found)
     if draws < LEAST_DRAWS or chains < 1 or warm_up < 0:

@@ -178,7 +178,7 @@ class Calibration:
             value: In the unit of the robot file.
 
         Raises:
-            InputError: There is no such constant, or the objective is no likelihood.
+            InputError: There is no such constant, or the objective is not a likelihood.
         """
         if name not in self.names:
             raise InputError.UNKNOWN_NAME(

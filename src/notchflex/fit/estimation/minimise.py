@@ -1,7 +1,7 @@
 """Minimising a function within limits from its gradient and (approximate) curvature.
 
 `scipy.optimize.least_squares` searches, with its trust region and its steps along limits. It takes
-residuals: a function that is no sum of squares is passed as residuals that have its value,
+residuals: a function that is not a sum of squares is passed as residuals that have its value,
 gradient and curvature. A trial value at which the model has no solution counts as infinite.
 """
 

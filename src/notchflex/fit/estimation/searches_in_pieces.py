@@ -120,11 +120,11 @@ def search_in_pieces(
     while len(minima) < starts and last < task.manifest.pieces:
         last = min(last + starts - len(minima), task.manifest.pieces)
 
-        def told(rows: int, *_: int, before: int = done) -> None:
+        def report(rows: int, *_: int, before: int = done) -> None:
             if progress is not None:
                 progress("searching", min(before + rows, starts), starts)
 
-        folder.run(task, pieces=range(done, last), cores=1, progress=told)
+        folder.run(task, pieces=range(done, last), cores=1, progress=report)
         for piece in range(done, last):
             head = finished_head(folder.directory, task.manifest, piece)
             if head["codes"][0] or not piece:

@@ -6,7 +6,7 @@ them; cutting beam and tendon in a gap shows that contact forces need not be sum
 
 Liu 2022 also reads the pull as a dead load or a follower: it then stands along the channel of
 the proximal or the distal body, on the same point, while the way and its turning stay as they
-are. That is a reading of a paper; it is no tendon whose work is tension times length.
+are. That is a reading of a paper; it is not a tendon whose work is tension times length.
 """
 
 from __future__ import annotations

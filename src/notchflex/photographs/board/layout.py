@@ -165,7 +165,7 @@ def board_of(text: str) -> Board:
     """Return the board that a text describes, lengths in mm.
 
     Raises:
-        InputError: The text is no board.
+        InputError: The text is not a board.
 
     Example:
         >>> board_of("4x3,marker=5,gap=1.5").text()
@@ -189,7 +189,7 @@ def board_of(text: str) -> Board:
         or len(given) < len(others)
     ):
         raise InputError.BAD_SYNTAX(
-            f"{text!r} is no board; give columns x rows, and marker and gap in mm, {_WAYS}"
+            f"{text!r} is not a board; give columns x rows, and marker and gap in mm, {_WAYS}"
         )
     for name in ("marker", "gap"):
         try:
@@ -197,5 +197,7 @@ def board_of(text: str) -> Board:
         except ValueError:
             given[name] = math.nan
         if not math.isfinite(given[name]):
-            raise InputError.BAD_SYNTAX(f"{name} of the board {text!r} is no length in mm, {_WAYS}")
+            raise InputError.BAD_SYNTAX(
+                f"{name} of the board {text!r} is not a length in mm, {_WAYS}"
+            )
     return Board(int(columns), int(rows), **given)

@@ -36,7 +36,7 @@ class Ruler:
         """Check both.
 
         Raises:
-            InputError: Both are given, or one is no scale or no board.
+            InputError: Both are given, or one is not a scale or not a board.
         """
         scale: Any = self.scale
         if scale is not None:

@@ -54,7 +54,7 @@ def measure_cut(
         Lengths with standard deviations, or the reason why there are none.
 
     Raises:
-        InputError: A file is no photograph, the robot is of another kind, the number of turns
+        InputError: A file is not a photograph, the robot is of another kind, the number of turns
             differs from the number of photographs, scale or board are invalid, or
             `opencv-python-headless` is not installed.
 

@@ -14,7 +14,7 @@ from typing import TextIO
 def write_document(text: str) -> None:
     """Write a document (JSON, CSV) to standard output, as UTF-8 whatever the terminal takes.
 
-    A reader that has gone (`notchflex schema | head`) is no failure.
+    A reader that has gone (`notchflex schema | head`) is not a failure.
 
     Args:
         text: What to write.

@@ -183,7 +183,7 @@ def replacing(target: str | Path) -> Generator[Path]:
     `with` raises, the temporary file is removed and `target` is as it was.
 
     Args:
-        target: Path of the file to make or replace. A link is followed; what is no ordinary
+        target: Path of the file to make or replace. A link is followed; what is not an ordinary
             file (/dev/null, a pipe) is written directly.
 
     Yields:
@@ -241,7 +241,7 @@ def read_text(source: str | os.PathLike[str], kind: str) -> str:
         form = kind.removesuffix(" file")  # such as "CSV file"
         form = form if form[0].isupper() else "text"
         saved = f"save it as {form} in UTF-8"
-        raise InputError.FILE_UNREADABLE(f"{source} is no text in UTF-8; {saved}.") from None
+        raise InputError.FILE_UNREADABLE(f"{source} is not text in UTF-8; {saved}.") from None
     except (OSError, ValueError) as problem:  # ValueError: a null character in the name
         words = getattr(problem, "strerror", None) or problem
         raise InputError.FILE_UNREADABLE(f"{source} cannot be read: {words}.") from None

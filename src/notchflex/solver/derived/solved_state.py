@@ -214,7 +214,7 @@ def along_edges(
     flat = pairs.reshape(-1, pairs.shape[-1]).T
     met = jnp.take_along_axis(flat, jnp.maximum(chain.contacts, 0), axis=1)
     beyond = jnp.roll(chain.contacts, -1, axis=1).at[:, -1].set(-1)
-    # The last edge, where the tendon enters its end body, is no contact: it is fixed there.
+    # The last edge, where the tendon enters its end body, is not a contact: it is fixed there.
     return jnp.where(beyond >= 0, met, jnp.nan)
 
 

@@ -57,7 +57,7 @@ class PreparedChain:
         """The robot padded to as many flexures as programs are compiled for.
 
         Its tendons are taken to touch the wall at every edge of every gap; where they do depends on
-        the own chain (`run.SolverRun`), so that it is no part of a program.
+        the own chain (`run.SolverRun`), so that it is not a part of a program.
         """
         chain = self.chain
         more = padded(chain, capacity(chain.flexures), chain.contacts.shape[1])
