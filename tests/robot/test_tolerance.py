@@ -70,7 +70,7 @@ def test_states_do_not_depend_on_tolerances():
         ('notch.depth = "5 mm"', "notch.depth", '"5 %"'),
         ("notch.depth = -0.1", "notch.depth", "0 or more"),
         ("notch.depth = nan", "notch.depth", "finite"),
-        ("notch.depth = true", "notch.depth", "no number"),
+        ("notch.depth = true", "notch.depth", "not a number"),
         ("notch.depth = {plus = 0.1}", "notch.depth", "both `plus` and `minus`"),
         ("notch.depth = {sd = 0.1, high = 2}", "notch.depth", "Allowed: sd, plus, minus"),
         ("notch.depth = {sd = 0.1, per_notch = 1}", "notch.depth", "true or false"),
