@@ -35,7 +35,8 @@ def steer(session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"])
     """Find settings of the tendons that bring the tip to a point, within their sliders.
 
     Tendons that are pulled by tension are driven, all others held; where there are none, all
-    strokes.
+    strokes. Where the tip is at the point already, nothing moves: a smaller tension that friction
+    lets hold the tip would only make the robot creep while the mouse rests.
 
     Args:
         session: The robot in its present state, with its friction history.
@@ -43,6 +44,9 @@ def steer(session: Session, ends: ControlRanges, point: Float[np.ndarray, " 3"])
         point: Where the tip is to be, in the world, mm.
     """
     here, robot = session.controls, session.robot
+    away = float(np.linalg.norm(session.solved.tip_position - point))
+    if away <= _SEARCH.tolerance:
+        return Steered(here, away, True)
     drive: Drive = TENSION if TENSION in here.by else STROKE
     driven = [by == drive for by in here.by]
     held = [None if free else value for free, value in zip(driven, here.value, strict=True)]

@@ -13,9 +13,7 @@ from notchflex._quantity import REGISTERED
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.quantities import MODES_FAIL  # and registers all formulas
-from notchflex.solver.derived.solved_state import (
-    SolvedState,
-)
+from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 
 
