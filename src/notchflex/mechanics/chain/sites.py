@@ -28,12 +28,10 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     last = len(notches) - 1
     ratio = robot.material.poisson_ratio
 
-    def neighbours(index: int) -> tuple[int, int]:
-        return max(index - 1, 0), min(index + 1, last)
-
     def site(index: int) -> Site:
         before, behind = lengths[index], lengths[index + 1]
-        turned = [_is_turned(notches[index], notches[one]) for one in neighbours(index)]
+        neighbours = notches[max(index - 1, 0)], notches[min(index + 1, last)]
+        turned = [_is_turned(notches[index], one) for one in neighbours]
         proximal = Side("clamped" if index == 0 else "between", before, turned[0])
         distal = Side("free" if index == last else "between", behind, turned[1])
         return Site(proximal, distal, ratio)
