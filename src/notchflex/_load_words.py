@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 
-MOST_STEPS = 1_000_000
 SPEC = "values or start:stop:count ranges joined by commas, such as 2 or 0,1,2.5 or 0:3:31,3:0:31"
 _BODY = "BODY:X,Y,Z or BODY:X,Y,Z@X,Y,Z, such as 3:0,0.1,0 or 3:0,0.1,0@0.8,0,0.5"
+MOST_STEPS = 1_000_000
+"""Steps of the longest range."""
 _DIGITS = 9
 """More digits than any number of a body has."""
 

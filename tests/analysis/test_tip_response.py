@@ -25,6 +25,12 @@ def pose_slope(after, before, width: float) -> np.ndarray:
     return np.concatenate([vector, after.tip_position - before.tip_position]) / width
 
 
+def test_a_response_is_shown_in_a_few_lines(found):
+    lines = repr(found).splitlines()
+    assert len(lines) < 8
+    assert "3 steps x 6 x 1 tendons" in lines[1]
+
+
 @pytest.mark.nightly
 def test_compliance_against_differences(wrist, found, margin):
     width = 2e-4

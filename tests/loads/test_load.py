@@ -64,6 +64,9 @@ def test_steps_and_tendon_are_whole_numbers(make, wrong):
         make(0, 3, wrong)
     with pytest.raises(InputError, match="tendon"):
         make(0, 3, tendon=wrong)
+    for huge in ({"steps": 10**9}, {"tendon": 10**9}):  # before any memory is taken
+        with refused("OUT_OF_RANGE"):
+            make(0, 3, **huge)
     assert len(make(0, 3, np.int64(5))) == 5
 
 

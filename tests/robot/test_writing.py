@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import notchflex as nf
 from notchflex.robot import robot_from_text, robot_text
 from notchflex.robot.reading import READY
+from refusals import refused
 
 READY_NAMES = sorted(path.stem for path in READY.glob("*.toml"))
 
@@ -168,6 +169,23 @@ def test_what_cannot_be_written(tmp_path: Path):
     with pytest.raises(nf.RobotFileError, match="cannot be read"):
         nf.save_robot(robot, tmp_path / "a.toml", template=tmp_path / "none.toml")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_write_leaves_the_file_that_is_there(tmp_path: Path, monkeypatch):
+    robot = nf.load_robot("pacheco2021-a")
+    file = tmp_path / "a.toml"
+    nf.save_robot(robot, file)
+    before = file.read_bytes()
+
+    def fill_the_disk(path: Path, text: str, **_: object) -> None:
+        path.write_bytes(text.encode()[:100])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", fill_the_disk)
+    with refused("FILE_UNWRITABLE", "No space left on device"):
+        nf.save_robot(robot, file)
+    assert file.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [file]
 
 
 lengths = st.floats(1e-3, 1e3)

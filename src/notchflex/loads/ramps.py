@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from notchflex._load_words import MOST_STEPS
 from notchflex.errors import InputError
 from notchflex.loads.load_path import LoadPath
 from notchflex.loads.validation import check_integer, check_number
+
+_MOST_TENDONS = 1000
 
 
 def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> LoadPath:
@@ -22,8 +25,8 @@ def pull(start: float, stop: float, steps: int = 31, *, tendon: int = 1) -> Load
         The path; `.release()` adds the way back, `.loaded(...)` external loads.
 
     Raises:
-        InputError: Fewer than one step, or one step between different tensions; a negative or
-            infinite tension, no such tendon.
+        InputError: Fewer than one step or more than a million, or one step between different
+            tensions; a negative or infinite tension, no such tendon.
 
     Example:
         >>> pull(0.0, 3.0, steps=4).tension[:, 0].tolist()
@@ -45,8 +48,8 @@ def stroke_path(start: float, stop: float, steps: int = 31, *, tendon: int = 1) 
         The path; `.release()` adds the way back, `.loaded(...)` external loads.
 
     Raises:
-        InputError: Fewer than one step, or one step between different strokes; an infinite
-            stroke, no such tendon.
+        InputError: Fewer than one step or more than a million, or one step between different
+            strokes; an infinite stroke, no such tendon.
 
     Example:
         >>> stroke_path(0.0, 1.0, steps=3).stroke[:, 0].tolist()
@@ -59,8 +62,14 @@ def _ramp(what: str, start: float, stop: float, steps: int, tendon: int) -> Load
     steps, tendon = check_integer(steps, "steps"), check_integer(tendon, "tendon")
     if steps < 1:
         raise InputError.NO_DATA(f"a range needs at least one step; got {steps}")
-    if tendon < 1:
-        raise InputError.OUT_OF_RANGE(f"tendons are counted from 1; got {tendon}")
+    if steps > MOST_STEPS:
+        raise InputError.OUT_OF_RANGE(
+            f"a range has at most {MOST_STEPS:,} steps; got {steps:,}. Take fewer."
+        )
+    if not 1 <= tendon <= _MOST_TENDONS:
+        raise InputError.OUT_OF_RANGE(
+            f"tendons are counted from 1, to {_MOST_TENDONS} at most; got {tendon}"
+        )
     first, last = check_number(start, f"the first {what}"), check_number(stop, f"the last {what}")
     if steps == 1 and first != last:
         raise InputError.OUT_OF_RANGE(

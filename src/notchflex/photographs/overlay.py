@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from notchflex._replacing import replacing
 from notchflex.photographs.cut.measured_cut import MeasuredCut
 from notchflex.photographs.measured import MeasuredPhotograph
-from notchflex.results.files.writing import replacing
 
 LONGEST = 1800
 """Longer side of an overlay, px."""

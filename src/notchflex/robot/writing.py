@@ -11,6 +11,7 @@ from typing import Any, cast
 import tomlkit
 from tomlkit.exceptions import ParseError
 
+from notchflex._replacing import replacing
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.error_messages import fields_of
 from notchflex.robot.reading import robot_from_text
@@ -63,11 +64,12 @@ def save_robot(
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
             raise RobotFileError.FILE_UNREADABLE(f"{template} cannot be read: {reason}.") from None
+    text = robot_text(robot, source, fitted)
     try:
-        Path(path).write_text(robot_text(robot, source, fitted), encoding="utf-8", newline="\n")
-    except (OSError, ValueError) as error:  # ValueError: a null character in the name
-        reason = getattr(error, "strerror", None) or error
-        raise RobotFileError.FILE_UNWRITABLE(f"{path} cannot be written: {reason}.") from None
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+    except InputError as error:
+        raise RobotFileError.FILE_UNWRITABLE(str(error)) from None
 
 
 def robot_text(

@@ -47,6 +47,7 @@ def test_short_rings_between_notches_that_open_to_different_sides_are_named():
     (sentence,) = unchecked_dimensions(turned)
     assert sentence.startswith("notches 1, 2, 3: a neighbour opens to another side")
     assert "1.2 mm" in sentence
+    assert unchecked_dimensions(wrist().with_value("notch[2].direction_deg", 0.1 + 0.2 - 0.3)) == []
 
 
 @pytest.mark.parametrize(("ends", "most"), [("shell", 8.0), ("rigid", 16.0)])

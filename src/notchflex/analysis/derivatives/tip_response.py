@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex._jax import constant
+from notchflex._summary import Displayed, Summary
 from notchflex.analysis.derivatives.forward_model import ForwardModel
 from notchflex.analysis.derivatives.kinks import Kink, kinks
 from notchflex.analysis.derivatives.tangent import Change
@@ -26,8 +27,8 @@ from notchflex.solver.newton import DEFAULT, Settings
 _POSE = ("tip_rotation", "tip_position")
 
 
-@dataclass(frozen=True, eq=False)
-class TipResponse:
+@dataclass(frozen=True, eq=False, repr=False)
+class TipResponse(Displayed):
     """Slopes of the tip's pose along a path of loads; s steps, t tendons.
 
     Rows are (rotation vector, rad; position, mm), all in the world. NaN where a step did not
@@ -50,6 +51,17 @@ class TipResponse:
     def kinks(self) -> list[Kink]:
         """Contacts and notches at a switch: there the slopes are those of one side only."""
         return kinks(self.path)
+
+    def _summary(self) -> Summary:
+        steps, _, tendons = self.jacobian.shape
+        good = np.isfinite(self.jacobian).all(axis=(1, 2))
+        rows = [
+            ("jacobian", f"{steps} steps x 6 x {tendons} tendons: rad or mm per N or mm"),
+            ("compliance", f"{steps} steps x 6 x 6: rad or mm per N mm or N"),
+            ("steps with slopes", f"{int(good.sum())} of {steps}"),
+        ]
+        hint = ".kinks lists where slopes are those of one side; .path holds the states"
+        return Summary(f"Response of the tip of {self.path.robot.name}", rows, hint)
 
 
 def tip_response(

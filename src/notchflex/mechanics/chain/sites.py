@@ -7,6 +7,9 @@ from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure import Site, unchecked
 from notchflex.robot import Notch, Robot
 
+_SAME_DIRECTION = 1e-6
+"""Notches open to one side if their directions differ by less, deg: rounding of sums of angles."""
+
 
 def sites_of(robot: Robot) -> tuple[Site | None, ...]:
     """Find what surrounds every notch; None for notches that do not depend on it.
@@ -42,7 +45,8 @@ def sites_of(robot: Robot) -> tuple[Site | None, ...]:
 
 
 def _is_turned(notch: Notch, other: Notch) -> bool:
-    return (notch.direction_deg - other.direction_deg) % 360.0 != 0.0
+    apart = (notch.direction_deg - other.direction_deg + 180.0) % 360.0 - 180.0
+    return abs(apart) > _SAME_DIRECTION
 
 
 def unchecked_dimensions(robot: Robot) -> list[str]:
