@@ -173,10 +173,16 @@ class Cluster:
                 raise
             taken = time.monotonic() - begun
             print(f"  the client ended with code {code} after {taken:.1f} s", flush=True)
+            self.explain(code)
             self.stop()
             for one in ("scheduler", "worker 1", "worker 2"):
                 self.start(one)
         self.start("client" if name == "scheduler" else name)
+
+    def explain(self, code: int) -> None:
+        """Print what the client said if it neither finished nor refused."""
+        if code not in (0, 2):
+            print((self.folder.parent / "client.log").read_text()[-8000:], flush=True)
 
     def stop(self) -> None:
         """End all of them."""
@@ -214,6 +220,7 @@ def kills(count: int, rows: int, seed: int) -> None:
                     if code == 0:
                         break
                     print(f"  the client ended with code {code}", flush=True)
+                    cluster.explain(code)
                     cluster.start("client")
                 code = cluster.processes["client"].wait(timeout=600)
                 while code:  # refused, such as by a worker's death: called again
