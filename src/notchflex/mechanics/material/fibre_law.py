@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.material.fibre_section import Fibres, FibreSection
-from notchflex.mechanics.material.law import Bending, Response, SectionLaw
+from notchflex.mechanics.material.law import Bending, SectionLaw, SectionResponse
 
 # Newton's method ends at this imbalance, as a part of the strain of bending, or after many tries.
 _BALANCED, _MOST_TRIES = 1e-13, 16
@@ -131,7 +131,7 @@ class FibreLaw(SectionLaw):
 
     def respond_all(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
-    ) -> Response:
+    ) -> SectionResponse:
         """All sections together: mapped one by one they would be traced three times as long."""
         return self.respond(strain, section, memory)
 
