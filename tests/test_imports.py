@@ -57,6 +57,8 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ),
     ("robot.robot", "robot.value_names"): "`Robot.with_values`; setting a value makes a robot",
     ("robot.robot", "robot.summary"): _SHOWN,
+    ("robot.problems", "robot.robot"): "for the type only: a robot checks itself by this file",
+    ("robot.problems", "robot.value_names"): "a tolerance names a value; value names make robots",
     ("loads.load_path", "loads.summary"): _SHOWN,
     ("results.equilibrium", "results.summary"): _SHOWN,
     ("results.path", "results.summary"): _SHOWN,

@@ -7,9 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from notchflex._replacing import replacing
 from notchflex.cli import terminal
 from notchflex.cli.outputs import Outputs
-from notchflex.results.files.writing import MOVING, replacing
+from notchflex.results.files.writing import MOVING
 
 if TYPE_CHECKING:
     from notchflex.analysis import Bands

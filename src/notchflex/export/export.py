@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from notchflex._replacing import replacing
 from notchflex.errors import InputError
 from notchflex.export.document import Document, Subject
 from notchflex.export.formats import FORMATS, format_of
-from notchflex.results.files.writing import check_output, replacing
+from notchflex.results.files.writing import check_output
 from notchflex.robot import Robot
 
 if TYPE_CHECKING:

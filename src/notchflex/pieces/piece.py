@@ -10,10 +10,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from notchflex._replacing import replacing
 from notchflex.pieces import checksum
 from notchflex.pieces.codes import FAILED
 from notchflex.pieces.manifest import Manifest
-from notchflex.results.files.writing import replacing
 
 if TYPE_CHECKING:
     from polars import DataFrame

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from notchflex._replacing import replacing
 from notchflex.errors import InputError
 from notchflex.plotting.curves import abscissa, notches_panel, total_panel
 from notchflex.plotting.output import Picture
@@ -17,7 +18,7 @@ from notchflex.plotting.renderers.with_matplotlib import draw_panel, figure_of
 from notchflex.plotting.shapes.panel import plane_of, representative_steps, shape_panel
 from notchflex.plotting.sheet import Area, Faces, Panel, stack
 from notchflex.plotting.style import BLACK, BLUE, house_style
-from notchflex.results.files.writing import MOVING, check_picture, replacing
+from notchflex.results.files.writing import MOVING, check_picture
 from notchflex.results.quantities.registry import QUANTITIES
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from notchflex.results.files.writing import PAPER, check_picture, replacing
+from notchflex._replacing import replacing
+from notchflex.results.files.writing import PAPER, check_picture
 
 # notation: the eight colours of Okabe and Ito (2008), made for all kinds of colour vision.
 BLACK = "#000000"

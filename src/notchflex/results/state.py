@@ -10,13 +10,13 @@ from typing import Any
 import jax.tree_util as tree_util
 import numpy as np
 
+from notchflex._replacing import replacing
 from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
 from notchflex.loads.applied import in_frame, out_of_frame
 from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
-from notchflex.results.files.writing import replacing
 from notchflex.results.same_robot import mismatch
 from notchflex.robot import Robot
 from notchflex.solver.continuation import SolverState, at_rest

@@ -9,8 +9,8 @@ import numpy as np
 
 from notchflex._extras import need
 from notchflex._quantity import DEGREES
+from notchflex._replacing import replacing
 from notchflex.results.files.json import document_head
-from notchflex.results.files.writing import replacing
 from notchflex.results.quantities.registry import AXES
 from notchflex.workspaces.cloud import Workspace
 from notchflex.workspaces.comparing import Overlap

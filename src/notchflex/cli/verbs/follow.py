@@ -151,9 +151,9 @@ def follow(
 
 
 def _write(found: Following, outputs: Outputs, title: str) -> None:
+    from notchflex._replacing import replacing
     from notchflex.control.documents import following_columns, following_document
     from notchflex.results.files.csv import write_path_csv
-    from notchflex.results.files.writing import replacing
 
     def picture() -> Any:
         from notchflex.plotting import following_picture

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from notchflex._extras import need
+from notchflex._replacing import replacing
 from notchflex.errors import InputError
 from notchflex.results.files.csv import path_columns
 from notchflex.results.files.record import Record, decoded, encoded, record_of
-from notchflex.results.files.writing import replacing
 
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath

@@ -15,9 +15,9 @@ import numpy as np
 
 from notchflex._extras import need
 from notchflex._quantity import Quantity
+from notchflex._replacing import replacing
 from notchflex.errors import InputError
 from notchflex.results.files.record import Record, path_of, record_of
-from notchflex.results.files.writing import replacing
 from notchflex.results.quantities.registry import AXES, CONTACT_STATES, QUANTITIES
 
 if TYPE_CHECKING:

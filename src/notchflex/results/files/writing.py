@@ -1,19 +1,14 @@
-"""Where results go: paths checked before anything is computed, files replaced whole.
-
-A file is first written beside its destination under a temporary name and then renamed over it, so
-that whoever reads it sees the old file or the new one and never half of either.
-"""
+"""Where results go: paths are checked before anything is computed."""
 
 from __future__ import annotations
 
-import contextlib
 import os
-import stat
 import tempfile
-from collections.abc import Generator, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 from notchflex._extras import need
+from notchflex._replacing import is_replaceable, replacing
 from notchflex.errors import InputError
 from notchflex.results.files.streams import write_document
 
@@ -72,7 +67,7 @@ def _obstacle(path: Path) -> str:
         return f"{folder} is a file, not a folder"
     if path.exists() and not os.access(path, os.W_OK):
         return "this file may not be written; choose another"
-    if _replaceable(path) and not _folder_takes_files(folder):
+    if is_replaceable(path) and not _folder_takes_files(folder):
         return f"no file may be written in the folder {folder}; choose another"
     return ""
 
@@ -175,52 +170,6 @@ def check_distinct(outputs: dict[str, str | None]) -> None:
         seen[name] = option
 
 
-@contextlib.contextmanager
-def replacing(target: str | Path) -> Generator[Path]:
-    """Give a path to write to; on success the file there becomes `target`, whole.
-
-    The temporary file lies in the folder of `target` and keeps its suffix. If the body of the
-    `with` raises, the temporary file is removed and `target` is as it was.
-
-    Args:
-        target: Path of the file to make or replace. A link is followed; what is not an ordinary
-            file (/dev/null, a pipe) is written directly.
-
-    Yields:
-        The path to write to.
-
-    Raises:
-        InputError: The file cannot be written.
-    """
-    if not _replaceable(Path(target)):  # not its real path: /dev/stdout may be a link to no name
-        try:
-            yield Path(target)
-        except OSError as problem:
-            words = problem.strerror or problem
-            raise InputError.FILE_UNWRITABLE(f"{target} cannot be written: {words}.") from None
-        return
-    try:
-        destination = Path(os.path.realpath(target))
-        handle, name = tempfile.mkstemp(
-            dir=destination.parent, prefix=f".{destination.stem}-", suffix=destination.suffix
-        )
-        os.close(handle)
-    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
-        words = getattr(problem, "strerror", None) or problem
-        raise InputError.FILE_UNWRITABLE(f"{target} cannot be written: {words}.") from None
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(_mode_for(destination))
-        os.replace(temporary, destination)
-    except OSError as problem:
-        raise InputError.FILE_UNWRITABLE(
-            f"{target} cannot be written: {problem.strerror or problem}."
-        ) from None
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def read_text(source: str | os.PathLike[str], kind: str) -> str:
     """Read a text file in UTF-8, without the byte-order mark that spreadsheets put before it.
 
@@ -264,11 +213,6 @@ def write_text(target: str | Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", errors="replace", newline="\n")
 
 
-def _replaceable(path: Path) -> bool:
-    """Say whether renaming over `path` is right: an ordinary file, or none yet."""
-    return not path.exists() or path.is_file()
-
-
 def _folder_takes_files(folder: Path) -> bool:
     """Say whether a file can be made in `folder`, by making one without a name and dropping it.
 
@@ -279,12 +223,3 @@ def _folder_takes_files(folder: Path) -> bool:
             return True
     except OSError:
         return False
-
-
-def _mode_for(destination: Path) -> int:
-    """Return the permissions of the file there is, or those a new file would get."""
-    if destination.exists():
-        return stat.S_IMODE(destination.stat().st_mode)
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
