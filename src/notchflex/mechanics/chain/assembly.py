@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from notchflex._jax import constant, jax
-from notchflex.mechanics.chain.chain import Chain
+from notchflex.mechanics.chain.arrays import Chain
 from notchflex.mechanics.chain.fibres import with_fibres
 from notchflex.mechanics.chain.mass import body_lengths, body_masses
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
