@@ -17,7 +17,7 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
+from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.derived.limit_points import snapped_notches
 from notchflex.solver.derived.reported import Shape, quantities, shape, unpad_quantity
 from notchflex.solver.derived.solved_state import notch_lips
@@ -29,6 +29,7 @@ from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
 from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.residual import evaluate
+from notchflex.solver.solver_state import SolverState
 
 # Columns behind the two states and the shape, see `_status`.
 _STATUS = 7
