@@ -69,7 +69,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("results.equilibrium", "results.path"): _TYPE,
     ("results.reason", "results.path"): _TYPE,
     ("results.quantities.path_formulas", "results.path"): _TYPE,
-    ("fit.estimation.calibration", "fit.documents"): _SHOWN,
+    ("fit.estimation.calibration", "fit.summary"): _SHOWN,
     ("designing.result", "designing.files"): "a design writes its files by a method",
     ("designing.files", "designing.front"): _TYPE,
     ("comparison.comparison", "comparison.tables"): _SHOWN,

@@ -17,7 +17,7 @@ from notchflex.errors import InputError
 
 
 @contextlib.contextmanager
-def replacing(target: str | Path) -> Generator[Path]:
+def replacing(target: str | os.PathLike[str]) -> Generator[Path]:
     """Give a path to write to; on success the file there becomes `target`, whole.
 
     The temporary file lies in the folder of `target` and keeps its suffix. If the body of the

@@ -6,9 +6,9 @@ import itertools
 from typing import Any
 
 from notchflex.designing.model.load_states import StatePaths, check_states, state_paths
-from notchflex.designing.model.point import Solver
 from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
 from notchflex.designing.model.resolving import wishes_of
+from notchflex.designing.model.solver import Solver
 from notchflex.designing.model.variables import variables_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import DesignProblem

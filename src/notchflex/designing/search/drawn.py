@@ -10,8 +10,9 @@ from jaxtyping import Bool, Float
 from notchflex.analysis.closing_loads.varied import closing_tensions_of
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
 from notchflex.analysis.varied.fit_polynomial import PolynomialAccuracy, fit_polynomial
-from notchflex.designing.model.point import CLOSINGS, Point, Solver
+from notchflex.designing.model.point import CLOSINGS, Point
 from notchflex.designing.model.quantities import CLOSING
+from notchflex.designing.model.solver import Solver
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.problem import DesignProblem, Vector
 from notchflex.designing.search.rows import TOLERANCE, row_reading, row_sizes, rows_of, violations

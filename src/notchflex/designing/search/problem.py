@@ -13,8 +13,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.designing.model.point import Point, Solver
+from notchflex.designing.model.point import Point
 from notchflex.designing.model.reading import Reading
+from notchflex.designing.model.solver import Solver
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.rows import (
     Row,

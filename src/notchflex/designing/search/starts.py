@@ -11,7 +11,8 @@ from jaxtyping import Bool, Float
 from scipy.stats import qmc
 
 from notchflex.analysis.batch import simulate_batch
-from notchflex.designing.model.point import Point, Solver
+from notchflex.designing.model.point import Point
+from notchflex.designing.model.solver import Solver
 from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath

@@ -26,7 +26,7 @@ from notchflex.mechanics.flexure import (
     stack,
     with_level,
 )
-from notchflex.mechanics.flexure.plane import planar_points
+from notchflex.mechanics.flexure.rod import planar_points
 from notchflex.mechanics.friction import friction_law
 from notchflex.mechanics.material import SectionLaw, section_law
 from notchflex.mechanics.motion import Motion, rotation_about
