@@ -24,7 +24,7 @@ import notchflex as nf
 from design_wishes import tip_first, wide_wrist
 from notchflex.designing.forms import problems_of
 from notchflex.designing.search.local import search_from
-from notchflex.designing.search.problem import Problem
+from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.specification.reading import spec_from_table
 from notchflex.robot.varied import VariedRobots
 
@@ -32,12 +32,12 @@ from notchflex.robot.varied import VariedRobots
 _PENALTY = 10.0
 
 
-def problem_of(along: str = "polynomial") -> Problem:
+def problem_of(along: str = "polynomial") -> DesignProblem:
     """The wrist whose tip closes first."""
     return problems_of(spec_from_table(tip_first(along)), wide_wrist())[0]
 
 
-def merit(problem: Problem, z: np.ndarray) -> float:
+def merit(problem: DesignProblem, z: np.ndarray) -> float:
     """Sum and penalties."""
     one = problem.evaluate(z)
     if one is None:
@@ -148,7 +148,7 @@ def grid(each: int = 100) -> None:
         print(f"{time.process_time() - begin:.0f} s of CPU", flush=True)
 
 
-def closed(problem: Problem, points: np.ndarray) -> np.ndarray:
+def closed(problem: DesignProblem, points: np.ndarray) -> np.ndarray:
     """Height that robots need for the angle, mm; inf where strain or closing is not as asked."""
     variables = problem.solver.variables
     z = np.insert(points, 2, 0.5, axis=1)

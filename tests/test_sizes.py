@@ -1,6 +1,6 @@
-"""Sizes that keep the sources readable: lengths of functions and numbers of parameters.
+"""Sizes that keep the sources readable: lengths of files and functions, numbers of parameters.
 
-Commands are excluded: their parameters are the options that `--help` shows.
+Of functions, commands are excluded: their parameters are the options that `--help` shows.
 """
 
 import ast
@@ -10,6 +10,8 @@ from pathlib import Path
 import notchflex
 
 SOURCE = Path(notchflex.__file__).parents[1]
+
+MOST_LINES_OF_A_FILE = 300
 
 MOST_LINES = 60
 """Lines of a function without its docstring."""
@@ -50,6 +52,17 @@ def _parameters(function: _Function) -> int:
     arguments = function.args
     named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
     return sum(one.arg not in _NOT_COUNTED for one in named)
+
+
+def test_files_are_short():
+    files = [file for name in ("notchflex", "lanewise") for file in (SOURCE / name).rglob("*.py")]
+    assert len(files) > 500
+    lines = {
+        str(file.relative_to(SOURCE)): file.read_text(encoding="utf-8").count("\n")
+        for file in files
+    }
+    long = {file: n for file, n in lines.items() if n > MOST_LINES_OF_A_FILE}
+    assert not long, f"a file has at most {MOST_LINES_OF_A_FILE} lines; {long}"
 
 
 def test_functions_are_short():

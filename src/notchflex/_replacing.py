@@ -1,6 +1,7 @@
-"""Files replaced whole: whoever reads one sees the old file or the new one, never half of either.
+"""Files replaced whole.
 
-A file is first written beside its destination under a temporary name and then renamed over it.
+A file is first written beside its destination under a temporary name and then renamed over it, so
+that whoever reads it sees the old file or the new one and never half of either.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def replacing(target: str | os.PathLike[str]) -> Generator[Path]:
 
 
 def is_replaceable(path: Path) -> bool:
-    """Say whether renaming over `path` is right: an ordinary file, or none yet."""
+    """Return whether renaming over `path` is right: it is an ordinary file, or none yet."""
     return not path.exists() or path.is_file()
 
 

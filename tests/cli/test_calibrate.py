@@ -12,7 +12,8 @@ import pytest
 import notchflex as nf
 import notchflex.fit as fitting
 from fitted import NAMES, OBSERVED, ROBOT, fitted, measured
-from notchflex.cli.arguments.fit import DataSource, DataSources, FitOptions
+from notchflex.cli.arguments.data_sources import DataSource, DataSources
+from notchflex.cli.arguments.fit import FitOptions
 from notchflex.cli.tables import calibrate_tables
 from notchflex.fit import Fold, LeftOut, Posterior
 

@@ -11,7 +11,7 @@ from export.closed_form import volume_of_windows
 from notchflex.export.cuts import cuts_of
 from notchflex.export.document import Subject
 from notchflex.export.options import SolidOptions
-from notchflex.export.solids.bent import Motion
+from notchflex.export.solids.bent import DeformationMap
 from notchflex.export.solids.stl import stl_solid
 from refusals import refused
 
@@ -129,7 +129,7 @@ def test_the_free_shape_has_the_precurvature(bent, tmp_path):
 )
 def test_points_of_a_robot_at_rest_do_not_move(name):
     robot = nf.load_robot(name)
-    motion = Motion(Subject(robot), cuts_of(robot))
+    motion = DeformationMap(Subject(robot), cuts_of(robot))
     draws = np.random.default_rng(1).uniform([-3, -3, -1], [3, 3, 35], (500, 3))
     assert motion(draws) == pytest.approx(draws, abs=1e-9)
 

@@ -9,10 +9,10 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual
-from notchflex.solver.block_elimination import Iterate
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.element import Memory, bound_side
+from notchflex.solver.linear_step.block_elimination import Iterate
 from notchflex.solver.residual import evaluate
+from notchflex.solver.solver_state import SolverState
 
 # Closed lips and tendons drawn by stroke are held by springs this much stiffer than the notches:
 # they only stiffen; without it their forces would be multipliers and the stiffness not defined.

@@ -12,7 +12,7 @@ from notchflex.analysis.solve import prepare_for
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import load_path
 from notchflex.solver.actuation import command_residual
-from notchflex.solver.block_elimination import Iterate, linear_step
+from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
 from notchflex.solver.residual import evaluate
 
 TIP = {"tip_force": (0.02, 0.0, -0.01), "tip_moment": (0.0, 0.05, 0.0)}

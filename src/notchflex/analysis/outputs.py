@@ -16,13 +16,14 @@ from notchflex.errors import ErrorCode, InputError
 from notchflex.loads.validation import short_repr
 from notchflex.mechanics.chain import Chain
 from notchflex.results.quantities.registry import QUANTITIES
-from notchflex.solver.continuation import SolverState, at_rest, solve_load_step
+from notchflex.solver.continuation import solve_load_step
 from notchflex.solver.derived.reported import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
 from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.solver_state import SolverState, at_rest
 
 _OF_STATE = [name for name, one in REGISTERED.items() if one.title and one.source != "path"]
 DEFAULT_OUTPUTS = ("total_angle", "tip_position", "tip_rotation", "converged")

@@ -20,7 +20,7 @@ from notchflex.designing.result import (
     asked_in_words,
     total_counts,
 )
-from notchflex.designing.search.problem import Evaluation, Problem, Progress
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Progress
 from notchflex.designing.search.robust_search import YieldOf, check_limits, robust_search
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.search import Searches, search
@@ -79,7 +79,7 @@ def design(
 
 
 def _tolerances(
-    spec: DesignSpec, robot: Robot, problems: Sequence[Problem]
+    spec: DesignSpec, robot: Robot, problems: Sequence[DesignProblem]
 ) -> tuple[Tolerance, ...]:
     """Return the tolerances that a robust design is made for.
 
@@ -127,7 +127,9 @@ def given(spec: Any, robot: Robot | None) -> tuple[DesignSpec, Robot]:
     return spec, robot or load_robot(spec.robot)
 
 
-def made_of(spec: DesignSpec, first: Robot, problems: list[Problem], searches: Searches) -> Design:
+def made_of(
+    spec: DesignSpec, first: Robot, problems: list[DesignProblem], searches: Searches
+) -> Design:
     """Make the result of the best of some searches."""
     best = searches.best
     problem, found = best.problem, best.found
@@ -172,7 +174,7 @@ def made_of(spec: DesignSpec, first: Robot, problems: list[Problem], searches: S
     )
 
 
-def missed_by_wish(problem: Problem, one: Evaluation) -> dict[int, float]:
+def missed_by_wish(problem: DesignProblem, one: DesignEvaluation) -> dict[int, float]:
     """Return the most by which each constraint is missed, in the sizes of its numbers."""
     found: dict[int, float] = {}
     for row, missed in zip(problem.rows, np.abs(problem.violation(one)).tolist(), strict=True):

@@ -10,10 +10,10 @@ import numpy as np
 from notchflex._summary import short
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.optimality import Held, multipliers
-from notchflex.designing.search.problem import Problem
+from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.search.robust_search import YieldOf
 from notchflex.designing.search.rows import TOLERANCE, Row
-from notchflex.designing.search.search import Outcome
+from notchflex.designing.search.search import SearchResult
 from notchflex.designing.specification.asked import DesignObjective
 from notchflex.designing.specification.spec import DesignSpec
 from notchflex.robot import Robot
@@ -26,7 +26,7 @@ _PART = 0.05
 _NOTHING = 1e-9
 
 
-def curves_missed(outcome: Outcome) -> tuple[str, ...]:
+def curves_missed(outcome: SearchResult) -> tuple[str, ...]:
     """Return a sentence for every curve with points that the axis does not reach."""
     one = outcome.found.evaluation
     assert one is not None
@@ -73,12 +73,12 @@ def _percent(part: float) -> str:
     return f"{100.0 * part:.4g}"
 
 
-def explain(outcome: Outcome) -> tuple[str, ...]:
+def explain(outcome: SearchResult) -> tuple[str, ...]:
     """Return sentences about the best robot of a design."""
     return (*curves_missed(outcome), *_about_limits(outcome))
 
 
-def _about_limits(outcome: Outcome) -> tuple[str, ...]:
+def _about_limits(outcome: SearchResult) -> tuple[str, ...]:
     one = outcome.found.evaluation
     assert one is not None
     problem = outcome.problem
@@ -95,7 +95,7 @@ def _about_limits(outcome: Outcome) -> tuple[str, ...]:
     return (*kept[:_MOST], *more)
 
 
-def _effect(problem: Problem, held: Held) -> tuple[float, float]:
+def _effect(problem: DesignProblem, held: Held) -> tuple[float, float]:
     """A round change of a limit, and what it changes of the sum."""
     if held.is_variable:
         size = problem.solver.variables.span[held.row]
@@ -113,7 +113,7 @@ def _round(value: float) -> float:
     return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= value * (1.0 + 1e-9))
 
 
-def _sentence(problem: Problem, held: Held) -> str:
+def _sentence(problem: DesignProblem, held: Held) -> str:
     step, effect = _effect(problem, held)
     what = _objective_name(problem)
     place, unit, change = _place(problem, held, step)
@@ -130,7 +130,7 @@ def _sentence(problem: Problem, held: Held) -> str:
     return f"{place}; {change} would {'save' if sign > 0 else 'gain'} {amount} of {name}."
 
 
-def _place(problem: Problem, held: Held, step: float) -> tuple[str, str, str]:
+def _place(problem: DesignProblem, held: Held, step: float) -> tuple[str, str, str]:
     if held.is_variable:
         column = problem.solver.variables.columns[held.row]
         limit = column.upper if held.side > 0 else column.lower
@@ -145,7 +145,7 @@ def _place(problem: Problem, held: Held, step: float) -> tuple[str, str, str]:
     return f"{title} stands at its {at} value, {shown}", unit, change
 
 
-def _objective_name(problem: Problem) -> tuple[str, str, float] | None:
+def _objective_name(problem: DesignProblem) -> tuple[str, str, float] | None:
     """Name, unit and direction of the only objective; None without one."""
     objectives = problem.objectives
     if len(objectives) == 0:
@@ -162,7 +162,7 @@ def _objective_name(problem: Problem) -> tuple[str, str, float] | None:
     return wish.title, wish.unit, 1.0 if asked.goal == "minimise" else -1.0
 
 
-def _missed(outcome: Outcome) -> tuple[str, ...]:
+def _missed(outcome: SearchResult) -> tuple[str, ...]:
     """What cannot be met together, and by how much the nearest robot misses it."""
     one, problem = outcome.found.evaluation, outcome.problem
     assert one is not None
@@ -198,7 +198,7 @@ def _miss(row: Row, value: float) -> str:
     return f"{row.title} is {short(value)}{unit}, {off}."
 
 
-def _at_limits(outcome: Outcome) -> tuple[str, ...]:
+def _at_limits(outcome: SearchResult) -> tuple[str, ...]:
     """Which variables stand at their limits, where wider ones could help."""
     names: list[str] = []
     for z, column in zip(

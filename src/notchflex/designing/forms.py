@@ -6,12 +6,12 @@ import itertools
 from typing import Any
 
 from notchflex.designing.model.load_states import StatePaths, check_states, state_paths
-from notchflex.designing.model.point import Solver
 from notchflex.designing.model.quantities import COMPLIANCE, CURVE, OF_STATES
 from notchflex.designing.model.resolving import wishes_of
+from notchflex.designing.model.solver import Solver
 from notchflex.designing.model.variables import variables_of
 from notchflex.designing.model.wishes import Wish
-from notchflex.designing.search.problem import Problem
+from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import InputError
 from notchflex.robot import Robot, from_table, to_table
@@ -21,7 +21,7 @@ from notchflex.robot.value_names import numbers_at
 MOST_FORMS = 200
 
 
-def problems_of(spec: DesignSpec, robot: Robot) -> list[Problem]:
+def problems_of(spec: DesignSpec, robot: Robot) -> list[DesignProblem]:
     """Make a problem for every size and every number of notches that a design may choose.
 
     Raises:
@@ -29,14 +29,14 @@ def problems_of(spec: DesignSpec, robot: Robot) -> list[Problem]:
     """
     _check_stock(spec, robot)
     robots = _forms(spec, robot)
-    problems: list[Problem] = []
+    problems: list[DesignProblem] = []
     for one in robots:
         check_states(spec.state, one.number_of_tendons)
         wishes = wishes_of(spec, one)
         paths = _paths(spec, wishes, one)
         variables = variables_of(one, spec.variable, paths.states)
         outputs = _outputs(wishes)
-        problems.append(Problem(Solver(variables, paths, outputs), wishes))
+        problems.append(DesignProblem(Solver(variables, paths, outputs), wishes))
     return problems
 
 

@@ -22,9 +22,9 @@ from notchflex.designing.forms import problems_of
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.result import Design
 from notchflex.designing.search.local import search_from
-from notchflex.designing.search.problem import Evaluation, Problem, Progress, Vector
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Progress, Vector
 from notchflex.designing.search.rows import TOLERANCE, objective_reading
-from notchflex.designing.search.search import Outcome, Searches
+from notchflex.designing.search.search import Searches, SearchResult
 from notchflex.designing.search.starts import draw, evaluate_all, smooth
 from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import InputError
@@ -119,7 +119,7 @@ def design_front(
     if points < 2 or generations < 1:
         raise InputError.OUT_OF_RANGE("a front needs 2 points and 1 generation or more")
     problems = problems_of(asked, first)
-    found: list[tuple[Problem, Vector, Evaluation]] = []
+    found: list[tuple[DesignProblem, Vector, DesignEvaluation]] = []
     reason = ""
     try:
         for number, problem in enumerate(problems):
@@ -127,7 +127,7 @@ def design_front(
                 progress("spreading over the front", number, len(problems))
             found += _spread(problem, points, generations, asked.search.seed)
         chosen = _chosen(found, points)
-        polished: list[tuple[Problem, Vector, Evaluation]] = []
+        polished: list[tuple[DesignProblem, Vector, DesignEvaluation]] = []
         for number, one in enumerate(chosen):
             if progress is not None:
                 progress("polishing", number, len(chosen))
@@ -143,15 +143,15 @@ def design_front(
     return DesignFront(asked, designs, reason)
 
 
-def sums(problem: Problem, one: Evaluation) -> Float[np.ndarray, " m"]:
+def sums(problem: DesignProblem, one: DesignEvaluation) -> Float[np.ndarray, " m"]:
     """Return what each objective adds to the sum that is minimised."""
     wishes = problem.objectives
     return np.array([float(objective_reading(w, one.point.plain).values.sum()) for w in wishes])
 
 
 def _spread(
-    problem: Problem, points: int, generations: int, seed: int
-) -> list[tuple[Problem, Vector, Evaluation]]:
+    problem: DesignProblem, points: int, generations: int, seed: int
+) -> list[tuple[DesignProblem, Vector, DesignEvaluation]]:
     """Return the front of a genetic search of one form of robots."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
@@ -162,7 +162,7 @@ def _spread(
     here = [one for _, one in evaluate_all(problem, smooth(problem, size, seed)) if one is not None]
     if here:
         problem.set_sizes(here)
-    known: dict[bytes, Evaluation] = {}
+    known: dict[bytes, DesignEvaluation] = {}
 
     class Batched(PymooProblem):  # pyright: ignore[reportUntypedBaseClass]
         """One batch a generation."""
@@ -193,8 +193,8 @@ def _spread(
 
 
 def _polished(
-    problem: Problem, z: Vector, one: Evaluation, iterations: int
-) -> tuple[Problem, Vector, Evaluation]:
+    problem: DesignProblem, z: Vector, one: DesignEvaluation, iterations: int
+) -> tuple[DesignProblem, Vector, DesignEvaluation]:
     """Make the first objective least, the others no worse."""
     wishes = problem.objectives
     values = sums(problem, one)
@@ -211,9 +211,11 @@ def _polished(
     return (problem, z, one) if full is None else (problem, found.z, full)
 
 
-def replace_problem(problem: Problem, kept: Wish, limited: list[tuple[Wish, float]]) -> Problem:
+def replace_problem(
+    problem: DesignProblem, kept: Wish, limited: list[tuple[Wish, float]]
+) -> DesignProblem:
     """Return a problem of one objective, with limits on the others."""
-    made = Problem(problem.solver, (kept, *problem.constraints), tuple(limited))
+    made = DesignProblem(problem.solver, (kept, *problem.constraints), tuple(limited))
     sizes = [problem.sizes, np.array([max(abs(most), 1e-12) for _, most in limited])]
     vars(made)["sizes"] = np.concatenate(sizes)
     vars(made)["total_size"] = problem.total_size
@@ -221,8 +223,8 @@ def replace_problem(problem: Problem, kept: Wish, limited: list[tuple[Wish, floa
 
 
 def _chosen(
-    found: list[tuple[Problem, Vector, Evaluation]], points: int
-) -> list[tuple[Problem, Vector, Evaluation]]:
+    found: list[tuple[DesignProblem, Vector, DesignEvaluation]], points: int
+) -> list[tuple[DesignProblem, Vector, DesignEvaluation]]:
     """Choose points that none of the others beats, spread evenly, by the first objective."""
     good = [one for one in found if one[0].worst(one[2]) <= max(TOLERANCE, 2e-3)]
     if not good:
@@ -251,13 +253,13 @@ def _chosen(
 def _design(
     spec: DesignSpec,
     first: Robot,
-    problems: list[Problem],
-    one: tuple[Problem, Vector, Evaluation],
+    problems: list[DesignProblem],
+    one: tuple[DesignProblem, Vector, DesignEvaluation],
 ) -> Design:
     problem, z, evaluation = one
     from notchflex.designing.search.local import Found
 
     found = Found(z, evaluation, True, 0)
-    outcome = Outcome(problem, problems.index(problem), z, found)
+    outcome = SearchResult(problem, problems.index(problem), z, found)
     made = made_of(spec, first, problems, Searches([outcome]))
     return replace(made, explanation=())

@@ -10,9 +10,9 @@ from typing import Any
 
 from notchflex._summary import Displayed, Summary, short
 from notchflex.designing.model.wishes import Wish
-from notchflex.designing.search.problem import Problem
+from notchflex.designing.search.problem import DesignProblem
 from notchflex.designing.search.robust_search import YieldOf
-from notchflex.designing.search.search import Outcome, Searches
+from notchflex.designing.search.search import Searches, SearchResult
 from notchflex.designing.specification.asked import DesignConstraint, DesignObjective
 from notchflex.designing.specification.spec import DesignSpec
 from notchflex.errors import ConvergenceError
@@ -98,7 +98,7 @@ class Design(Displayed):
     solves: int
     gradients: int
     starts: int
-    outcome: Outcome
+    outcome: SearchResult
     yields: tuple[YieldOf, ...] = ()
 
     @property
@@ -192,7 +192,7 @@ def asked_in_words(wish: Wish) -> str:
     return f"at most {asked.upper:g}{unit}{of}"
 
 
-def total_counts(problems: Sequence[Problem]) -> tuple[int, int]:
+def total_counts(problems: Sequence[DesignProblem]) -> tuple[int, int]:
     """Return how many robots were solved and differentiated."""
     counts = {id(one.solver.counts): one.solver.counts for one in problems}.values()
     return sum(one["solves"] for one in counts), sum(one["gradients"] for one in counts)

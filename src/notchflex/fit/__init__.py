@@ -41,5 +41,5 @@ from notchflex.fit.measurements.repeats import repeats as repeats
 from notchflex.fit.measurements.repeats import repeats_of_each as repeats_of_each
 from notchflex.fit.measurements.simulated import simulate_measurements as simulate_measurements
 from notchflex.fit.measurements.writing import write_measurements as write_measurements
-from notchflex.fit.model.constants import Constant as Constant
+from notchflex.fit.model.constant import Constant as Constant
 from notchflex.fit.model.constants import Unknown as Unknown

@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 
 from notchflex import __version__
-from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
+from notchflex.fit.assessment.diagnosis import diagnose
 from notchflex.fit.assessment.errors_of_parts import edge, errors_of_parts
 from notchflex.fit.assessment.folds import Fold, LeftOut
 from notchflex.fit.assessment.next_measurement import NextMeasurement
 from notchflex.fit.assessment.posterior import Posterior
 from notchflex.fit.estimation.calibration import Calibration
-from notchflex.fit.estimation.intervals import Interval
 from notchflex.fit.estimation.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
 from notchflex.results.files.json import plain
 from notchflex.results.quantities.registry import QUANTITIES
@@ -200,28 +199,6 @@ def data_of(found: Calibration, label: str) -> list[str]:
     """Return the sources of the measurements of a robot."""
     sources = (one.source for one in found.problem.samples.of_robot(label))
     return list(dict.fromkeys(sources))
-
-
-def summary(found: Calibration) -> str:
-    """Return constants with intervals and units, root-mean-square errors and the diagnosis."""
-    state = "converged" if found.converged else f"not converged: {found.reason}"
-    lines = [f"{', '.join(found.given)}: {found.counted} numbers measured, {state}"]
-    width = max(map(len, found.names))
-    for name, value in found.values.items():
-        unit, interval = found.units[name], found.intervals.get(name)
-        ends = "" if interval is None else f"  95 %: {_ends(interval, unit)}"
-        lines.append(f"  {name:<{width}}  {with_unit(value, unit)}{ends}")
-    errors = [
-        f"{edge(name)[0]} {error * edge(name)[2]:.3g} {edge(name)[1]}"
-        for name, error in found.residuals.root_mean_squares().items()
-    ]
-    lines.append(f"  rms error: {', '.join(errors)}")
-    return "\n".join([*lines, *(diagnose(found) or (NO_PROBLEMS,))])
-
-
-def _ends(interval: Interval, unit: str) -> str:
-    ends = ("open" if end is None else f"{end:.5g}" for end in (interval.lower, interval.upper))
-    return f"{' to '.join(ends)} {unit}".strip()
 
 
 def _constants(found: Calibration) -> list[dict[str, Any]]:

@@ -164,4 +164,27 @@ EXTERNAL = tuple(one.name for one in fields(ExternalLoad))
 _DEFAULTS = tuple((one.name, one.default) for one in fields(ExternalLoad))
 NOTHING = ExternalLoad()
 
+
+def external_of_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
+    """Return the external loads of every step of a load path, checked."""
+    try:
+        given: tuple[Any, ...] = tuple(external)
+    except TypeError:
+        given = (None,)
+    different = {id(one): one for one in given}.values()
+    if not all(isinstance(one, ExternalLoad) for one in different):
+        raise InputError.WRONG_TYPE(
+            "external of a load path must hold one ExternalLoad per step; "
+            f"got {short_repr(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
+        )
+    if given and len(given) != steps:
+        raise InputError.WRONG_SHAPE(
+            f"external of a load path has {len(given)} entries, but there are {steps} steps; "
+            "give one per step"
+        )
+    if any(type(one) is not ExternalLoad for one in different):
+        given = tuple(one.external for one in given)
+    return given or (NOTHING,) * steps
+
+
 __all__ = ["EXTERNAL", "HANGING", "NOTHING", "BodyForce", "ExternalLoad"]

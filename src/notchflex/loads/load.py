@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -93,6 +93,14 @@ class Load(ExternalLoad):
                 if not isfinite(entries[i]):
                     raise InputError.NOT_FINITE(f"{what} must be finite; got {short_repr(entry)}")
         return entries
+
+
+def entries_of(values: np.ndarray) -> float | list[float | None] | None:
+    """Return an entry per tendon as a `Load` takes them: a number for a single tendon."""
+    entries = [None if isnan(value) else value for value in values.tolist()]
+    if all(entry is None for entry in entries):
+        return None
+    return entries[0] if len(entries) == 1 else entries
 
 
 __all__ = ["BASE_TURN", "NO_TURN", "Load"]

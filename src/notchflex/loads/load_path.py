@@ -14,8 +14,8 @@ from jaxtyping import Int
 
 from notchflex._summary import Displayed, Summary
 from notchflex.errors import InputError
-from notchflex.loads.external import EXTERNAL, NOTHING, BodyForce, ExternalLoad
-from notchflex.loads.load import BASE_TURN, NO_TURN, Load
+from notchflex.loads.external import EXTERNAL, BodyForce, ExternalLoad, external_of_steps
+from notchflex.loads.load import BASE_TURN, NO_TURN, Load, entries_of
 from notchflex.loads.validation import (
     check_table,
     check_vector,
@@ -54,7 +54,7 @@ class LoadPath(Displayed):
                 f"a load path needs tension and stroke of one shape, steps by tendons; "
                 f"got {tension.shape} and {stroke.shape}"
             )
-        external = _for_steps(self.external, len(tension))
+        external = external_of_steps(self.external, len(tension))
         fields = {"tension": tension, "stroke": stroke, "base_rotation": base_rotation}
         vars(self).update(fields, external=external)
         if tension.size and np.isnan(stroke).all() and 0.0 <= tension.min() < np.inf:
@@ -107,8 +107,8 @@ class LoadPath(Displayed):
         if not -len(self) <= step < len(self):
             raise IndexError(f"step {step} of a load path of {len(self)} steps")
         return Load(
-            _as_given(self.tension[step]),
-            _as_given(self.stroke[step]),
+            entries_of(self.tension[step]),
+            entries_of(self.stroke[step]),
             tuple(self.base_rotation.tolist()),
             **{name: getattr(self.external[step], name) for name in EXTERNAL},
         )
@@ -291,36 +291,6 @@ def load_path(loads: Load | LoadPath | Iterable[Any], tendons: int) -> LoadPath:
     if any(pulled < 0.0 or not (isnan(pulled) or isnan(drawn)) for pulled, drawn in entries):
         return LoadPath(*given, external)  # raises the error
     return LoadPath.of_valid(*given, external)
-
-
-def _as_given(values: np.ndarray) -> float | list[float | None] | None:
-    """One entry per tendon as a `Load` takes them: a number for a single tendon."""
-    entries = [None if isnan(value) else value for value in values.tolist()]
-    if all(entry is None for entry in entries):
-        return None
-    return entries[0] if len(entries) == 1 else entries
-
-
-def _for_steps(external: Any, steps: int) -> tuple[ExternalLoad, ...]:
-    """Check the external loads, one entry per step."""
-    try:
-        given: tuple[Any, ...] = tuple(external)
-    except TypeError:
-        given = (None,)
-    different = {id(one): one for one in given}.values()
-    if not all(isinstance(one, ExternalLoad) for one in different):
-        raise InputError.WRONG_TYPE(
-            "external of a load path must hold one ExternalLoad per step; "
-            f"got {short_repr(external)}; LoadPath.loaded(tip_force=...) puts a load on all steps"
-        )
-    if given and len(given) != steps:
-        raise InputError.WRONG_SHAPE(
-            f"external of a load path has {len(given)} entries, but there are {steps} steps; "
-            "give one per step"
-        )
-    if any(isinstance(one, Load) for one in different):
-        given = tuple(one.external for one in given)
-    return given or (NOTHING,) * steps
 
 
 __all__ = ["LoadPath", "join_paths", "load_path"]

@@ -8,7 +8,7 @@ from typing import Self
 
 from notchflex.errors import InputError
 from notchflex.loads.validation import short_repr
-from notchflex.pieces.piece import Task
+from notchflex.pieces.piece import PieceTask
 from notchflex.pieces.run import Progress, check_workers, open_folder, run_pieces
 
 
@@ -46,7 +46,7 @@ class PieceFolder:
 
     def run(
         self,
-        task: Task,
+        task: PieceTask,
         *,
         pieces: range | None = None,
         cores: int | None = None,

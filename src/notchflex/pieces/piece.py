@@ -57,11 +57,11 @@ class Recipe(NamedTuple):
         content: What it takes: text, or pickled objects.
     """
 
-    make: Callable[[Any], Task]
+    make: Callable[[Any], PieceTask]
     content: str | bytes
 
 
-class Task(Protocol):
+class PieceTask(Protocol):
     """Work that is cut into pieces, each of which depends on the task and its number alone."""
 
     @property
@@ -84,7 +84,7 @@ class Task(Protocol):
 
 
 @lru_cache(maxsize=2)
-def task_of(recipe: Recipe, text: str) -> Task:
+def task_of(recipe: Recipe, text: str) -> PieceTask:
     """Return the task of a recipe, prepared; one for a process.
 
     Args:
@@ -105,7 +105,7 @@ def piece_file(folder: str | os.PathLike[str], piece: int) -> Path:
     return Path(folder) / "pieces" / f"piece-{piece:09d}.parquet"
 
 
-def encoded(task: Task, piece: int) -> tuple[memoryview, dict[str, Any]]:
+def encoded(task: PieceTask, piece: int) -> tuple[memoryview, dict[str, Any]]:
     """Return the bytes of a piece, and its head."""
     frame, content = task.piece(piece)
     head = {"sweep": task.manifest.digest, "piece": piece, **content}
@@ -117,7 +117,7 @@ def encoded(task: Task, piece: int) -> tuple[memoryview, dict[str, Any]]:
     return data, head
 
 
-def make_piece(task: Task, folder: str | os.PathLike[str], piece: int) -> Done:
+def make_piece(task: PieceTask, folder: str | os.PathLike[str], piece: int) -> Done:
     """Work out a piece and write its file, beside and then renamed.
 
     Raises:

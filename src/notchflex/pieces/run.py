@@ -15,7 +15,7 @@ from notchflex.loads.validation import check_integer
 from notchflex.pieces.connection import check_address, local_cluster, scheduler_at
 from notchflex.pieces.folder import check_target, done_piece, locked, prepare_folder, tidy
 from notchflex.pieces.manifest import Manifest
-from notchflex.pieces.piece import Done, Task
+from notchflex.pieces.piece import Done, PieceTask
 from notchflex.pieces.running import in_threads, on_cluster
 
 Progress = Callable[[int, int, int, int], None]
@@ -44,7 +44,7 @@ def check_workers(workers: int | None, scheduler: str | None) -> None:
 
 
 def open_folder(
-    task: Task,
+    task: PieceTask,
     folder: str | os.PathLike[str],
     option: str,
     inputs: Iterable[str | Path] = (),
@@ -65,7 +65,7 @@ def open_folder(
 
 
 def run_pieces(
-    task: Task,
+    task: PieceTask,
     folder: str | os.PathLike[str],
     *,
     pieces: range | None = None,
@@ -113,7 +113,7 @@ def run_pieces(
 
 @contextlib.contextmanager
 def _running(
-    task: Task,
+    task: PieceTask,
     folder: str,
     pieces: list[int],
     workers: int | None,

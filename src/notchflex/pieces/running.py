@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from notchflex.errors import InputError
 from notchflex.pieces.connection import ClusterConnection, scheduler_gone
-from notchflex.pieces.piece import Done, Recipe, Task, make_piece, task_of
+from notchflex.pieces.piece import Done, PieceTask, Recipe, make_piece, task_of
 from notchflex.solver.programs.threads import number_of_cores, on_cores
 
 _TRIM_THRESHOLD, _TOP_PAD, _MMAP_THRESHOLD = -1, -2, -3
@@ -39,7 +39,7 @@ _BEAT, _FETCH = 1.0, 10.0
 
 
 def in_threads(
-    task: Task, folder: str, pieces: Iterable[int], cores: int | None = None
+    task: PieceTask, folder: str, pieces: Iterable[int], cores: int | None = None
 ) -> Generator[Done]:
     """Work on pieces in threads of this process; each piece keeps to one of them."""
     keep_memory()
@@ -52,7 +52,7 @@ def in_threads(
         yield from found
 
 
-def on_cluster(client: Any, task: Task, folder: str, pieces: Iterable[int]) -> Generator[Done]:
+def on_cluster(client: Any, task: PieceTask, folder: str, pieces: Iterable[int]) -> Generator[Done]:
     """Work on pieces with the workers of a client of dask.
 
     Args:

@@ -25,10 +25,10 @@ from notchflex.results.reason import why_not
 from notchflex.results.recorded import Recorded
 from notchflex.results.state import State
 from notchflex.robot import Robot
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.run import SolverRun
+from notchflex.solver.solver_state import SolverState
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

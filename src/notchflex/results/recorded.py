@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from notchflex.loads.command import Command
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.reported import STATE, Shape
+from notchflex.solver.solver_state import SolverState
 
 REPORTED = (*Shape._fields, *STATE)
 """Everything that a run reports of each state, by name."""

@@ -19,7 +19,7 @@ from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import LEVELS
 from notchflex.results.same_robot import mismatch
 from notchflex.robot import Robot
-from notchflex.solver.continuation import SolverState, at_rest
+from notchflex.solver.solver_state import SolverState, at_rest
 
 _MODES = ".point.unknowns.modes"
 _LOADS = ".applied"

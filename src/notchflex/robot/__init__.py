@@ -9,7 +9,7 @@ from notchflex._ready import list_robots
 from notchflex.robot.friction.capstan import Capstan
 from notchflex.robot.friction.corner import Corner
 from notchflex.robot.friction.frictionless import Frictionless
-from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
+from notchflex.robot.kinds import Friction, Material, Notch, kinds_of, openings_along
 from notchflex.robot.materials.linear import Linear
 from notchflex.robot.materials.nitinol import Nitinol
 from notchflex.robot.materials.stress_strain import StressStrain
@@ -18,7 +18,6 @@ from notchflex.robot.notches.arc import ArcNotch
 from notchflex.robot.notches.opening import Opening
 from notchflex.robot.notches.strip import StripNotch
 from notchflex.robot.notches.u_link import ULink
-from notchflex.robot.openings import openings_along
 from notchflex.robot.reading import load_robot, robot_from_text
 from notchflex.robot.robot import Robot, from_table, to_table
 from notchflex.robot.schema import json_schema

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, overload
 
 from pydantic import Field, ValidationError, model_validator
@@ -10,8 +10,8 @@ from pydantic import Field, ValidationError, model_validator
 from notchflex.errors import InputError
 from notchflex.robot.error_messages import fields_of, sentences
 from notchflex.robot.kinds import Friction, Material, Notch, one_of
-from notchflex.robot.openings import openings_along
 from notchflex.robot.part import ProblemError, part
+from notchflex.robot.problems import robot_problems
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tolerance import Tolerances
 from notchflex.robot.tube import Tube
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     AnyFriction: TypeAlias = Friction
 else:
     AnyNotch, AnyMaterial, AnyFriction = one_of(Notch), one_of(Material), one_of(Friction)
-
-MOST_NOTCHES = 10_000
 
 
 @part
@@ -73,71 +71,10 @@ class Robot:
 
     @model_validator(mode="after")
     def _parts_fit(self) -> "Robot":
-        found = list(self._problems())
+        found = list(robot_problems(self))
         if found:
             raise ProblemError(found)
         return self
-
-    def _problems(self) -> Iterator[tuple[str, str]]:
-        """Check what only the whole robot can tell."""
-        number = sum(notch.repeat for notch in self.notch)
-        if number > MOST_NOTCHES:
-            yield ("notch", f"makes {number} notches; at most {MOST_NOTCHES} are allowed.")
-            return
-        first = 1
-        last: Notch | None = None  # the notch right before the table
-        found: list[tuple[str, str]] = []
-        row: list[tuple[str, str]] = []  # what one notch lacks its neighbours often lack too
-        for notch in self.notch:
-            found += [(f"notch[{first}].{key}", text) for key, text in notch.problems(self.tube)]
-            if last and not row:
-                row = [(f"notch[{first}].{key}", text) for key, text in notch.row_problems(last)]
-            first += notch.repeat
-            last = notch.expanded()[-1]
-        found += row
-        yield from found
-        for i, tendon in enumerate(self.tendon, start=1):
-            if tendon.radius > self.tube.outer_radius:
-                yield (
-                    f"tendon[{i}].radius",
-                    f"is {tendon.radius} mm, outside the wall; it must be at most the outer "
-                    f"radius, {self.tube.outer_radius} mm.",
-                )
-            if tendon.end_body is not None and tendon.end_body > number:
-                yield (
-                    f"tendon[{i}].end_body",
-                    f"is {tendon.end_body}; the robot has the bodies 1 to {number}, one after each "
-                    "notch.",
-                )
-            elif not found:
-                for key, text in self._tendon_problems(tendon):
-                    yield (f"tendon[{i}].{key}", text)
-        if self.tolerance and not found:
-            from notchflex.robot.value_names import tolerance_problems  # it makes robots
-
-            yield from tolerance_problems(self)
-
-    def _tendon_problems(self, tendon: Tendon) -> Iterator[tuple[str, str]]:
-        """Check a tendon against the notches that it crosses, and the body that it ends in."""
-        end = tendon.end_body or self.number_of_notches
-        found: dict[tuple[str, str], None] = {}  # equal notches say the same
-        first = 1
-        for notch in self.notch:
-            if first <= end:
-                found |= dict.fromkeys(notch.tendon_problems(tendon))
-            first += notch.repeat
-        yield from found
-        if found or tendon.end_body is None:
-            return
-        bodies = [number for number, _ in openings_along(self.notches, tendon.direction_deg)]
-        if end not in bodies:
-            near = [n for n in bodies if n < end][-1:] + [n for n in bodies if n > end][:1]
-            yield (
-                "end_body",
-                f"is {end}, which has no wall on the tendon's side of the tube; the tendon runs "
-                f"through the {'bodies' if len(near) > 1 else 'body'} "
-                f"{' and '.join(map(str, near))} there.",
-            )
 
     @functools.cached_property
     def _hash(self) -> int:

@@ -13,6 +13,7 @@ from tomlkit.exceptions import ParseError
 
 from notchflex._replacing import replacing
 from notchflex.errors import InputError, RobotFileError
+from notchflex.robot.comments import FITTED_TO, add_note, set_value
 from notchflex.robot.error_messages import fields_of
 from notchflex.robot.reading import robot_from_text
 from notchflex.robot.robot import Robot, source_of, to_table
@@ -20,10 +21,6 @@ from notchflex.robot.tolerance import read_tolerances
 from notchflex.robot.value_names import defaults_of
 
 _HEADER = re.compile(r"""\s*\[{1,2}\s*["']?(\w+)["']?\s*\]{1,2}\s*(#.*)?""")
-_CHANGED = re.compile(r"\s*\(changed from (.*)\)$")
-# What a fit said of a value, behind the comment that stood there before.
-_BY = "fitted by notchflex to"
-_FITTED = re.compile(rf"(?:;|#)\s*{_BY} .*$")
 _NUMBERED = re.compile(r"(\w+)(?:\[(\*|\d+)\])?\.(\w+)")
 
 _Notes = Mapping[str, str]
@@ -64,10 +61,9 @@ def save_robot(
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
             raise RobotFileError.FILE_UNREADABLE(f"{template} cannot be read: {reason}.") from None
-    text = robot_text(robot, source, fitted)
     try:
         with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
+            temporary.write_text(robot_text(robot, source, fitted), encoding="utf-8", newline="\n")
     except InputError as error:
         raise RobotFileError.FILE_UNWRITABLE(str(error)) from None
 
@@ -137,15 +133,14 @@ def _fresh(robot: Robot, notes: _Notes) -> str:
 
 def _tolerance_lines(table: Mapping[str, Any]) -> list[str]:
     """Write tolerances, a name a line; TOML wants quotes around one with brackets."""
-    items = [(name if "[" not in name else f'"{name}"', one) for name, one in table.items()]
-    inline = [(name, _inline(one) if isinstance(one, dict) else one) for name, one in items]
-    return [f"{name} = {tomlkit.item(one).as_string()}" for name, one in inline]
-
-
-def _inline(table: dict[str, Any]) -> Any:
-    made = tomlkit.inline_table()
-    made.update(table)
-    return made
+    lines: list[str] = []
+    for name, one in table.items():
+        item: Any = tomlkit.inline_table() if isinstance(one, dict) else tomlkit.item(one)
+        if isinstance(one, dict):
+            item.update(one)
+        lines.append(f'"{name}"' if "[" in name else name)
+        lines[-1] += f" = {item.as_string()}"
+    return lines
 
 
 def _fresh_part(part: Any, notes: _Notes) -> list[str]:
@@ -157,7 +152,7 @@ def _fresh_part(part: Any, notes: _Notes) -> list[str]:
         unit = (record.json_schema_extra or {}).get("unit", "")
         comment = ", ".join(word for word in (unit, record.description or "") if word)
         if key in notes:
-            comment = "; ".join(word for word in (comment, f"{_BY} {notes[key]}") if word)
+            comment = "; ".join(word for word in (comment, f"{FITTED_TO} {notes[key]}") if word)
         line = f"{key} = {tomlkit.item(value).as_string()}"
         lines.append(f"{line}  # {comment}" if comment else line)
     return lines
@@ -270,41 +265,6 @@ def _update(table: Any, values: dict[str, Any], section: str, notes: _Notes) -> 
             for item, one in zip(table[key], cast("list[Any]", value), strict=False):
                 _update(item, one, key, notes)
         elif table[key] != value:
-            _set(table, key, value)
+            set_value(table, key, value)
         if key in notes and key in table:
-            _tell(table[key], notes[key])
-
-
-def _set(table: Any, key: str, value: object) -> None:
-    """Change a value; a comment beside it says from what."""
-    was, comment = table[key].as_string(), table[key].trivia.comment
-    table[key] = value
-    if not comment:
-        return
-    changed = _CHANGED.search(comment)
-    if changed:
-        comment, was = comment[: changed.start()], changed[1]
-    # What a fit said of the value is not true of another.
-    comment = _FITTED.sub("", comment).rstrip()
-    same = tomllib.loads(f"x = {was}")["x"] == value
-    if not same:
-        comment = f"{comment or '#'} (changed from {was})"
-    _put(table[key], comment)
-
-
-def _tell(item: Any, note: str) -> None:
-    """Say of a value what it was fitted to, between its comment and what it was changed from."""
-    comment = item.trivia.comment
-    changed = _CHANGED.search(comment)
-    if changed:
-        comment = comment[: changed.start()]
-    comment = _FITTED.sub("", comment).rstrip()
-    comment = f"{comment}; {_BY} {note}" if comment.strip("# ") else f"# {_BY} {note}"
-    _put(item, comment + (changed[0] if changed else ""))
-
-
-def _put(item: Any, comment: str) -> None:
-    """Put a comment beside a value, two blanks behind it where there was none."""
-    if comment and not item.trivia.comment:
-        item.trivia.comment_ws = "  "
-    item.trivia.comment = comment
+            add_note(table[key], notes[key])

@@ -16,7 +16,7 @@ from notchflex.analysis.derivatives.tangent import Change, PathTangents
 from notchflex.results.path import EquilibriumPath
 from notchflex.sensing.model import SensingModel, Step
 from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
-from notchflex.solver.continuation import SolverState
+from notchflex.solver.solver_state import SolverState
 
 Progress = Callable[[int, int], None]
 

@@ -18,8 +18,8 @@ from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.sensing.readings import Readings
 from notchflex.sensing.unknown import UnknownForce
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.newton import Settings
+from notchflex.solver.solver_state import SolverState
 
 # What readings can't resolve in the model, mm and rad: a stuck tendon of the model is not quite
 # rigid, and a solve is met to its tolerance.

@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from notchflex.results.path import EquilibriumPath
 from notchflex.sensing.model import SensingModel, Step
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.programs.run import SolverRun
+from notchflex.solver.solver_state import SolverState
 
 # Lengths that are tried of a step: of what slopes promise, and where that fails of any.
 _WHOLE = np.array([1.0])

@@ -1,11 +1,14 @@
-"""Poses of all bodies in the frame of the base, and the external loads on them."""
+"""Poses of bodies: against the base, with the external loads on them, and against those before."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
 from notchflex.loads.applied import BodyLoads, body_wrench
+from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.motion import Motion, identity
 
 
@@ -48,3 +51,41 @@ def external_wrenches(
     summed = jnp.cumsum(in_base[::-1], axis=0)[::-1]
     inside = jax.vmap(Motion.wrench_inside)(distal, summed)
     return distal.rotation, inside, summed[0]
+
+
+def anchor_poses(chain: Chain, pose: Motion | None) -> Motion | None:
+    """Pose of every body in the frames of those before it, as far back as the window reaches."""
+    if pose is None:
+        return None
+    poses = [pose]
+    before = pose
+    for _ in range(chain.window - 1):
+        first = identity(pose.translation.shape[-1])
+        before: Motion = jax.tree.map(shift_from_base, before, first)
+        poses.append(jax.vmap(Motion.then)(before, poses[-1]))
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves, axis=1), *poses)
+
+
+def select_anchors(anchors: Motion | None, back: Array) -> Motion | None:
+    """Select for every tendon or contact the body that it comes from, of those before."""
+    if anchors is None:
+        return None
+
+    def of_leaf(leaf: Array) -> Array:
+        return select_back([leaf[:, number] for number in range(leaf.shape[1])], back)
+
+    return jax.tree.map(of_leaf, anchors)
+
+
+def select_back(by_body: Sequence[Array], back: Array) -> Float[Array, "n t *k"]:
+    """Select values of the first, second ... body before, for every tendon or contact its own."""
+    selected = by_body[0][:, None]
+    for number, values in enumerate(by_body[1:], start=2):
+        here = (back == number).reshape(*back.shape, *(1,) * (values.ndim - 1))
+        selected = jnp.where(here, values[:, None], selected)
+    return jnp.broadcast_to(selected, (*back.shape, *by_body[0].shape[1:]))
+
+
+def shift_from_base(values: Array, first: Array) -> Array:
+    """Values of the flexure before; `first` for the first flexure."""
+    return jnp.concatenate([jnp.asarray(first)[None], values[:-1]])

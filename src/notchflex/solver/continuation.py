@@ -5,34 +5,17 @@ from __future__ import annotations
 from functools import partial
 from typing import NamedTuple
 
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from notchflex._jax import constant, jax, jnp
+from notchflex._jax import jax, jnp
 from notchflex._pytree import choose
-from notchflex.loads.applied import BodyLoads
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import Iterate
-from notchflex.solver.element import Memory, Unknowns
+from notchflex.solver.element import Memory
 from notchflex.solver.friction_predictor import predict_log_ratios
+from notchflex.solver.linear_step.block_elimination import Iterate
 from notchflex.solver.newton import NewtonProblem, NewtonResult, Settings, newton
-
-
-class SolverState(NamedTuple):
-    """A solved state and all that the next one needs: the state that can be saved.
-
-    Attributes:
-        point: Unknowns and base tensions.
-        memory: History of contacts and material, as of this state.
-        stroke: Tendon drawn out at the base, mm.
-        applied: External loads on the bodies; None for a chain assembled for tendons alone.
-    """
-
-    point: Iterate
-    memory: Memory
-    stroke: Float[Array, " t"]
-    applied: BodyLoads | None
+from notchflex.solver.solver_state import SolverState
 
 
 class LoadStepResult(NamedTuple):
@@ -102,31 +85,6 @@ class _LoadStepSearch(NamedTuple):
     eased: Bool[Array, ""]
     moving: Iterate
     predicts: Bool[Array, ""]
-
-
-def at_rest(chain: Chain) -> SolverState:
-    """Return the free robot with slack tendons that have not yet slid."""
-    none = tuple(constant(np.zeros((*group.present.shape, 2))) for group in chain.groups)
-    unknowns = Unknowns(
-        modes=constant(np.zeros(chain.stiffness.shape)),
-        contact_force=tuple(
-            constant(np.zeros(group.has_contact.shape)) for group in chain.contact_pairs
-        ),
-        log_ratio=none,
-    )
-    slack = constant(np.zeros(chain.tendons))
-    memory = Memory(none, none, none, chain.law.rest(chain.rods.section))
-    return SolverState(Iterate(unknowns, slack), memory, slack, unloaded(chain))
-
-
-def unloaded(chain: Chain) -> BodyLoads | None:
-    """Return the absence of loads on all bodies, in the form of the chain."""
-    if not chain.loaded:
-        return None
-    bodies = chain.flexures + 1
-    d, a = (3, 3) if chain.frame is None else (2, 1)
-    shapes = ((d,), (a,), (d, d), (a + d,))
-    return BodyLoads(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
 
 
 def solve_load_step(

@@ -20,9 +20,9 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.friction.registry import LEAST_RATIO
-from notchflex.solver.block_elimination import Iterate
 from notchflex.solver.element import Memory
-from notchflex.solver.residual import slip_mask
+from notchflex.solver.linear_step.block_elimination import Iterate
+from notchflex.solver.tendon_spans import slip_mask
 
 LARGEST_LOG_RATIO = 1.0
 """A step may change a log ratio by so much; beyond, the linear model says nothing of use."""

@@ -23,16 +23,16 @@ from notchflex._jax import jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_slopes
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.element import Memory, bound_side
-from notchflex.solver.linearisation import LinearisedRows, linearise
+from notchflex.solver.linear_step.linearisation import LinearisedRows, linearise
+from notchflex.solver.linear_step.row_layout import RowLayout, row_layout
 from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
 from notchflex.solver.programs.static_structure import StaticStructure
 from notchflex.solver.residual import evaluate
-from notchflex.solver.row_layout import RowLayout, row_layout
+from notchflex.solver.solver_state import SolverState
 
 # Closed lips and tendons driven by stroke are held by springs this much stiffer than the notches:
 # they only stiffen; without it their forces would be multipliers and the stiffness not defined.

@@ -15,9 +15,9 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.flexure import in_space
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
-from notchflex.solver.block_elimination import Iterate, linear_step
 from notchflex.solver.element import Memory
 from notchflex.solver.friction_predictor import LARGEST_LOG_RATIO, limit_slack, predict_contacts
+from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
 from notchflex.solver.residual import Evaluation, evaluate
 from notchflex.solver.step_limits import limit_closing
 

@@ -7,10 +7,8 @@ external loads from the tip.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
@@ -18,38 +16,22 @@ from notchflex.loads.applied import BodyLoads
 from notchflex.mechanics.chain import Chain, flexure_states
 from notchflex.mechanics.contact import GapResponse
 from notchflex.mechanics.flexure import FlexureState
-from notchflex.mechanics.motion import Motion, identity
-from notchflex.mechanics.tendon import Crossing, TendonGroup
-from notchflex.solver.body_poses import external_wrenches
+from notchflex.mechanics.motion import Motion
+from notchflex.mechanics.tendon import Crossing
+from notchflex.solver.body_poses import (
+    anchor_poses,
+    external_wrenches,
+    select_anchors,
+    shift_from_base,
+)
 from notchflex.solver.element import Memory, Unknowns, clip_symmetric, signorini, trial_log_ratio
-
-
-class TendonSpans(NamedTuple):
-    """Tensions and lengths of a group of t tendons over all flexures, n by t (mm, N).
-
-    Attributes:
-        crossing: Its path over every gap.
-        tension_ratio: Tension beyond each edge of the gap over the tension before it.
-        gap_tension: Tension in the gap; 0 where the tendon has no span there.
-        body_tension: Tension inside the distal body, likewise.
-        released_beyond: Tendon length released by the flexures beyond the distal body.
-        tension_length_beyond: Sum of tension times length beyond it, N mm.
-        released_length: As `released_beyond`, with this gap.
-        tension_length: As `tension_length_beyond`, with this gap and the distal body.
-        slid: Tendon slid over both edges toward the base, with the stiffness of the friction law.
-        bound: Largest log ratio at both edges, in the direction of the present one.
-    """
-
-    crossing: Crossing
-    tension_ratio: Float[Array, "n t 2"]
-    gap_tension: Float[Array, "n t"]
-    body_tension: Float[Array, "n t"]
-    released_beyond: Float[Array, "n t"]
-    tension_length_beyond: Float[Array, "n t"]
-    released_length: Float[Array, "n t"]
-    tension_length: Float[Array, "n t"]
-    slid: Float[Array, "n t 2"]
-    bound: Float[Array, "n t 2"]
+from notchflex.solver.tendon_spans import (
+    TendonSpans,
+    crossings,
+    in_tendon_order,
+    of_group,
+    slip_mask,
+)
 
 
 class BodyWrenches(NamedTuple):
@@ -132,9 +114,9 @@ def evaluate(
     """
     on_bodies = chain.forces_on_bodies
     flexure = flexure_states(chain, unknowns.modes, memory.material, with_pose=on_bodies)
-    anchors = _anchor_poses(chain, flexure.pose)
+    anchors = anchor_poses(chain, flexure.pose)
     spans = tuple(
-        _spans(chain, k, _crossings(group, chain, flexure, anchors), unknowns, base_tension)
+        _spans(chain, k, crossings(group, chain, flexure, anchors), unknowns, base_tension)
         for k, group in enumerate(chain.groups)
     )
     contacts = tuple(
@@ -207,52 +189,6 @@ def _balance(
     return balance
 
 
-def _crossings(
-    group: TendonGroup, chain: Chain, flexure: FlexureState, anchors: Motion | None
-) -> Crossing:
-    """Paths of a group of tendons over all gaps."""
-    selected = select_anchors(anchors, group.back) if group.acts_on_bodies else None
-    return jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
-
-
-def select_anchors(anchors: Motion | None, back: Array) -> Motion | None:
-    """Select for every tendon or contact the body that it comes from, of those before."""
-    if anchors is None:
-        return None
-
-    def of_leaf(leaf: Array) -> Array:
-        return select_back([leaf[:, number] for number in range(leaf.shape[1])], back)
-
-    return jax.tree.map(of_leaf, anchors)
-
-
-def select_back(by_body: Sequence[Array], back: Array) -> Float[Array, "n t *k"]:
-    """Select values of the first, second ... body before, for every tendon or contact its own."""
-    selected = by_body[0][:, None]
-    for number, values in enumerate(by_body[1:], start=2):
-        here = (back == number).reshape(*back.shape, *(1,) * (values.ndim - 1))
-        selected = jnp.where(here, values[:, None], selected)
-    return jnp.broadcast_to(selected, (*back.shape, *by_body[0].shape[1:]))
-
-
-def _anchor_poses(chain: Chain, pose: Motion | None) -> Motion | None:
-    """Pose of every body in the frames of those before it, as far back as the window reaches."""
-    if pose is None:
-        return None
-    poses = [pose]
-    before = pose
-    for _ in range(chain.window - 1):
-        first = identity(pose.translation.shape[-1])
-        before: Motion = jax.tree.map(_shift_from_base, before, first)
-        poses.append(jax.vmap(Motion.then)(before, poses[-1]))
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves, axis=1), *poses)
-
-
-def _shift_from_base(values: Array, first: Array) -> Array:
-    """Values of the flexure before; `first` for the first flexure."""
-    return jnp.concatenate([jnp.asarray(first)[None], values[:-1]])
-
-
 def _spans(
     chain: Chain,
     k: int,
@@ -265,10 +201,10 @@ def _spans(
     runs = group.runs
     # Not written with ln T, so that a slack tendon stays regular.
     turning = crossing.exit_turning, crossing.entry_turning
-    at_base = chain.friction.least_taut(_of_group(base_tension, group), *turning)[None]
+    at_base = chain.friction.least_taut(of_group(base_tension, group), *turning)[None]
     tension_ratio = jnp.exp(-runs[..., None] * log_ratio)
     beyond_both = at_base * jnp.cumprod(tension_ratio[..., 0] * tension_ratio[..., 1], axis=0)
-    transmitted = _shift_from_base(beyond_both, at_base[0])
+    transmitted = shift_from_base(beyond_both, at_base[0])
     gap_tension = runs * tension_ratio[..., 0] * transmitted
     body_tension = tension_ratio[..., 1] * gap_tension
     shortening = runs * (group.natural_gap - crossing.length)
@@ -276,7 +212,7 @@ def _spans(
     lengths = jnp.stack([shortening, gap_tension * group.natural_gap + in_body])
     summed = jnp.cumsum(lengths[:, ::-1], axis=1)[:, ::-1]
     beyond = summed - lengths
-    stiffness = _of_group(chain.memory_stiffness, group)[None]
+    stiffness = of_group(chain.memory_stiffness, group)[None]
     at_exit = summed[0] + summed[1] / stiffness
     at_entry = beyond[0] + (beyond[1] + in_body) / stiffness
     limits = chain.friction.limits(*turning, (transmitted, gap_tension), log_ratio)
@@ -292,16 +228,6 @@ def _spans(
         slid=jnp.stack([at_exit, at_entry], axis=-1),
         bound=slip_mask(group) * limits,
     )
-
-
-def _of_group(values: Float[Array, " all"], group: TendonGroup) -> Float[Array, " t"]:
-    """Values of the tendons of a group; by slices, whose adjoint the native compiler knows."""
-    return jnp.stack([values[number] for number in group.numbers])
-
-
-def slip_mask(group: TendonGroup) -> Float[Array, "n t 2"]:
-    """1 where a tendon can slide over an edge: not where it is fixed, nor where it does not run."""
-    return jnp.stack([group.visits, group.visits * (1.0 - group.ends)], axis=-1)
 
 
 def _wrenches(
@@ -339,11 +265,3 @@ def _wrenches(
 def span_mask(chain: Chain, back: Array) -> Float[Array, "n t window"]:
     """1 where a span or contact that ends at a body reaches back over so many flexures more."""
     return 1.0 * (back[..., None] > jnp.arange(chain.window)[None, None])
-
-
-def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...]) -> Array:
-    """Bring values per group of tendons into the order of the robot's tendons, as last axis."""
-    if not grouped:
-        return jnp.zeros(0)
-    together = jnp.concatenate(grouped, axis=-1)
-    return jnp.stack([together[..., place] for place in np.argsort(chain.tendon_order)], axis=-1)

@@ -15,10 +15,11 @@ from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import stroke
-from notchflex.solver.block_elimination import Iterate, linear_step
-from notchflex.solver.continuation import SolverState, interpolate_command
+from notchflex.solver.continuation import interpolate_command
 from notchflex.solver.element import Memory
+from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
 from notchflex.solver.residual import evaluate
+from notchflex.solver.solver_state import SolverState
 
 
 class SubstepHistory(NamedTuple):

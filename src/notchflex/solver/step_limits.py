@@ -6,8 +6,8 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.block_elimination import Iterate
 from notchflex.solver.element import Unknowns, is_active, notch_heights
+from notchflex.solver.linear_step.block_elimination import Iterate
 from notchflex.solver.residual import Evaluation
 
 # Lips are brought together by a little more than their gap, so that they count as closed: by this

@@ -1,7 +1,8 @@
 """Sweeps: many robots under the same loads, in pieces that are kept as files and gone on with."""
 
 from notchflex.sweeping.plan import SweepPlan, read_plan
-from notchflex.sweeping.result import Sweep, read_sweep
+from notchflex.sweeping.reading import read_sweep
+from notchflex.sweeping.result import Sweep
 from notchflex.sweeping.sweep import sweep
 
 __all__ = ["Sweep", "SweepPlan", "read_plan", "read_sweep", "sweep"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +14,12 @@ from jaxtyping import Int
 from notchflex._extras import need
 from notchflex._summary import Displayed, Summary, short
 from notchflex.errors import InputError
-from notchflex.pieces.codes import CODES
-from notchflex.pieces.folder import head_of, manifest_in
 from notchflex.pieces.piece import piece_file
 from notchflex.pieces.sketch import Scale, Sketch
 from notchflex.results.files.json import write_json
 from notchflex.robot import Robot
 from notchflex.robot.error_messages import nearest
-from notchflex.sweeping.manifest import KIND, SweepManifest
+from notchflex.sweeping.manifest import SweepManifest
 from notchflex.sweeping.plan.parts import SweepPlan
 from notchflex.sweeping.points import axis_values
 
@@ -252,60 +249,6 @@ class Sweep(Displayed):
             if one.count:
                 rows.append((name, f"{short(one.smallest[0][0])} to {short(one.largest[0][0])}"))
         return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
-
-
-def check_content(manifest: SweepManifest, directory: str | os.PathLike[str]) -> None:
-    """Raise unless plan, robot and columns can be read from a manifest.
-
-    Raises:
-        InputError: Its file was changed.
-    """
-    try:
-        _ = manifest.plan, manifest.robot
-        columns = manifest.document["columns"]
-        if not isinstance(columns, list) or not all(isinstance(one, str) for one in columns):
-            raise TypeError
-    except (InputError, LookupError, TypeError, AttributeError):
-        raise InputError.FILE_DAMAGED(
-            f"{directory} cannot be read: its sweep.json was changed; give the plan again with "
-            "another folder."
-        ) from None
-
-
-def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
-    """Read a sweep, which may be unfinished.
-
-    Args:
-        directory: Its folder.
-
-    Returns:
-        The sweep: `lazy` and `to_xarray` are its rows.
-
-    Raises:
-        InputError: It is not a folder of a sweep, or polars is not installed.
-    """
-    need("polars", "data", "read_sweep")
-    manifest = SweepManifest(manifest_in(directory, KIND).document)
-    check_content(manifest, directory)
-    output = manifest.plan.output
-    pieces: list[int] = []
-    codes = np.zeros(len(CODES), int)
-    failures: list[int] = []
-    sketches = {name: Sketch() for name in manifest.document["columns"]}
-    scales: dict[str, Scale] = {}
-    for piece in range(manifest.pieces):
-        file = piece_file(directory, piece)
-        head = head_of(file, manifest, piece)
-        if head is None:
-            continue
-        pieces.append(piece)
-        codes += np.array(head["codes"])
-        failures += head["failures"][: output.failures - len(failures)]
-        scales = {name: Scale(*pair) for name, pair in head["scales"].items()}
-        for name, document in head["columns"].items():
-            sketches[name] = sketches[name].merged(Sketch.read(document), output.extremes)
-    counts: dict[str, int] = dict(zip(CODES, codes.tolist(), strict=True))
-    return Sweep(Path(directory), manifest, tuple(pieces), counts, failures, sketches, scales)
 
 
 def write_summary(found: Sweep) -> None:

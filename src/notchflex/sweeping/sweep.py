@@ -18,7 +18,8 @@ from notchflex.sweeping.manifest import KIND, SweepManifest
 from notchflex.sweeping.model import model_of
 from notchflex.sweeping.plan import SweepPlan, read_plan
 from notchflex.sweeping.plan.reading import plan_from_table
-from notchflex.sweeping.result import Sweep, read_sweep, write_summary
+from notchflex.sweeping.reading import read_sweep
+from notchflex.sweeping.result import Sweep, write_summary
 from notchflex.sweeping.worker import SweepWorker
 
 

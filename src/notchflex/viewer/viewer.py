@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable
 from pathlib import Path as FilePath
-from threading import Event
 
 import numpy as np
 
@@ -21,7 +19,7 @@ from notchflex.viewer.scene.scene import Scene, Shown
 from notchflex.viewer.server import HOST, PORT, bracketed, check_host, check_installed, serve
 from notchflex.viewer.session import Session
 from notchflex.viewer.steering import steer
-from notchflex.viewer.tasks import TargetQueue, Tasks, WatchedFile
+from notchflex.viewer.tasks import TargetQueue, TaskLoop, WatchedFile
 
 # A browser does not show more steps a second than this.
 MOST_STEPS = 60.0
@@ -31,7 +29,7 @@ _TEXT, _LOOK = 0.1, 0.5
 _SEEN = 0.05
 
 
-class Viewer:
+class Viewer(TaskLoop):
     """A robot in the browser, with sliders for its loads.
 
     It is solved at rest and served on a host and a port, or the next free one. `read` reads the
@@ -50,6 +48,7 @@ class Viewer:
         host: str = HOST,
         port: int = PORT,
     ) -> None:
+        super().__init__()
         check_installed()
         check_host(host, port)
         self.original = robot
@@ -60,12 +59,10 @@ class Viewer:
         self.shown = Shown()
         self.message = ""  # why something was not done
         self.note = ""  # how the last number was changed
-        self.tasks = Tasks()
-        self.interrupted = Event()  # the page asks to stop what takes long
         self._playing = False
         self._read = read
         self._file = WatchedFile(file) if file is not None and read is not None else None
-        self._stopped, self._looked, self._updated = Event(), 0.0, 0.0
+        self._looked, self._updated = 0.0, 0.0
         self.server = serve(host, port)
         self._make_scene(robot)
         self.page = Page(self)
@@ -81,33 +78,12 @@ class Viewer:
         """The settings that the sliders show: the last target, or, in a cycle, the current one."""
         return self.session.controls if self._playing and len(self.targets) else self.targets.end
 
-    def ask(self, task: Callable[[], None]) -> None:
-        """Add a task of the solver thread; any thread may call this."""
-        self.tasks.add(task)
-
-    def interrupt(self, task: Callable[[], None]) -> None:
-        """Stop what takes long and add a task; any thread may call this."""
-        self.interrupted.set()
-        self.ask(task)
-
     def run(self) -> None:
         """Solve and draw until `stop` is called."""
-        while not self._stopped.is_set():
-            try:
-                self._turn()
-            except InputError as problem:
-                self._fail(str(problem))
-            except Exception as problem:
-                traceback.print_exc()
-                self._fail(f"this is a bug in notchflex, please report it: {problem!r}")
+        super().run()
         self.server.stop()
 
-    def stop(self) -> None:
-        """End `run`; any thread may call this."""
-        self._stopped.set()
-        self.ask(lambda: None)
-
-    def _turn(self) -> None:
+    def turn(self) -> None:
         """Do all tasks and one step toward the next target, or wait for a task."""
         started = time.monotonic()
         if started - self._looked > _LOOK:
@@ -292,7 +268,7 @@ class Viewer:
         try:
             robot = self._read()
         except InputError as problem:
-            self._fail(f"The file was saved, but cannot be used: {problem}")
+            self.fail(f"The file was saved, but cannot be used: {problem}")
             return
         self.change(robot)
         self.original = robot
@@ -317,6 +293,7 @@ class Viewer:
             self.page.busy(f"repeating the load history: step {done} of {of}")
         return not self.interrupted.is_set()
 
-    def _fail(self, sentence: str) -> None:
+    def fail(self, sentence: str) -> None:
+        """Show what failed."""
         self.message = sentence
         self.page.update()

@@ -20,8 +20,9 @@ from notchflex.mechanics.contact import closing_travel, free_angle
 from notchflex.results.quantities.registry import QUANTITIES
 from notchflex.robot import Robot
 from notchflex.solver.newton import Settings
+from notchflex.solver.programs.contacts import solve_contacts
 from notchflex.solver.programs.prepare import PreparedChain, prepare
-from notchflex.solver.programs.run import run, solve_contacts
+from notchflex.solver.programs.run import run
 
 _ANGLE = QUANTITIES["total_angle"]
 _MOST_ROWS = 12

@@ -26,10 +26,10 @@ from notchflex.mechanics.chain import Shaped, laws, shape_of
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.prepare import PreparedChain, flat, prepare
 from notchflex.solver.programs.run import run
+from notchflex.solver.solver_state import SolverState
 
 # One gradient of a number takes about as long as derivatives along so many directions.
 _ADJOINT = 4

@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Float
 
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.programs.run import SolverRun
-from notchflex.solver.residual import slip_mask
+from notchflex.solver.solver_state import SolverState
+from notchflex.solver.tendon_spans import slip_mask
 
 if TYPE_CHECKING:  # for the type only: a path tells its kinks
     from notchflex.results.path import EquilibriumPath

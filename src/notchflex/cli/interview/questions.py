@@ -16,7 +16,7 @@ from notchflex.errors import InputError
 from notchflex.robot import Nitinol, Robot, Superelastic, Tendon, Tube
 from notchflex.robot.error_messages import fields_of, is_list, kind_of
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
-from notchflex.robot.robot import MOST_NOTCHES
+from notchflex.robot.problems import MOST_NOTCHES
 
 ALLOWED_STRAIN = "0.08"
 NITINOL_DENSITY = 6450.0  # kg/m3

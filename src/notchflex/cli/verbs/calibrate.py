@@ -9,13 +9,8 @@ from cyclopts import Parameter
 
 from notchflex._load_words import load_columns
 from notchflex.cli import terminal
-from notchflex.cli.arguments.fit import (
-    BeyondFit,
-    DataSources,
-    FitOptions,
-    ParameterSpec,
-    Sources,
-)
+from notchflex.cli.arguments.data_sources import DataSources, Sources
+from notchflex.cli.arguments.fit import BeyondFit, FitOptions, ParameterSpec
 from notchflex.cli.arguments.pieces import InPieces
 from notchflex.cli.arguments.robots import MeasuredAs, OnePath, Settings, read_data
 from notchflex.cli.outputs import OUTPUT, JsonFile, Outputs, PlotFile

@@ -33,16 +33,17 @@ from notchflex.control.program.task import SearchLayouts, Task
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, stroke, tension_is_bounded
-from notchflex.solver.block_elimination import Iterate, linear_step
-from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
+from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.derived.reported import believable
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.element import Memory
 from notchflex.solver.friction_predictor import limit_slack
+from notchflex.solver.linear_step.block_elimination import Iterate, linear_step
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.pytree_layout import lane_sizes
 from notchflex.solver.residual import Evaluation, evaluate
+from notchflex.solver.solver_state import SolverState
 
 # Redundant drives are as small as they get where a step would change them by this part.
 _SMALL_RELAXATION = 1e-3

@@ -26,12 +26,12 @@ from notchflex.loads.load_path import LoadPath
 from notchflex.mechanics.motion import rotation_about
 from notchflex.results.state import SavedState, State, fitted
 from notchflex.robot import Robot
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.reported import unpad_quantity
 from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.capacity import pad_rows
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.solver_state import SolverState
 
 # Corrections of drives and equilibrium after a solved load.
 _CORRECTIONS = 8.0

@@ -7,7 +7,7 @@ from typing import Any
 from jaxtyping import Array, Float
 
 from notchflex._jax import array_module, jnp
-from notchflex.solver.block_elimination import gauss_jordan
+from notchflex.solver.linear_step.block_elimination import gauss_jordan
 
 LEAST_DRIVES = 1e-10
 """Where drives are redundant the smallest meet the target. This weight decides among those that

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from jaxtyping import Array, Bool, Int
 
-from notchflex.solver.block_elimination import Iterate
-from notchflex.solver.continuation import LoadStepResult, SolverState
+from notchflex.solver.continuation import LoadStepResult
+from notchflex.solver.linear_step.block_elimination import Iterate
+from notchflex.solver.solver_state import SolverState
 
 
 class SearchState(NamedTuple):

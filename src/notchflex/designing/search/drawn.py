@@ -10,10 +10,11 @@ from jaxtyping import Bool, Float
 from notchflex.analysis.closing_loads.varied import closing_tensions_of
 from notchflex.analysis.uncertainty.draws import sources_of, values_at
 from notchflex.analysis.varied.fit_polynomial import PolynomialAccuracy, fit_polynomial
-from notchflex.designing.model.point import CLOSINGS, Point, Solver
+from notchflex.designing.model.point import CLOSINGS, Point
 from notchflex.designing.model.quantities import CLOSING
+from notchflex.designing.model.solver import Solver
 from notchflex.designing.model.wishes import Wish
-from notchflex.designing.search.problem import Problem, Vector
+from notchflex.designing.search.problem import DesignProblem, Vector
 from notchflex.designing.search.rows import TOLERANCE, row_reading, row_sizes, rows_of, violations
 from notchflex.designing.search.starts import solved
 from notchflex.robot import Robot
@@ -27,7 +28,7 @@ _ERROR, _CHECKS = 0.01, 12
 
 
 def levels_of(
-    problem: Problem, tolerances: Sequence[Tolerance], draws: int, seed: int
+    problem: DesignProblem, tolerances: Sequence[Tolerance], draws: int, seed: int
 ) -> Float[np.ndarray, "draws d"]:
     """Return levels of everything that deviates, as for a tolerance analysis."""
     sources = sources_of(problem.solver.variables.robot, tolerances)
@@ -35,7 +36,7 @@ def levels_of(
 
 
 def met_by(
-    problem: Problem,
+    problem: DesignProblem,
     z: Vector,
     tolerances: Sequence[Tolerance],
     levels: Float[np.ndarray, "draws d"],

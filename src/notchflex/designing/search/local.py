@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
 from notchflex.designing.search.optimality import multipliers
-from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.scaled import Scaled
 from notchflex.designing.search.squares import is_sum_of_squares, nearest_squares
@@ -45,14 +45,14 @@ class Found(NamedTuple):
     """
 
     z: Vector
-    evaluation: Evaluation | None
+    evaluation: DesignEvaluation | None
     stationary: bool
     iterations: int
     trail: tuple[Vector, ...] = ()
 
 
 def search_from(
-    problem: Problem, z: Vector, iterations: int, settled: Sequence[Found] = ()
+    problem: DesignProblem, z: Vector, iterations: int, settled: Sequence[Found] = ()
 ) -> Found:
     """Search from a start by SLSQP.
 
@@ -73,7 +73,7 @@ def search_from(
     return found._replace(trail=(*trail.steps, found.z))
 
 
-def _search(problem: Problem, z: Vector, iterations: int, trail: Trail) -> Found:
+def _search(problem: DesignProblem, z: Vector, iterations: int, trail: Trail) -> Found:
     first = problem.evaluate(z)
     first = None if first is None else problem.with_slopes(first, z)
     if first is None:
@@ -96,7 +96,7 @@ def _search(problem: Problem, z: Vector, iterations: int, trail: Trail) -> Found
     return Found(*best, stationary, done)
 
 
-def search_on(problem: Problem, found: Found, iterations: int) -> Found:
+def search_on(problem: DesignProblem, found: Found, iterations: int) -> Found:
     """Go on by trust-constr where SLSQP ended without having settled."""
     if found.evaluation is None or problem.count == 0:
         return found
@@ -107,20 +107,20 @@ def search_on(problem: Problem, found: Found, iterations: int) -> Found:
     return found._replace(iterations=found.iterations + more)
 
 
-def is_stationary(problem: Problem, z: Vector, one: Evaluation) -> bool:
+def is_stationary(problem: DesignProblem, z: Vector, one: DesignEvaluation) -> bool:
     """Whether all constraints hold and no small change improves the design, to first order."""
     return problem.worst(one) <= TOLERANCE and multipliers(problem, z, one).is_stationary
 
 
-def _gained(problem: Problem, before: Evaluation, after: Evaluation) -> bool:
+def _gained(problem: DesignProblem, before: DesignEvaluation, after: DesignEvaluation) -> bool:
     if problem.worst(before) > TOLERANCE:
         return problem.worst(after) < 0.9 * problem.worst(before)
     return before.total - after.total > _GAIN * max(abs(before.total), 1e-12)
 
 
 def _slsqp(
-    problem: Problem, z: Vector, first: Evaluation, iterations: int, trail: Trail
-) -> tuple[tuple[Vector, Evaluation], int]:
+    problem: DesignProblem, z: Vector, first: DesignEvaluation, iterations: int, trail: Trail
+) -> tuple[tuple[Vector, DesignEvaluation], int]:
     scaled = Scaled(problem, first, z, best=(z, first))
     history: list[tuple[float, float]] = []
 
@@ -154,8 +154,8 @@ def _slsqp(
 
 
 def _trust(
-    problem: Problem, z: Vector, first: Evaluation, iterations: int
-) -> tuple[tuple[Vector, Evaluation], int]:
+    problem: DesignProblem, z: Vector, first: DesignEvaluation, iterations: int
+) -> tuple[tuple[Vector, DesignEvaluation], int]:
     scaled = Scaled(problem, first, z, best=(z, first))
     limits: Any = [
         NonlinearConstraint(one["fun"], 0.0, 0.0 if one["type"] == "eq" else np.inf, one["jac"])
@@ -177,7 +177,7 @@ def _trust(
     return _best(problem, scaled), int(result.nit)
 
 
-def _best(problem: Problem, scaled: Scaled) -> tuple[Vector, Evaluation]:
+def _best(problem: DesignProblem, scaled: Scaled) -> tuple[Vector, DesignEvaluation]:
     """The best robot that a search met, with its derivatives."""
     assert scaled.best is not None
     z, one = scaled.best

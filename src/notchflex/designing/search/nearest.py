@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 
 _EVALUATIONS = 60
 _INSIDE = 1e-10
 
 
-def nearest(problem: Problem, z: Vector, first: Evaluation) -> tuple[Vector, Evaluation]:
+def nearest(
+    problem: DesignProblem, z: Vector, first: DesignEvaluation
+) -> tuple[Vector, DesignEvaluation]:
     """Search for the smallest sum of squares of what constraints are missed by, in their sizes.
 
     Args:
@@ -28,7 +30,7 @@ def nearest(problem: Problem, z: Vector, first: Evaluation) -> tuple[Vector, Eva
     best = [z, first]
     last: list[Any] = [z, first]
 
-    def at(vector: Vector) -> Evaluation:
+    def at(vector: Vector) -> DesignEvaluation:
         if not np.array_equal(vector, last[0]):
             found = problem.evaluate(vector)
             if found is None:

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import lsq_linear
 
-from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 
 # A limit is reached up to this part of its size, a variable's up to this part of its span.
 _REACHED = 1e-5
@@ -56,7 +56,7 @@ class Multipliers:
         return self.rest <= _REST
 
 
-def multipliers(problem: Problem, z: Vector, one: Evaluation) -> Multipliers:
+def multipliers(problem: DesignProblem, z: Vector, one: DesignEvaluation) -> Multipliers:
     """Find the limits that are reached and what they cost.
 
     Args:
@@ -115,7 +115,7 @@ def multipliers(problem: Problem, z: Vector, one: Evaluation) -> Multipliers:
     return Multipliers(costs, rest / gross)
 
 
-def _cost(problem: Problem, row: int, is_variable: bool, side: int, factor: float) -> float:
+def _cost(problem: DesignProblem, row: int, is_variable: bool, side: int, factor: float) -> float:
     """Change of the sum per unit of the limit."""
     if is_variable:
         return -factor * side / problem.solver.variables.span[row]
@@ -123,7 +123,7 @@ def _cost(problem: Problem, row: int, is_variable: bool, side: int, factor: floa
 
 
 def _reached(
-    problem: Problem, z: Vector, one: Evaluation
+    problem: DesignProblem, z: Vector, one: DesignEvaluation
 ) -> tuple[list[tuple[int, bool, int]], list[np.ndarray], list[float], list[float]]:
     """Limits reached, the gradients of what they limit, and the signs of their factors."""
     span = problem.solver.variables.span

@@ -13,8 +13,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.designing.model.point import Point, Solver
+from notchflex.designing.model.point import Point
 from notchflex.designing.model.reading import Reading
+from notchflex.designing.model.solver import Solver
 from notchflex.designing.model.wishes import Wish
 from notchflex.designing.search.rows import (
     Row,
@@ -33,7 +34,7 @@ _KEPT = 16
 
 
 @dataclass(frozen=True)
-class Bound:
+class EpigraphBound:
     """A variable of the search that is above or below all numbers of an objective."""
 
     wish: Wish
@@ -47,7 +48,7 @@ class Bound:
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class DesignEvaluation:
     """A design at one vector of scaled variables.
 
     Attributes:
@@ -68,7 +69,7 @@ class Evaluation:
 
 
 @dataclass(eq=False)
-class Problem:
+class DesignProblem:
     """A design of robots of one form.
 
     Attributes:
@@ -108,10 +109,10 @@ class Problem:
         return (*own, *more)
 
     @cached_property
-    def bounds(self) -> tuple[Bound, ...]:
+    def bounds(self) -> tuple[EpigraphBound, ...]:
         """The further variables."""
         return tuple(
-            Bound(wish, side, factor)
+            EpigraphBound(wish, side, factor)
             for wish in self.objectives
             for side, factor in epigraphs(wish)
         )
@@ -128,11 +129,11 @@ class Problem:
         return variables.lower + np.clip(z[: self.count], 0.0, 1.0) * variables.span
 
     @cached_property
-    def _kept(self) -> dict[bytes, Evaluation | None]:
+    def _kept(self) -> dict[bytes, DesignEvaluation | None]:
         """Designs evaluated last: a search asks for where another one began or ended."""
         return {}
 
-    def evaluate(self, z: Vector) -> Evaluation | None:
+    def evaluate(self, z: Vector) -> DesignEvaluation | None:
         """Return the design at a scaled vector; None where there is no robot or no equilibrium."""
         z = np.clip(z[: self.count], 0.0, 1.0)
         key = z.tobytes()
@@ -142,7 +143,7 @@ class Problem:
             self._kept[key] = self._evaluated(z)
         return self._kept[key]
 
-    def _evaluated(self, z: Vector) -> Evaluation | None:
+    def _evaluated(self, z: Vector) -> DesignEvaluation | None:
         try:
             point = self._solved(z)
             found = self.read(point.plain, z)
@@ -153,7 +154,7 @@ class Problem:
     def _solved(self, z: Vector) -> Point:
         return self.solver.point(self.x(z))
 
-    def with_slopes(self, one: Evaluation, z: Vector) -> Evaluation | None:
+    def with_slopes(self, one: DesignEvaluation, z: Vector) -> DesignEvaluation | None:
         """Return the design at a scaled vector with its derivatives; None if they are not known."""
         if one.has_slopes:
             return one
@@ -165,13 +166,13 @@ class Problem:
     def _failed(self, reason: str) -> None:
         self.failures[reason] = self.failures.get(reason, 0) + 1
 
-    def read(self, point: Point, z: Vector) -> Evaluation | None:
+    def read(self, point: Point, z: Vector) -> DesignEvaluation | None:
         """Return what is asked of a solved robot; None where it is not a number."""
         terms, total = self._terms(point, z)
         bounded = tuple(self._joined([one.wish.every(point)]) for one in self.bounds)
         has_slopes = point.slopes_of is not None
         rows = self._joined(self._row_readings(point))
-        made = Evaluation(point, self._sum(terms), rows, bounded, total, has_slopes)
+        made = DesignEvaluation(point, self._sum(terms), rows, bounded, total, has_slopes)
         if made.objective.slopes is not None:
             size = float(np.linalg.norm(made.objective.slopes * self.solver.variables.span))
             self.steepest = max(self.steepest, size if np.isfinite(size) else 0.0)
@@ -205,7 +206,7 @@ class Problem:
             return Reading(values, None)
         return Reading(values, np.concatenate([np.zeros((0, self.count)), *known]))
 
-    def _is_finite(self, one: Evaluation) -> bool:
+    def _is_finite(self, one: DesignEvaluation) -> bool:
         readings = (one.objective, one.rows, *one.bounded)
         good = all(
             np.isfinite(reading.values).all()
@@ -221,13 +222,13 @@ class Problem:
         """Sizes by which violations count; set by the first robot that is solved."""
         return row_sizes(self.rows)
 
-    def violation(self, one: Evaluation) -> Float[np.ndarray, " k"]:
+    def violation(self, one: DesignEvaluation) -> Float[np.ndarray, " k"]:
         """Return by how much rows are beyond their limits, in their sizes."""
         if not self.rows:
             return np.zeros(0)
         return violations(self.rows, one.rows.values, self.sizes)
 
-    def worst(self, one: Evaluation) -> float:
+    def worst(self, one: DesignEvaluation) -> float:
         """Return the largest violation."""
         return float(np.abs(self.violation(one)).max(initial=0.0))
 
@@ -236,7 +237,7 @@ class Problem:
         """Size by which sums of robots differ; set with the sizes of the rows."""
         return 1.0
 
-    def set_sizes(self, reached: Sequence[Evaluation]) -> None:
+    def set_sizes(self, reached: Sequence[DesignEvaluation]) -> None:
         """Take sizes from what robots reach: of the sum, and of rows without a limit of a size."""
         totals = np.array([one.total for one in reached])
         spread = float(np.quantile(totals, 0.75) - np.quantile(totals, 0.25))

@@ -18,7 +18,7 @@ from scipy.special import log_ndtr
 from notchflex.designing.model.point import Point
 from notchflex.designing.model.reading import Reading
 from notchflex.designing.model.wishes import Wish
-from notchflex.designing.search.problem import Bound, Problem, Vector
+from notchflex.designing.search.problem import DesignProblem, EpigraphBound, Vector
 from notchflex.designing.search.rows import Row, row_reading, rows_of
 
 # Derivatives of a standard deviation are differences of exact derivatives, over this part of the
@@ -42,7 +42,7 @@ class Hold:
 
 
 @dataclass(eq=False)
-class RobustProblem(Problem):
+class RobustProblem(DesignProblem):
     """A design whose limits robots made within tolerances must meet.
 
     Attributes:
@@ -58,7 +58,7 @@ class RobustProblem(Problem):
         return super().objectives if self.holds else ()
 
     @cached_property
-    def bounds(self) -> tuple[Bound, ...]:
+    def bounds(self) -> tuple[EpigraphBound, ...]:
         """The further variables."""
         return super().bounds if self.holds else ()
 
@@ -170,7 +170,7 @@ class RobustProblem(Problem):
         return [np.stack(one, axis=1) for one in zip(*columns, strict=True)]
 
 
-def limited(problem: Problem) -> list[int]:
+def limited(problem: DesignProblem) -> list[int]:
     """Return the numbers of the constraints that have limits, not a value."""
     every = enumerate(problem.constraints)
     return [number for number, one in every if not any(row.is_equality for row in rows_of(one))]

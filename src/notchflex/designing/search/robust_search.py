@@ -17,9 +17,9 @@ from scipy.special import ndtri
 from notchflex.designing.model.deviations import deviations_of
 from notchflex.designing.search.drawn import levels_of, met_by
 from notchflex.designing.search.local import Found, search_from
-from notchflex.designing.search.problem import Problem, Progress
+from notchflex.designing.search.problem import DesignProblem, Progress
 from notchflex.designing.search.robust_problem import Hold, RobustProblem, limited
-from notchflex.designing.search.search import Outcome, Searches
+from notchflex.designing.search.search import Searches, SearchResult
 from notchflex.designing.specification.asked import DesignConstraint
 from notchflex.designing.specification.spec import DesignSpec, RobustOptions
 from notchflex.errors import InputError
@@ -108,7 +108,7 @@ def robust_search(
     numbers = limited(best.problem)
     wanted = _wanted(spec, options, best.problem, numbers)
 
-    def counted(one: Outcome) -> Counted:
+    def counted(one: SearchResult) -> Counted:
         levels = levels_of(one.problem, tolerances, options.draws, options.seed)
         return Counted(met_by(one.problem, one.found.z, tolerances, levels, numbers))
 
@@ -141,7 +141,7 @@ def robust_search(
 
 
 def _wanted(
-    spec: DesignSpec, options: RobustOptions, problem: Problem, numbers: Sequence[int]
+    spec: DesignSpec, options: RobustOptions, problem: DesignProblem, numbers: Sequence[int]
 ) -> list[Wanted]:
     """Return what is wanted: of each constraint that says so, and of all together."""
     found: list[Wanted] = []
@@ -169,11 +169,11 @@ def _holds(
 
 
 def _robust(
-    start: Outcome,
+    start: SearchResult,
     tolerances: Sequence[Tolerance],
     holds: Mapping[int, Hold],
     iterations: int,
-) -> Outcome | None:
+) -> SearchResult | None:
     """Search from the end of another search; None where that has no derivatives."""
     solver = start.problem.solver
     problem = RobustProblem(
@@ -188,7 +188,7 @@ def _robust(
     if holds:  # the same sum, whose size several robots have shown
         vars(problem)["total_size"] = start.problem.total_size
     found: Found = search_from(problem, start.found.z, iterations)
-    return None if found.evaluation is None else Outcome(problem, start.number, found.z, found)
+    return None if found.evaluation is None else SearchResult(problem, start.number, found.z, found)
 
 
 def _recalibrate(wanted: Sequence[Wanted], factors: list[float], count: Counted) -> bool:
@@ -208,7 +208,11 @@ def _recalibrate(wanted: Sequence[Wanted], factors: list[float], count: Counted)
 
 
 def _is_better(
-    wanted: Sequence[Wanted], one: Outcome, count: Counted, best: Outcome, best_count: Counted
+    wanted: Sequence[Wanted],
+    one: SearchResult,
+    count: Counted,
+    best: SearchResult,
+    best_count: Counted,
 ) -> bool:
     """Whether a design misses less of what is wanted than the best so far, or costs less."""
     if not wanted:
@@ -225,13 +229,13 @@ def _is_better(
     return lack < best_lack
 
 
-def _total(one: Outcome) -> float:
+def _total(one: SearchResult) -> float:
     assert one.found.evaluation is not None
     return one.found.evaluation.total
 
 
 def _yields(
-    problem: Problem,
+    problem: DesignProblem,
     options: RobustOptions,
     numbers: Sequence[int],
     before: Counted,
@@ -253,7 +257,7 @@ def _yields(
     return tuple(found)
 
 
-def check_limits(problems: Sequence[Problem], tolerances: Sequence[Tolerance]) -> None:
+def check_limits(problems: Sequence[DesignProblem], tolerances: Sequence[Tolerance]) -> None:
     """Raise if there is nothing to make robust.
 
     Raises:

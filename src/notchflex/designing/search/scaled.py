@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 
 # What a sum is taken to be where there is no robot or no equilibrium, in sizes of the sum.
 _PENALTY = 1e3
 
 
 @dataclass
-class Linear:
+class ScaledDerivatives:
     """Derivatives of the sum and of the rows, "eq" (= 0) and "ineq" (>= 0)."""
 
     gradient: Vector
@@ -34,11 +34,11 @@ class Scaled:
         linear: Where derivatives were asked last, and what they are.
     """
 
-    problem: Problem
-    first: Evaluation
+    problem: DesignProblem
+    first: DesignEvaluation
     start: Vector
-    best: tuple[Vector, Evaluation] | None = None
-    linear: tuple[bytes, Linear] | None = None
+    best: tuple[Vector, DesignEvaluation] | None = None
+    linear: tuple[bytes, ScaledDerivatives] | None = None
 
     def __post_init__(self) -> None:
         """Find the sizes of sum and rows."""
@@ -74,7 +74,7 @@ class Scaled:
         free: list[tuple[float | None, float | None]] = [(None, None)] * len(self.problem.bounds)
         return [*((0.0, 1.0) for _ in range(self.problem.count)), *free]
 
-    def evaluation(self, y: Vector) -> Evaluation | None:
+    def evaluation(self, y: Vector) -> DesignEvaluation | None:
         """Return the robot at a vector, perhaps without derivatives."""
         found = self.problem.evaluate(y)
         if found is not None and self._is_better(found):
@@ -99,7 +99,7 @@ class Scaled:
         """Return the derivatives of the rows."""
         return self._linear(y).rows[kind]
 
-    def _linear(self, y: Vector) -> Linear:
+    def _linear(self, y: Vector) -> ScaledDerivatives:
         key = y.tobytes()
         if self.linear is None or self.linear[0] != key:
             found = self.evaluation(y)
@@ -113,7 +113,7 @@ class Scaled:
             self._good = self._value(y, full), self._rows(y, full)
         return self.linear[1]
 
-    def _is_better(self, found: Evaluation) -> bool:
+    def _is_better(self, found: DesignEvaluation) -> bool:
         if self.best is None:
             return True
         return is_better(self.problem, found, self.best[1])
@@ -121,11 +121,11 @@ class Scaled:
     def _slack(self, y: Vector) -> Vector:
         return self.bound_zero + self.bound_size * y[self.problem.count :]
 
-    def _value(self, y: Vector, one: Evaluation) -> float:
+    def _value(self, y: Vector, one: DesignEvaluation) -> float:
         factors = np.array([bound.factor for bound in self.problem.bounds])
         return float(one.objective.values.sum() + factors @ self._slack(y)) / self.size
 
-    def _rows(self, y: Vector, one: Evaluation) -> dict[str, np.ndarray]:
+    def _rows(self, y: Vector, one: DesignEvaluation) -> dict[str, np.ndarray]:
         low, high, same = self._row_limits
         numbers, slack = one.rows.values, self._slack(y)
         least: list[np.ndarray] = []
@@ -137,7 +137,7 @@ class Scaled:
         equal = (numbers[same] - low[same]) / self.row_size[same]
         return {"eq": equal, "ineq": np.concatenate([np.zeros(0), *least])}
 
-    def _derivatives(self, one: Evaluation) -> Linear:
+    def _derivatives(self, one: DesignEvaluation) -> ScaledDerivatives:
         bounds, span = self.problem.bounds, self.problem.solver.variables.span
         assert one.objective.slopes is not None
         assert one.rows.slopes is not None
@@ -156,7 +156,9 @@ class Scaled:
             least.append(np.concatenate([by_z, own], axis=1))
         none = np.zeros((0, rows.shape[1]))
         gradient = np.concatenate(by) / self.size
-        return Linear(gradient, {"eq": rows[same], "ineq": np.concatenate([none, *least])})
+        return ScaledDerivatives(
+            gradient, {"eq": rows[same], "ineq": np.concatenate([none, *least])}
+        )
 
     @property
     def _row_limits(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -180,7 +182,7 @@ class Scaled:
         ]
 
 
-def is_better(problem: Problem, one: Evaluation, other: Evaluation) -> bool:
+def is_better(problem: DesignProblem, one: DesignEvaluation, other: DesignEvaluation) -> bool:
     """Whether a robot is better than another: nearer to all limits, or as near and with less."""
     from notchflex.designing.search.rows import TOLERANCE
 

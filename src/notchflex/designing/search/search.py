@@ -9,7 +9,7 @@ import numpy as np
 
 from notchflex.designing.search.local import Found, search_from, search_on
 from notchflex.designing.search.nearest import nearest
-from notchflex.designing.search.problem import Problem, Progress, Vector
+from notchflex.designing.search.problem import DesignProblem, Progress, Vector
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.squares import is_followed
 from notchflex.designing.search.starts import starts
@@ -23,7 +23,7 @@ _SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class SearchResult:
     """Where one search ended.
 
     Attributes:
@@ -33,7 +33,7 @@ class Outcome:
         found: Where it ended.
     """
 
-    problem: Problem
+    problem: DesignProblem
     number: int
     start: Vector
     found: Found
@@ -56,15 +56,15 @@ class Searches:
         interrupted: Whether they were stopped by Ctrl-C.
     """
 
-    outcomes: list[Outcome] = field(default_factory=list[Outcome])
+    outcomes: list[SearchResult] = field(default_factory=list[SearchResult])
     interrupted: bool = False
 
     @property
-    def best(self) -> Outcome:
+    def best(self) -> SearchResult:
         """The best of all."""
         return min(self.outcomes, key=lambda one: one.merit)
 
-    def of(self, number: int) -> list[Outcome]:
+    def of(self, number: int) -> list[SearchResult]:
         """Return where the searches of a form ended."""
         return [one for one in self.outcomes if one.number == number]
 
@@ -98,7 +98,7 @@ def _same(one: Found, other: Found) -> bool:
 
 
 def search(
-    problems: Sequence[Problem], options: SearchOptions, progress: Progress | None
+    problems: Sequence[DesignProblem], options: SearchOptions, progress: Progress | None
 ) -> Searches:
     """Search robots of several forms.
 
@@ -122,7 +122,7 @@ def search(
                 settled = searches.settled(number)
                 found = search_from(problem, z, options.iterations, settled)
                 if found.evaluation is not None:
-                    searches.outcomes.append(Outcome(problem, number, z, found))
+                    searches.outcomes.append(SearchResult(problem, number, z, found))
                 if searches.has_agreed(number, max(2, (several + 1) // 2)):
                     break
             if searches.has_followed(number):
@@ -157,12 +157,12 @@ def _approach(searches: Searches, options: SearchOptions) -> None:
         else:
             found = Found(z, near, False, 0)
         if found.evaluation is not None:
-            searches.outcomes.append(Outcome(one.problem, one.number, one.start, found))
+            searches.outcomes.append(SearchResult(one.problem, one.number, one.start, found))
         if searches.best.merit[0] == 0.0:
             return
 
 
-def _nothing(problems: Sequence[Problem]) -> InputError:
+def _nothing(problems: Sequence[DesignProblem]) -> InputError:
     """Make the error that says why no robot could be solved."""
     reasons: dict[str, int] = {}
     for problem in problems:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from notchflex.designing.model.wishes import Wish
-from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 from notchflex.designing.search.rows import squared
 from notchflex.designing.specification.asked import DesignObjective
 
@@ -24,7 +24,7 @@ class _Enough(Exception):  # noqa: N818 - no error
     """Ends a search whose curves are followed well enough."""
 
 
-def is_sum_of_squares(problem: Problem) -> bool:
+def is_sum_of_squares(problem: DesignProblem) -> bool:
     """Whether all that is asked is to come near to something."""
     return (
         bool(problem.objectives) and not problem.rows and all(map(_is_square, problem.objectives))
@@ -38,8 +38,8 @@ def _is_square(wish: Wish) -> bool:
 
 
 def nearest_squares(
-    problem: Problem, z: Vector, first: Evaluation
-) -> tuple[Vector, Evaluation, bool]:
+    problem: DesignProblem, z: Vector, first: DesignEvaluation
+) -> tuple[Vector, DesignEvaluation, bool]:
     """Search for the least sum of squares by SciPy's trust region, from a start.
 
     Args:
@@ -52,12 +52,12 @@ def nearest_squares(
         settled.
     """
     span = problem.solver.variables.span
-    best: list[tuple[Vector, Evaluation]] = [(z, first)]
-    last: list[tuple[Vector, Evaluation | None]] = [(z, first)]
+    best: list[tuple[Vector, DesignEvaluation]] = [(z, first)]
+    last: list[tuple[Vector, DesignEvaluation | None]] = [(z, first)]
     enough = _enough(problem)
     large = _PENALTY * (1.0 + np.abs(_residuals(problem, first)[0]))
 
-    def at(vector: Vector) -> Evaluation | None:
+    def at(vector: Vector) -> DesignEvaluation | None:
         if not np.array_equal(vector, last[0][0]):
             last[0] = vector.copy(), problem.evaluate(vector)
             one = last[0][1]
@@ -108,12 +108,12 @@ def _least(
     return int(result.status) > 0
 
 
-def is_followed(problem: Problem, total: float) -> bool:
+def is_followed(problem: DesignProblem, total: float) -> bool:
     """Whether nothing but curves is asked, and all are followed well enough."""
     return is_sum_of_squares(problem) and total <= _enough(problem)
 
 
-def _enough(problem: Problem) -> float:
+def _enough(problem: DesignProblem) -> float:
     """Return the sum at which all curves are followed well enough; below 0 with other targets."""
     if any(wish.curve is None for wish in problem.objectives):
         return -1.0
@@ -125,7 +125,9 @@ def _enough(problem: Problem) -> float:
     )
 
 
-def _residuals(problem: Problem, one: Evaluation) -> tuple[np.ndarray, np.ndarray | None]:
+def _residuals(
+    problem: DesignProblem, one: DesignEvaluation
+) -> tuple[np.ndarray, np.ndarray | None]:
     """What is to be 0, and its derivatives; its sum of squares is the sum that is minimised."""
     source = one.point if one.has_slopes else one.point.plain
     readings = [squared(wish, source) for wish in problem.objectives]

@@ -11,8 +11,9 @@ from jaxtyping import Bool, Float
 from scipy.stats import qmc
 
 from notchflex.analysis.batch import simulate_batch
-from notchflex.designing.model.point import Point, Solver
-from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.model.point import Point
+from notchflex.designing.model.solver import Solver
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 from notchflex.errors import InputError
 from notchflex.loads import LoadPath
 from notchflex.robot import Robot
@@ -27,11 +28,11 @@ _APART = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class StartingPoint:
     """A robot that a search may start from."""
 
     z: Vector
-    evaluation: Evaluation
+    evaluation: DesignEvaluation
 
 
 def draw(count: int, variables: int, seed: int) -> Float[np.ndarray, "count variables"]:
@@ -43,7 +44,7 @@ def draw(count: int, variables: int, seed: int) -> Float[np.ndarray, "count vari
     return sobol.random_base2(power)[:count]
 
 
-def smooth(problem: Problem, count: int, seed: int) -> Float[np.ndarray, "count variables"]:
+def smooth(problem: DesignProblem, count: int, seed: int) -> Float[np.ndarray, "count variables"]:
     """Return vectors whose values run straight along the tube where each notch has its own.
 
     Good designs are smooth, and among many values drawn one by one none is.
@@ -61,7 +62,7 @@ def smooth(problem: Problem, count: int, seed: int) -> Float[np.ndarray, "count 
     return vectors
 
 
-def starts(problem: Problem, several: int, most: int, seed: int) -> Iterator[Vector]:
+def starts(problem: DesignProblem, several: int, most: int, seed: int) -> Iterator[Vector]:
     """Yield starts, far from each other, the most promising first.
 
     The first two are chosen from the robot as it is and a few drawn ones, by one batch. The others
@@ -75,7 +76,7 @@ def starts(problem: Problem, several: int, most: int, seed: int) -> Iterator[Vec
     """
     here = problem.start
     own = problem.evaluate(here)
-    known = [] if own is None else [Candidate(here, own)]
+    known = [] if own is None else [StartingPoint(here, own)]
     if several == 1 and own is not None:
         problem.set_sizes([own])
         yield here
@@ -84,9 +85,9 @@ def starts(problem: Problem, several: int, most: int, seed: int) -> Iterator[Vec
     half = max(1, most // 2)
     drawn = np.stack([smooth(problem, half, seed), draw(half, problem.count, seed)], axis=1)
     drawn = drawn.reshape(-1, problem.count)  # either kind in turn
-    used: list[Candidate] = []
+    used: list[StartingPoint] = []
     for part, wanted in ((drawn[:few], min(2, several)), (drawn[few:], several)):
-        more = [Candidate(z, one) for z, one in evaluate_all(problem, part) if one is not None]
+        more = [StartingPoint(z, one) for z, one in evaluate_all(problem, part) if one is not None]
         known += more
         if known and not used:
             problem.set_sizes([one.evaluation for one in known])
@@ -98,8 +99,8 @@ def starts(problem: Problem, several: int, most: int, seed: int) -> Iterator[Vec
 
 
 def evaluate_all(
-    problem: Problem, vectors: Float[np.ndarray, "k v"]
-) -> list[tuple[Vector, Evaluation | None]]:
+    problem: DesignProblem, vectors: Float[np.ndarray, "k v"]
+) -> list[tuple[Vector, DesignEvaluation | None]]:
     """Evaluate many vectors by batches, without derivatives."""
     solver = problem.solver
     robots: list[Robot | None] = []
@@ -113,7 +114,7 @@ def evaluate_all(
     every = [robot for robot in robots if robot is not None]
     arrays, converged = solved(solver, every, [problem.x(vectors[i]) for i in good])
     solver.counts["solves"] += len(good)
-    found: list[tuple[Vector, Evaluation | None]] = [(z, None) for z in vectors]
+    found: list[tuple[Vector, DesignEvaluation | None]] = [(z, None) for z in vectors]
     for row, number in enumerate(good):
         robot = robots[number]
         if robot is None or not converged[row]:
@@ -157,7 +158,7 @@ def solved(
     return joined, np.asarray(joined["converged"].all(axis=1))
 
 
-def ranked(problem: Problem, found: Sequence[Candidate]) -> list[Candidate]:
+def ranked(problem: DesignProblem, found: Sequence[StartingPoint]) -> list[StartingPoint]:
     """Sort candidates: first those that miss least and whose sum is least."""
     if not found:
         return []
@@ -171,8 +172,8 @@ def ranked(problem: Problem, found: Sequence[Candidate]) -> list[Candidate]:
 
 
 def spread_out(
-    candidates: Sequence[Candidate], count: int, chosen: Sequence[Candidate]
-) -> list[Candidate]:
+    candidates: Sequence[StartingPoint], count: int, chosen: Sequence[StartingPoint]
+) -> list[StartingPoint]:
     """Add to chosen candidates the best that are not too near to them and to each other."""
     found, rest = list(chosen), []
     for one in candidates:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
-from notchflex.designing.search.problem import Evaluation, Problem, Vector
+from notchflex.designing.search.problem import DesignEvaluation, DesignProblem, Vector
 from notchflex.designing.search.rows import TOLERANCE
 from notchflex.designing.search.trails import Trail
 
@@ -31,12 +31,12 @@ _STEPS = 30
 class _Model:
     """Sum and rows, linear about a point."""
 
-    problem: Problem
-    one: Evaluation
+    problem: DesignProblem
+    one: DesignEvaluation
     price: float
     size: float
 
-    def merit(self, other: Evaluation) -> float:
+    def merit(self, other: DesignEvaluation) -> float:
         """Sum and price of what is missed."""
         missed = np.abs(self.problem.violation(other)).sum()
         return other.total / self.size + self.price * float(missed)
@@ -80,8 +80,8 @@ class _Model:
 
 
 def approach(
-    problem: Problem, z: Vector, first: Evaluation, iterations: int, trail: Trail
-) -> tuple[Vector, Evaluation, int]:
+    problem: DesignProblem, z: Vector, first: DesignEvaluation, iterations: int, trail: Trail
+) -> tuple[Vector, DesignEvaluation, int]:
     """Step to where limits hold, or are missed by least.
 
     Args:

@@ -96,7 +96,7 @@ def state_shape(subject: Subject, pieces: int = PIECES) -> RobotShape:
     return shape_from_angles(subject.robot, free, pieces)
 
 
-class Motion:
+class DeformationMap:
     """How every point of the straight tube moves to its place in a state."""
 
     def __init__(self, subject: Subject, cuts: RobotCuts) -> None:
@@ -129,7 +129,7 @@ class Motion:
         return new
 
 
-def bent_solid(straight: Manifold, motion: Motion, cuts: RobotCuts) -> Manifold:
+def bent_solid(straight: Manifold, motion: DeformationMap, cuts: RobotCuts) -> Manifold:
     """Bend the straight solid of a robot.
 
     Its edges are refined to the length of a piece of a flexure. Lengths of tube without cuts, which

@@ -21,7 +21,7 @@ from notchflex.export.cuts import RobotCuts, cuts_of
 from notchflex.export.document import Subject
 from notchflex.export.flat.title import plain_name
 from notchflex.export.options import SolidOptions
-from notchflex.export.solids.bent import Motion, is_bent
+from notchflex.export.solids.bent import DeformationMap, is_bent
 from notchflex.export.solids.checks import check_channels, check_one_piece, check_window
 from notchflex.export.tube_ends import TubeEnd, tube_end
 from notchflex.results.same_robot import robot_digest
@@ -164,7 +164,7 @@ def _bent(
         InputError: A spine's section has a hole.
     """
     cad = import_module("build123d")
-    motion = Motion(subject, cuts)
+    motion = DeformationMap(subject, cuts)
     at = [-options.shank, *(z for one in cuts.cuts for z in (one.start, one.end)), end.at]
     parts: list[Any] = []
     for number, (low, high) in enumerate(pairwise(at)):

@@ -68,7 +68,7 @@ def stl_solid(subject: Subject, options: SolidOptions) -> StlSolid:
     Raises:
         InputError: See `straight_solid`.
     """
-    from notchflex.export.solids.bent import Motion, bent_solid, is_bent
+    from notchflex.export.solids.bent import DeformationMap, bent_solid, is_bent
     from notchflex.export.solids.straight import straight_solid
 
     robot = subject.robot
@@ -78,7 +78,7 @@ def stl_solid(subject: Subject, options: SolidOptions) -> StlSolid:
     check_one_piece(len(solid.decompose()))
     warnings = [end.warning] if end.warning else []
     if is_bent(subject):
-        motion = Motion(subject, cuts)
+        motion = DeformationMap(subject, cuts)
         solid = bent_solid(solid, motion, cuts)
         if not all(zone.along_tube for zone in motion.zones):
             warnings.append(STRETCHED)

@@ -13,7 +13,8 @@ from notchflex.fit.estimation.fit import by_label, fitted
 from notchflex.fit.estimation.objective import LeastSquares
 from notchflex.fit.estimation.problem import FitProblem
 from notchflex.fit.measurements.measurements import OBSERVED, Measurements
-from notchflex.fit.model.constants import Constant, RobotNumber, Unknown, unknowns
+from notchflex.fit.model.constant import Constant
+from notchflex.fit.model.constants import RobotNumber, Unknown, unknowns
 from notchflex.fit.model.residuals import ANGLES
 from notchflex.fit.model.samples import Samples
 from notchflex.robot import Robot

@@ -262,7 +262,7 @@ class Calibration:
 
     def __repr__(self) -> str:
         """Return the constants with their intervals, the errors and the diagnosis on few lines."""
-        from notchflex.fit.documents import summary
+        from notchflex.fit.summary import summary
 
         return summary(self)
 

@@ -17,7 +17,8 @@ from notchflex.fit.estimation.objective import FitObjective, LeastSquares
 from notchflex.fit.estimation.problem import FitProblem, Progress, search
 from notchflex.fit.estimation.searches_in_pieces import search_in_pieces
 from notchflex.fit.measurements.measurements import Measurements
-from notchflex.fit.model.constants import Constant, unknowns
+from notchflex.fit.model.constant import Constant
+from notchflex.fit.model.constants import unknowns
 from notchflex.fit.model.samples import Samples
 from notchflex.pieces.options import PieceFolder
 from notchflex.robot import Robot

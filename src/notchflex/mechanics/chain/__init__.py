@@ -1,6 +1,7 @@
 """The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
 
-from notchflex.mechanics.chain.chain import Chain, Shaped, assemble, flexure_states, laws, shape_of
+from notchflex.mechanics.chain.arrays import Chain, flexure_states
+from notchflex.mechanics.chain.assembly import Shaped, assemble, laws, shape_of
 from notchflex.mechanics.chain.pad import padded
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
 from notchflex.mechanics.chain.sites import sites_of, unchecked_dimensions

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array
 
 from notchflex._jax import constant, jax
-from notchflex.mechanics.chain.chain import Chain
+from notchflex.mechanics.chain.arrays import Chain
 from notchflex.mechanics.flexure import Rod
 
 _ROTATIONS = ("start_rotation", "curve_rotation", "end_rotation", "node_rotation")

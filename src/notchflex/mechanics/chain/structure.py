@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array
 
 from notchflex._jax import jax
-from notchflex.mechanics.chain.chain import Chain
+from notchflex.mechanics.chain.arrays import Chain
 
 
 def structural(chain: Chain) -> Chain:

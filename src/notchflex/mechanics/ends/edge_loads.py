@@ -24,7 +24,7 @@ RELAXATION = 0.833
 """λ, the part of the compliance of the harmonics from n = 2 that finite elements find."""
 
 
-class Arc(NamedTuple):
+class WallSector(NamedTuple):
     """The arc of wall that a cut leaves, as an annular sector with edges at right angles.
 
     Attributes:
@@ -40,7 +40,7 @@ class Arc(NamedTuple):
     section: Section
 
 
-def arc_of(outer: float, inner: float, section: Section) -> Arc:
+def arc_of(outer: float, inner: float, section: Section) -> WallSector:
     """Replace what the cut leaves by a sector of the same area.
 
     Args:
@@ -53,7 +53,9 @@ def arc_of(outer: float, inner: float, section: Section) -> Arc:
     """
     radius, wall = 0.5 * (outer + inner), outer - inner
     angle = float(section.area) / (2.0 * radius * wall)
-    return Arc(radius, wall, angle, annular_sector(outer, inner, outer * (1.0 + np.cos(angle))))
+    return WallSector(
+        radius, wall, angle, annular_sector(outer, inner, outer * (1.0 + np.cos(angle)))
+    )
 
 
 class EndCompliance(NamedTuple):
@@ -72,7 +74,7 @@ class EndCompliance(NamedTuple):
     coupling: float
 
 
-def arc_harmonics(arc: Arc) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def arc_harmonics(arc: WallSector) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Expand the edge loads of the arc's stress in harmonics.
 
     Args:
@@ -109,7 +111,7 @@ _RELAXED = np.where(np.arange(HARMONICS) < 2, 1.0, RELAXATION)
 def end_compliance(
     outer: float,
     inner: float,
-    arc: Arc,
+    arc: WallSector,
     side: Side,
     poisson_ratio: float,
     relaxation: np.ndarray = _RELAXED,

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from notchflex.mechanics.ends.edge_loads import Arc
+from notchflex.mechanics.ends.edge_loads import WallSector
 from notchflex.mechanics.ends.side import Side
 
 
@@ -37,7 +37,7 @@ _SIDEWAYS = _Powers(2.35, -1.17, -0.84, 1.31, 0.06)
 
 
 def shear_compliances(
-    arc: Arc,
+    arc: WallSector,
     outer: float,
     lengths: tuple[float, float],
     second_moments: tuple[float, float],

@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from notchflex.mechanics.ends.edge_loads import Arc
+from notchflex.mechanics.ends.edge_loads import WallSector
 from notchflex.mechanics.section import Section
 
 
-def warping_constant(arc: Arc) -> float:
+def warping_constant(arc: WallSector) -> float:
     """Compute the warping constant C_w of the arc about its shear centre.
 
     Args:
@@ -34,7 +34,7 @@ def warping_constant(arc: Arc) -> float:
 
 
 def torsion_length(
-    arc: Arc,
+    arc: WallSector,
     outer: float,
     height: float,
     poisson_ratio: float,
@@ -61,7 +61,7 @@ def torsion_length(
     return height + t * (3.11 - 1.60 * a) - held
 
 
-def shear_centre(arc: Arc, height: float, section: Section) -> float:
+def shear_centre(arc: WallSector, height: float, section: Section) -> float:
     """Compute the distance of the centre of twist from the tube axis, toward the spine.
 
     Args:

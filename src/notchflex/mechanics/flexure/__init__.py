@@ -3,16 +3,10 @@
 from notchflex._packages import import_all
 from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
-from notchflex.mechanics.flexure.plane import flattened
+from notchflex.mechanics.flexure.geometric_stiffness import geometric_stiffness
 from notchflex.mechanics.flexure.registry import Site, rod, rod_at, unchecked
-from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.rod_kinematics import (
-    free_pose,
-    geometric_stiffness,
-    relative_pose,
-    rod_end,
-    turn_doubt,
-)
+from notchflex.mechanics.flexure.rod import Rod, flattened
+from notchflex.mechanics.flexure.rod_kinematics import free_pose, relative_pose, rod_end, turn_doubt
 from notchflex.mechanics.flexure.state import (
     FlexureState,
     fibre_slope,

@@ -64,6 +64,11 @@ def shifted(x: float = 0.0, z: float = 0.0) -> Motion:
     return Motion(constant(np.eye(3)), constant([x, 0.0, z]))
 
 
+def between(outer: Motion, inner: Motion) -> Motion:
+    """Return the inner pose, or many, as seen from the outer one."""
+    return Motion(outer.rotation.T @ inner.rotation, outer.point_inside(inner.translation))
+
+
 def legendre_modes(
     quadrature: RodQuadrature,
     bending: int,

@@ -24,7 +24,6 @@ from notchflex.mechanics.motion import (
     Motion,
     cross,
     left_slope,
-    left_slope_change,
     rotation_about,
     sine_cosine,
     unskew,
@@ -65,7 +64,7 @@ def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
     else:
         turns, slope = _turns(rod, hat)
         rotation = _products(_about(turns))
-        turning = _before(rotation) @ _left_slopes(turns) @ slope
+        turning = rotations_before(rotation) @ left_slopes(turns) @ slope
         from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
     stepped = _stepped(rod, rotation)
     return RodConfiguration(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
@@ -80,7 +79,7 @@ def free_pose(rod: Rod) -> Motion:
     turns = np.diff(rod.turn[..., 0], axis=0, prepend=0.0) + rod.turn_pair[..., 0, 0]
     rotation = _products(_about(constant(turns)))
     end = Motion(rotation[-1], _stepped(rod, rotation)[..., 0].sum(axis=0))
-    return Motion(rod.start_rotation, rod.start_offset).then(end).then(_tail(rod))
+    return Motion(rod.start_rotation, rod.start_offset).then(end).then(tail_pose(rod))
 
 
 def _stepped(rod: Rod, rotation: Float[Array, "places d d"]) -> Float[Array, "gauss d hat"]:
@@ -130,7 +129,8 @@ def _about(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
     return jax.vmap(rotation_about)(turns)
 
 
-def _left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
+def left_slopes(turns: Float[Array, "places 3"]) -> Float[Array, "places 3 3"]:
+    """Return the slopes of the exponential by turns, seen from before each."""
     if array_module(turns) is np:
         return left_slope(turns)
     return jax.vmap(left_slope)(turns)
@@ -142,7 +142,7 @@ def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
     return xp.stack(list(accumulate(parts, xp.matmul)))
 
 
-def _before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
+def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
     """Rotation at the place before each; none before the first."""
     return array_module(values).concatenate([np.eye(3)[None], values[:-1]])
 
@@ -172,7 +172,7 @@ def rod_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
     )
 
 
-def _tail(rod: Rod) -> Motion:
+def tail_pose(rod: Rod) -> Motion:
     """The distal body as seen from where the motion beside the curve ends."""
     return Motion(rod.curve_rotation, rod.curve_offset).then(
         Motion(rod.end_rotation, rod.end_offset)
@@ -184,7 +184,7 @@ def relative_pose(
 ) -> Motion:
     """Pose of the distal body as seen from the proximal one."""
     beside = _beside(rod, modes, integrate_rod(rod, modes) if own is None else own)
-    return Motion(rod.start_rotation, rod.start_offset).then(beside).then(_tail(rod))
+    return Motion(rod.start_rotation, rod.start_offset).then(beside).then(tail_pose(rod))
 
 
 def twist_slope(
@@ -193,13 +193,13 @@ def twist_slope(
     """Twist (angular, linear) of the distal body, in its own frame, per unit of mode."""
     end = own.rotation[-1]
     turn = own.turn[-1] if len(end) == 2 else end.T @ own.turn[-1]
-    twist = jnp.concatenate([turn, end.T @ _moved(own)])
+    twist = jnp.concatenate([turn, end.T @ end_displacement(own)])
     if rod.linear_kinematics is not None:
-        twist = jnp.where(rod.linear_kinematics > 0.0, _small_twist(rod, modes), twist)
-    return _tail(rod).twist_inside(twist)
+        twist = jnp.where(rod.linear_kinematics > 0.0, small_twist(rod, modes), twist)
+    return tail_pose(rod).twist_inside(twist)
 
 
-def _moved(own: RodConfiguration) -> Float[Array, "d modes"]:
+def end_displacement(own: RodConfiguration) -> Float[Array, "d modes"]:
     """Displacement of the end per unit of mode, along the axes of the start."""
     return jnp.sum(own.stepped + _crossed(own.turn[:-1], own.step[..., None]), axis=0)
 
@@ -211,85 +211,7 @@ def _crossed(turn: Array, vector: Array) -> Array:
     return jnp.cross(turn, jnp.broadcast_to(vector, turn.shape), axis=1)
 
 
-def geometric_stiffness(
-    rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration, wrench: Float[Array, " w"]
-) -> Float[Array, "modes modes"]:
-    """How what a wrench on the distal body does to each mode changes with the modes.
-
-    It is the derivative of twist_slope^T wrench, the wrench going along with the body; rows are the
-    modes that it acts on. With F the force and M the moment about the end, along the axes of the
-    start, the wrench does M . turn + F . (sum of the moved steps) to each mode.
-    """
-    axes = own.turn.shape[1]
-    at_end = _tail(rod).wrench(wrench)
-    end = own.rotation[-1]
-    force = end @ at_end[axes:]
-    arms = _arms(rod, own, force)
-    turn = own.turn[:-1]
-    # Half of what two turns, one after the other, do to a step along the force, both ways round.
-    along = 0.5 * (own.step @ force)
-    mixed = jnp.einsum("gci,gcj->ij", arms - along[:, None, None] * turn, turn)
-    leaving = _moments(_moved(own)[None], force)[0].T @ own.turn[-1]
-    change = mixed + mixed.T - leaving
-    if axes == 3:
-        change = change + _order_of_turns(rod, own, at_end)
-    if rod.linear_kinematics is not None:
-        small = jax.jacfwd(lambda varied: _small_twist(rod, varied).T @ at_end)(modes)
-        change = jnp.where(rod.linear_kinematics > 0.0, small, change)
-    return change
-
-
-def _arms(rod: Rod, own: RodConfiguration, force: Array) -> Float[Array, "gauss a modes"]:
-    """Moments of a force that moves along with each step, per unit of mode, about the start."""
-    if len(force) == 3:
-        return _moments(own.stepped, force)
-    # A number, whichever way the axes are turned: the force is, and not the steps of all modes.
-    across = jnp.stack([-force[1], force[0]])
-    across = jnp.einsum("gdc,d->gc", own.rotation[:-1], across)
-    return jnp.einsum("gc,gci->gi", across, rod.step[..., 1:])[:, None]
-
-
-def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:
-    """Moments of one force at points (places, d, modes) about the start."""
-    if len(force) == 2:
-        return points[:, 1:] * force[0] - points[:, :1] * force[1]
-    return jnp.cross(points, jnp.broadcast_to(force[:, None], points.shape), axis=1)
-
-
-def _order_of_turns(
-    rod: Rod, own: RodConfiguration, at_end: Float[Array, " 6"]
-) -> Float[Array, "modes modes"]:
-    """What `geometric_stiffness` has in space alone, where turns do not commute.
-
-    The slopes of the turns change with the modes: from place to place by those before, within each
-    step by the slope of the exponential and by the pairs of Magnus's series.
-    """
-    assert rod.turn_pair is not None
-    assert own.from_place is not None
-    turns, slope, turning = own.from_place
-    end = own.rotation[-1]
-    moment, force = end @ at_end[:3], end @ at_end[3:]
-    nodes = own.turn[:-1]
-    # Each place's share of the wrench, then that of all places from it on.
-    shares = jnp.cross(own.step, jnp.broadcast_to(force, own.step.shape))
-    shares = jnp.concatenate([shares, moment[None]])
-    onward = jnp.cumsum(shares[::-1], axis=0)[::-1]
-    turned_before = jnp.concatenate([jnp.zeros_like(own.turn[:1]), own.turn[:-1]])
-    lever = jnp.cross(turning, jnp.broadcast_to(onward[..., None], turning.shape), axis=1)
-    change = jnp.einsum("kci,kcj->ij", lever, turned_before)
-    inside = jnp.einsum("kdc,kd->kc", _before(own.rotation), onward)
-    bending = jax.vmap(left_slope_change)(turns, inside)
-    change = change + jnp.einsum("kci,kcd,kdj->ij", slope, bending, slope)
-    answers = jnp.einsum("kdc,kd->kc", _left_slopes(turns), inside)
-    change = change + 2.0 * jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
-    # The first node's wrench is turned by the end, and steps lean out of their turns' plane.
-    last = own.turn[-1]
-    change = change + jnp.einsum("ci,cj->ij", last, jnp.cross(last, moment[:, None], axis=0))
-    by_force = jnp.einsum("gcj,c->gj", nodes, force)
-    return change + jnp.einsum("gci,gc,gj->ij", nodes, own.step, by_force)
-
-
-def _small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w modes"]:
+def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w modes"]:
     """Twist of the end beside the curve, in its frame, per unit of mode, of a small deflection."""
     motion = _small_motion(rod, modes)
     slope: Motion = jax.jacfwd(lambda varied: _small_motion(rod, varied))(modes)

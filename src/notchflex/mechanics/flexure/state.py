@@ -17,7 +17,7 @@ from notchflex.mechanics.flexure.rod_kinematics import (
     rod_end,
     twist_slope,
 )
-from notchflex.mechanics.material import Response, SectionLaw
+from notchflex.mechanics.material import SectionLaw, SectionResponse
 from notchflex.mechanics.motion import PLANE, Motion, angular, rotation_about
 
 
@@ -33,7 +33,7 @@ class FlexureState(Pytree):
         strain: Strain of each interval beyond that of the free tube.
         memory: Memory of the material at every node, after these strains.
         slope: Change of the moment about y with the curvature at every node, where the law knows
-            it (`Response.slope`).
+            it (`SectionResponse.slope`).
         internal: Generalised internal force of each mode, N mm per unit of mode.
         bend: Bending of the whole rod about x and y of its frame, of a plane about y, rad.
         chord_turn: Rotation, in the proximal body's frame, by which the chord from the rod's
@@ -89,7 +89,7 @@ def flexure_state(
     law: SectionLaw,
     memory: Any,
     modes: Float[Array, " modes"],
-    response: Response | None = None,
+    response: SectionResponse | None = None,
     *,
     with_pose: bool,
 ) -> FlexureState:

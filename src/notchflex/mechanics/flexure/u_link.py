@@ -16,6 +16,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     NeutralAxis,
     StrainModes,
     about_neutral_axis,
+    between,
     build_rod,
     shifted,
 )
@@ -105,8 +106,8 @@ def u_link_rod(
     )
     onward = Motion(*(constant(np.delete(part, -2, axis=0)) for part in every))
     # The distal body's frame: level with the strip's lower edge, on the tube axis.
-    distal = _between(end, shifted(z=2.0 * notch.slot_radius))
-    axis = NeutralAxis(places, start, distal, _between(start, onward), free)
+    distal = between(end, shifted(z=2.0 * notch.slot_radius))
+    axis = NeutralAxis(places, start, distal, between(start, onward), free)
     in_plane = moment_modes + 2 * force_modes
     modes = StrainModes(basis, (in_plane, in_plane, basis.shape[-1]))
     return build_rod(axis, section, modes, direction_deg=notch.direction_deg)
@@ -118,11 +119,6 @@ def _poses(course: Course, middle: np.ndarray, hand: float) -> Motion:
     about_y = hand * (course.heading - 0.5 * np.pi)
     turns = rotation_about(constant(about_y[:, None] * np.array([0.0, 1.0, 0.0])))
     return Motion(turns, constant(middle + place))
-
-
-def _between(outer: Motion, inner: Motion) -> Motion:
-    """The inner pose, or many, as seen from the outer one."""
-    return Motion(outer.rotation.T @ inner.rotation, outer.point_inside(inner.translation))
 
 
 def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> FibreSection:

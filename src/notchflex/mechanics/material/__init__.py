@@ -3,7 +3,7 @@
 from notchflex._packages import import_all
 from notchflex.mechanics.material.fibre_section import Fibres, FibreSection, NotchEnds
 from notchflex.mechanics.material.flattening import Flattening
-from notchflex.mechanics.material.law import Response, SectionLaw, section_law
+from notchflex.mechanics.material.law import SectionLaw, SectionResponse, section_law
 
 import_all(__name__, __path__)
 
@@ -12,7 +12,7 @@ __all__ = [
     "Fibres",
     "Flattening",
     "NotchEnds",
-    "Response",
     "SectionLaw",
+    "SectionResponse",
     "section_law",
 ]

@@ -19,61 +19,19 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jax, jnp
+from notchflex.mechanics.material.fibre_balance import (
+    FibreSums,
+    SectionEnds,
+    same_sums,
+    settle_fibres,
+)
 from notchflex.mechanics.material.fibre_section import Fibres, FibreSection
-from notchflex.mechanics.material.law import Bending, Response, SectionLaw
+from notchflex.mechanics.material.law import Bending, SectionLaw, SectionResponse
 
-# Newton's method ends at this imbalance, as a part of the strain of bending, or after many tries.
-_BALANCED, _MOST_TRIES = 1e-13, 16
 # So many fibres at once: programs get longer with more, and slower with fewer.
 _AT_ONCE = 5
 # A transformed strain this near to a curve goes on along it.
 _ON_CURVE = 1e-12
-
-
-class _Sums(NamedTuple):
-    """Sums over the fibres: force (N) and moment (N mm), and how they change.
-
-    Attributes:
-        force: Axial force.
-        moment: Moment.
-        stretch: Change of the force with the strain of the neutral axis.
-        mixed: Change of the force with the curvature, and of the moment with that strain.
-        bending: Change of the moment with the curvature.
-    """
-
-    force: Array
-    moment: Array
-    stretch: Array
-    mixed: Array
-    bending: Array
-
-
-class _Joint(NamedTuple):
-    """The section between its ends: own * k + soft * moment = s."""
-
-    own: Array | float
-    soft: Array | float
-    reduced: Array
-
-    def step(self, curvature: Array, sums: _Sums, slopes: _Sums) -> tuple[Array, Array]:
-        """Newton's step of the strain of the neutral axis and of the curvature."""
-        beyond = self.own * curvature + self.soft * sums.moment - self.reduced
-        by_strain, by_curvature = self.soft * slopes.mixed, self.own + self.soft * slopes.bending
-        determinant = slopes.stretch * by_curvature - slopes.mixed * by_strain
-        strain = slopes.mixed * beyond - by_curvature * sums.force
-        return strain / determinant, (
-            by_strain * sums.force - slopes.stretch * beyond
-        ) / determinant
-
-    def size(self, curvature: Array, sums: _Sums, scale: tuple[Array, Array]) -> Array:
-        """Imbalance of forces and of bending, as strains."""
-        beyond = self.own * curvature + self.soft * sums.moment - self.reduced
-        return jnp.abs(sums.force) / scale[1] + scale[0] * jnp.abs(beyond)
-
-    def slope(self, slopes: _Sums) -> Array:
-        """Change of the moment with s."""
-        free = slopes.bending - slopes.mixed**2 / slopes.stretch
-        return free / (self.own + self.soft * free)
 
 
 class _Curve(NamedTuple):
@@ -131,7 +89,7 @@ class FibreLaw(SectionLaw):
 
     def respond_all(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
-    ) -> Response:
+    ) -> SectionResponse:
         """All sections together: mapped one by one they would be traced three times as long."""
         return self.respond(strain, section, memory)
 
@@ -142,14 +100,14 @@ class FibreLaw(SectionLaw):
         none = jnp.zeros_like(reduced)
         weak, share = (none, none) if ends is None else (ends.weak, ends.material_share)
         rigidity = self.elastic_modulus * section.second_moment_weak
-        joint = _Joint(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
+        joint = SectionEnds(1.0 + share * weak, (1.0 - share) * weak / rigidity, reduced)
         start = reduced / (1.0 + weak)
         scale = section.edge_near, self.elastic_modulus * section.area
         everything = self, fibres, memory, joint, scale, start
         still = jax.tree.map(jax.lax.stop_gradient, everything)
-        strain, curvature, slopes = _settled(*still)
+        strain, curvature, slopes = settle_fibres(*still)
         _, held, _, fixed, *_ = still
-        sums = _same_sums(slopes, self, fibres, memory, strain, curvature)
+        sums = same_sums(slopes, self, fibres, memory, strain, curvature)
         by_strain, by_curvature = joint.step(curvature, sums, slopes)
         if not isinstance(memory, tuple):
             moves = strain, curvature, by_strain, by_curvature
@@ -162,21 +120,21 @@ class FibreLaw(SectionLaw):
             strain=strain + by_strain,
         )
 
-    def sum_fibres(self, fibres: Fibres, memory: Any, strain: Array, curvature: Array) -> _Sums:
+    def sum_fibres(self, fibres: Fibres, memory: Any, strain: Array, curvature: Array) -> FibreSums:
         """Sums over the fibres of a section, or of many."""
         curves = self._curves(memory)
 
-        def add(total: _Sums, some: tuple[Array, Array, Any]) -> tuple[_Sums, None]:
+        def add(total: FibreSums, some: tuple[Array, Array, Any]) -> tuple[FibreSums, None]:
             arm, area, past = some
             own = _along(strain, curvature, arm)
             transformed, slope = self._transformed(own, past, curves)
             force, tangent = area * (own - transformed), area * (1.0 - slope)
             turning = tangent * arm
             parts = force, force * arm, tangent, turning, turning * arm
-            added = _Sums(*(jnp.sum(part, axis=-1) for part in parts))
+            added = FibreSums(*(jnp.sum(part, axis=-1) for part in parts))
             return jax.tree.map(jnp.add, total, added), None
 
-        none = _Sums(*[jnp.zeros_like(strain)] * len(_Sums._fields))
+        none = FibreSums(*[jnp.zeros_like(strain)] * len(FibreSums._fields))
         every = fibres.arm, fibres.area, memory
         sums = jax.lax.scan(add, none, jax.tree.map(_in_parts, every))[0]
         return jax.tree.map(lambda total: self.elastic_modulus * total, sums)
@@ -255,95 +213,6 @@ class FibreLaw(SectionLaw):
         ends = section.ends
         follows = 1.0 if ends is None else 1.0 + ends.material_share * ends.weak
         return follows * np.sum(loss * section.fibres.area, axis=-1)
-
-
-def _settle(
-    law: FibreLaw,
-    fibres: Fibres,
-    memory: Any,
-    joint: _Joint,
-    scale: tuple[Array, Array],
-    start: Array,
-) -> tuple[Array, Array, _Sums]:
-    """Find strain of the neutral axis, curvature and sums of all sections, from a curvature.
-
-    All together, so that one condition stops the search; the sections may have leading axes.
-    """
-
-    def proceed(search: tuple[Array, ...]) -> Array:
-        *_, least, tries = search
-        return jnp.any(least > _BALANCED * scale[0] * jnp.abs(joint.reduced)) & (
-            tries < _MOST_TRIES
-        )
-
-    def improve(search: tuple[Any, ...]) -> tuple[Any, ...]:
-        """Try a step: the next one where the imbalance falls, half of it where not."""
-        strain, curvature, by_strain, by_curvature, sums, least, tries = search
-        trial = strain + by_strain, curvature + by_curvature
-        found = law.sum_fibres(fibres, memory, *trial)
-        size = joint.size(trial[1], found, scale)
-        falls = size < least
-        new = *trial, *joint.step(trial[1], found, found), found, size
-        old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, sums, least
-        return *jax.tree.map(lambda *pair: jnp.where(falls, *pair), new, old), tries + 1
-
-    none, far = jnp.zeros_like(start), jnp.full_like(start, jnp.inf)
-    sums = _Sums(*(none for _ in _Sums._fields))
-    begin = none, start, none, none, sums, far, jnp.zeros((), int)
-    strain, curvature, _, _, sums, *_ = jax.lax.while_loop(proceed, improve, begin)
-    return strain, curvature, sums
-
-
-_settled = jax.custom_batching.custom_vmap(_settle)
-
-
-@_settled.def_vmap
-def _(size: int, batched: Any, law: FibreLaw, *sections: Any) -> tuple[Any, Any]:
-    all_batched = True, True, _Sums._make([True] * len(_Sums._fields))
-    if any(jax.tree.leaves(batched[0])):  # rows of a batch that is not one of sections
-        axes = jax.tree.map(lambda one: 0 if one else None, list(batched))
-        return jax.vmap(_settle, in_axes=tuple(axes))(law, *sections), all_batched
-    every = jax.tree.map(
-        lambda one, leaf: leaf if one else jnp.broadcast_to(leaf, (size, *jnp.shape(leaf))),
-        list(batched[1:]),
-        list(sections),
-    )
-    return _settled(law, *every), all_batched
-
-
-@jax.custom_jvp
-def _same_sums(sums: _Sums, *of: Any) -> _Sums:
-    """Return sums over fibres that are known, with the derivatives of summing up again.
-
-    Nothing is summed up, or traced, where nothing is differentiated.
-    """
-    del of
-    return sums
-
-
-def _change_of_sums(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[_Sums, _Sums]:
-    """Derivatives along what varies alone."""
-    (sums, *of), (_, *moved) = primals, tangents
-    leaves, tree = jax.tree.flatten(of)
-    by = jax.tree.leaves(moved, is_leaf=_is_still)
-    varies = [place for place, one in enumerate(by) if not _is_still(one)]
-
-    def again(*varied: Array) -> _Sums:
-        every = list(leaves)
-        for place, one in zip(varies, varied, strict=True):
-            every[place] = one
-        law, *rest = jax.tree.unflatten(tree, every)
-        return law.sum_fibres(*rest)
-
-    at, along = [leaves[place] for place in varies], [by[place] for place in varies]
-    return sums, jax.jvp(again, at, along)[1]
-
-
-def _is_still(tangent: Any) -> bool:
-    return isinstance(tangent, jax.custom_derivatives.SymbolicZero)
-
-
-_same_sums.defjvp(_change_of_sums, symbolic_zeros=True)
 
 
 def _in_parts(array: Array) -> Array:

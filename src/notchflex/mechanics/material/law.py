@@ -30,7 +30,7 @@ from notchflex.mechanics.material.flattening import Flattening, flattening
 from notchflex.mechanics.material.root import bracketed_root
 
 
-class Response(NamedTuple):
+class SectionResponse(NamedTuple):
     """Answer of a section law.
 
     Attributes:
@@ -117,7 +117,7 @@ class SectionLaw(Pytree, ABC):
 
     def respond_all(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
-    ) -> Response:
+    ) -> SectionResponse:
         """Resultants of many cross-sections."""
         respond = self.respond
         for _ in strain.shape[:-1]:
@@ -126,7 +126,7 @@ class SectionLaw(Pytree, ABC):
 
     def respond(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
-    ) -> Response:
+    ) -> SectionResponse:
         """Resultants of a cross-section under given strains (beyond those of the free tube).
 
         Of many where the law bends many at once.
@@ -144,7 +144,7 @@ class SectionLaw(Pytree, ABC):
                 by_q = (ends.odd + 2.0 * ends.even * curvature) / q
                 slope = (slope * (1.0 - curvature * by_q) / q - bending.moment * by_q) / q
         resultants = jnp.where(_WEAK, moment[..., None], elastic)
-        return Response(resultants, bending.memory, slope)
+        return SectionResponse(resultants, bending.memory, slope)
 
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from notchflex.robot.kinds import Notch
-from notchflex.robot.openings import openings_along
+from notchflex.robot.kinds import Notch, openings_along
 
 
 class Passage(NamedTuple):

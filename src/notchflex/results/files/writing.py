@@ -1,4 +1,4 @@
-"""Where results go: paths checked before anything is computed, and text read and written."""
+"""Where results go: paths are checked before anything is computed."""
 
 from __future__ import annotations
 

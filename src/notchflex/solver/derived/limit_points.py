@@ -12,9 +12,9 @@ from jaxtyping import Array, Float
 
 from notchflex._jax import constant, jax, jnp
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.element import Unknowns
 from notchflex.solver.residual import Evaluation, evaluate
+from notchflex.solver.solver_state import SolverState
 
 # Shapes between the two, and the part of the holding tension by which it must fall.
 _SHAPES, _FALLS = 33, 1e-6

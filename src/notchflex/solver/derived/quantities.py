@@ -61,8 +61,7 @@ def edge_angle(state: SolvedState) -> Array:
     With elastic ends it is less than the notch angle, which moves the tip: part of the elastic
     angle lies in the rings beyond the faces.
     """
-    chain, flexure = state.chain, state.at.flexure
-    ends = chain.rods.section.ends
+    chain, flexure, ends = state.chain, state.at.flexure, state.chain.rods.section.ends
     angles = state.quantity("notch_angle")
     if ends is None:
         return angles
@@ -200,12 +199,10 @@ def contact_slid(state: SolvedState) -> Array:
     """Tendon length that has slid over a friction contact toward the base."""
     chain, spans = state.chain, state.at.spans
     beyond = paired(chain, [(s.released_beyond, s.tension_length_beyond) for s in spans])
-    released_length, tension_length = paired(
-        chain, [(s.released_length, s.tension_length) for s in spans]
-    )
+    summed = paired(chain, [(s.released_length, s.tension_length) for s in spans])
     in_body = state.tensions[1] * state.by_tendon("body_length")
     at_entry = beyond[0] + (beyond[1] + in_body) * state.compliance
-    return along_contacts(chain, released_length + tension_length * state.compliance, at_entry)
+    return along_contacts(chain, summed[0] + summed[1] * state.compliance, at_entry)
 
 
 @Quantity("state", "turning at a contact", r"\beta_i", "deg", key="contacts.turning_deg",
@@ -279,10 +276,8 @@ def stored_energy(state: SolvedState) -> Array:
     in_tendons = in_tendons + beside_body**2 * state.by_tendon("body_length")
     in_lips = jnp.zeros(())
     if chain.contact_flexibility is not None:
-        forces = jnp.stack(
-            [jnp.sum(one**2, axis=-1) for one in state.solved.point.unknowns.contact_force]
-        )
-        in_lips = 0.5 * jnp.sum(chain.contact_flexibility[None] * forces)
+        squares = [jnp.sum(one**2, axis=-1) for one in state.solved.point.unknowns.contact_force]
+        in_lips = 0.5 * jnp.sum(chain.contact_flexibility[None] * jnp.stack(squares))
     return (
         in_lips
         + jnp.sum(chain.rods.length * density)

@@ -11,10 +11,10 @@ from jaxtyping import Array
 
 from notchflex._quantity import REGISTERED
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.derived.quantities import MODES_FAIL  # and registers all formulas
 from notchflex.solver.derived.solved_state import SolvedState
 from notchflex.solver.programs.pytree_layout import PytreeLayout
+from notchflex.solver.solver_state import SolverState
 
 
 def _reported(source: str) -> tuple[str, ...]:

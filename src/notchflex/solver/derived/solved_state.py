@@ -14,9 +14,10 @@ from notchflex.mechanics.flexure import FlexureState, in_space, relative_pose
 from notchflex.mechanics.material import Flattening
 from notchflex.mechanics.motion import IN_PLANE, Motion, wrench_at
 from notchflex.solver.body_poses import body_poses
-from notchflex.solver.continuation import SolverState
 from notchflex.solver.element import Unknowns
-from notchflex.solver.residual import Evaluation, evaluate, in_tendon_order
+from notchflex.solver.residual import Evaluation, evaluate
+from notchflex.solver.solver_state import SolverState
+from notchflex.solver.tendon_spans import in_tendon_order
 
 # Of the cosine between the directions of two notches, less than 0.3 degrees.
 _IN_PLANE = 1e-5

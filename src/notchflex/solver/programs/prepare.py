@@ -15,11 +15,11 @@ from notchflex._jax import constant, jax
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain, assemble, padded
 from notchflex.robot import Robot
-from notchflex.solver.continuation import SolverState, at_rest, unloaded
 from notchflex.solver.derived.reported import Shape
 from notchflex.solver.programs.capacity import capacity, pad_rows
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.static_structure import StaticStructure
+from notchflex.solver.solver_state import SolverState, at_rest, unloaded
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,10 +17,9 @@ from jaxtyping import Array, Bool, Float, Int
 from notchflex._jax import jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
-from notchflex.solver.continuation import LoadStepResult, SolverState, solve_load_step
+from notchflex.solver.continuation import LoadStepResult, solve_load_step
 from notchflex.solver.derived.limit_points import snapped_notches
 from notchflex.solver.derived.reported import Shape, quantities, shape, unpad_quantity
-from notchflex.solver.derived.solved_state import notch_lips
 from notchflex.solver.held_stiffness import stability, stable
 from notchflex.solver.newton import Settings
 from notchflex.solver.programs.capacity import pad_rows, padded_indices
@@ -28,7 +27,7 @@ from notchflex.solver.programs.compiled import native
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.pytree_layout import PytreeLayout, lane_sizes
 from notchflex.solver.programs.static_structure import StaticStructure
-from notchflex.solver.residual import evaluate
+from notchflex.solver.solver_state import SolverState
 
 # Columns behind the two states and the shape, see `_status`.
 _STATUS = 7
@@ -273,44 +272,3 @@ def _snapped(
     """Notches that snapped between two states; nothing is carried on."""
     states = (state_layout.unpack(state) for state in (before, after))
     return carried, snapped_notches(chain_layout.unpack(vector), *states)
-
-
-def solve_contacts(
-    prepared: PreparedChain, commands: Command, start: SolverState, settings: Settings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find contact forces (N) and gaps (mm) of all notches, each load from the same state.
-
-    A small program beside `run`, for searches that ask only whether the notches are closed.
-
-    Returns:
-        Contact forces and gaps, loads by notches, and which loads converged.
-    """
-    long = prepared.long
-    packed, form = prepared.padded_commands(commands)
-    before = pad_rows(np.asarray(prepared.state.pack(start)), prepared.state, long.state)
-    vectors = (np.zeros(1), long.dynamic_vector, packed, before, np.array(settings.numbers))
-    force, gap, converged = _solve_contacts.along(
-        (False, False, True, False, False), *vectors, long.static_structure, form, long.state
-    )
-    own = prepared.chain.flexures
-    return force[:, :own], gap[:, :own], converged
-
-
-@native(5, lane_sizes)
-def _solve_contacts(
-    carried: Float[Array, " one"],
-    vector: Float[Array, " chain"],
-    load: Float[Array, " command"],
-    start: Float[Array, " state"],
-    numbers: Float[Array, " settings"],
-    chain_layout: StaticStructure,
-    command_layout: PytreeLayout,
-    state_layout: PytreeLayout,
-) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Contact forces and gaps of one load, and whether it converged; nothing is carried on."""
-    chain, settings = chain_layout.unpack(vector), Settings.of(numbers)
-    command, last = command_layout.unpack(load), state_layout.unpack(start)
-    result = solve_load_step(chain, command, last, settings)
-    (unknowns, base_tension), memory, _, applied = result.solved
-    at = evaluate(chain, unknowns, memory, base_tension, applied)
-    return carried, (*notch_lips(chain, unknowns, at), result.converged)

@@ -20,37 +20,13 @@ the cells of finite elements in `tests/reference/fem_strip_cells.csv` and `fem_u
 
 from __future__ import annotations
 
-import dataclasses
 from typing import NamedTuple
 
-import numpy as np
-from jaxtyping import Float
-from numpy.typing import ArrayLike
-
-from notchflex._jax import constant
-from notchflex.mechanics.flexure.notch_rod import (
-    STRAIGHT,
-    NeutralAxis,
-    StrainModes,
-    about_neutral_axis,
-    build_rod,
-    shifted,
-)
-from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.roots.sideways import (
     ROUND,
     SHARP,
     Sideways,
-    Walls,
-    plane_compliance,
-    turned_compliance,
-    with_sideways,
 )
-from notchflex.mechanics.flexure.wrench_modes import wrench_modes
-from notchflex.mechanics.material import FibreSection, NotchEnds
-from notchflex.mechanics.motion import Motion, rotation_about
-from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.robot import StripNotch, Tube, ULink
 
 # How far a strip goes on beyond the tip of the slot, over its size (`_size`).
@@ -59,17 +35,12 @@ _BEYOND = 0.267
 _ALONG_SHARP, _ALONG_ROUND, _ALONG_RADIUS = 1.208, 1.016, 0.544
 # How far a strip reaches round the end of a slot on each side, over the radius of the slot.
 _ROUND_END = 0.662
-# Second moment of a root over that of the strip at the tip, sharp or round, and its twisting c.
-_BENDING_SHARP, _BENDING_ROUND, _TWIST = 2.098, 2.695, 2.243
-# How far beyond the tips walls are clamped, over the root of the thicknesses of strip and wall.
-_CLAMP, _CLAMP_SIDEWAYS = 0.818, 0.97
+# Second moment of a root over that of the strip at the tip, sharp or round.
+_BENDING_SHARP, _BENDING_ROUND = 2.098, 2.695
 # Power of the strip's over the wall's thickness by which the lengths of the root grow.
 _POWER = 0.152
 # Shear of a body below a triangular notch: length over the notch's height, of the whole tube.
 _WEDGE = 4.893
-_SHEAR_AREA = 5.0 / 6.0
-_STEEPEST = 0.95  # sin² of the angle at which a wall is at most met
-_RIGID = 1e6  # area of a root that does not shear, over that of the strip
 
 
 class RootedStrip(NamedTuple):
@@ -134,179 +105,7 @@ def round_strip(notch: ULink, tube: Tube) -> RootedStrip:
     )
 
 
-def _walls(strip: RootedStrip, tube: Tube) -> Walls:
-    """The strip's two walls."""
-    return Walls(
-        outer=tube.outer_radius,
-        inner=tube.inner_radius,
-        width=strip.width_factor * (tube.outer_radius - tube.inner_radius),
-        thickness=strip.thickness,
-        length=strip.free_length + 2.0 * strip.beyond,
-    )
-
-
 def _size(thickness: float, tube: Tube, width_factor: float = 1.0) -> float:
     """Thickness to which the lengths of a root are proportional, mm."""
     wall = width_factor * (tube.outer_radius - tube.inner_radius)
     return thickness * (thickness / wall) ** _POWER
-
-
-def rooted_strip_rod(
-    strip: RootedStrip,
-    tube: Tube,
-    distal: float,
-    refinement: int = 0,
-    *,
-    direction_deg: float = 0.0,
-    linear_kinematics: bool = False,
-    poisson_ratio: float,
-) -> Rod:
-    """Build the rod of a strip with its roots.
-
-    Args:
-        strip: The strip.
-        tube: The tube that it is cut into.
-        distal: Height of the distal body's frame above the proximal face, mm.
-        refinement: How many more modes and nodes than for usual loads.
-        direction_deg: Side toward which a positive angle bends it, deg.
-        linear_kinematics: Whether displacements are proportional to the strains.
-        poisson_ratio: Poisson's ratio of the tube.
-
-    Returns:
-        The rod, from the proximal wall to the distal one.
-    """
-    pieces = [0.0, strip.along, strip.beyond, strip.free_length, strip.beyond, strip.along]
-    ends = tuple(np.cumsum(pieces).tolist())
-    more = refinement
-    counts = (3 + more, 2 + more, 6 + 3 * more, 2 + more, 3 + more)
-    points = RodQuadrature(ends, counts, counts)
-    place = points.every
-    course = _course(place, ends)
-    section = _section(strip, tube, *course[:2], ends[-1], poisson_ratio)
-    middle = np.array([0.0, 0.0, strip.middle])
-    start, end = (_poses(strip, *_course(np.array([at]), ends)) for at in (0.0, ends[-1]))
-    start, end = (Motion(one.rotation[0], one.translation[0]) for one in (start, end))
-    poses = _poses(strip, *course)
-    plane = plane_compliance(poses, points.weight, section, middle, poisson_ratio)
-    turned = turned_compliance(_walls(strip, tube), plane, strip.sideways, poisson_ratio)
-    section = with_sideways(section, points.weight, course[2], turned, poisson_ratio)
-    moments, forces = 3 + 3 * refinement, 1 + 2 * refinement
-    basis = wrench_modes(
-        poses,
-        2.0 * place / ends[-1] - 1.0,
-        points.weight,
-        section,
-        middle,
-        moments,
-        forces,
-        poisson_ratio,
-    )
-    onward = Motion(
-        constant(np.concatenate([poses.rotation, end.rotation[None]])),
-        constant(np.concatenate([poses.translation, end.translation[None]])),
-    )
-    axis = NeutralAxis(
-        points,
-        start,
-        _between(end, shifted(z=distal)),
-        _between(start, onward),
-        np.tile(STRAIGHT, (len(place), 1)),
-    )
-    in_plane = moments + 2 * forces
-    return build_rod(
-        axis,
-        section,
-        StrainModes(basis, (in_plane, in_plane, basis.shape[-1])),
-        direction_deg=direction_deg,
-        linear_kinematics=linear_kinematics,
-    )
-
-
-def _course(
-    place: Float[np.ndarray, " k"], ends: tuple[float, ...]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places along the strip and above its middle, mm, and whether they lie on the wall."""
-    half = 0.5 * ends[-1]
-    beside = np.clip(place - half, ends[1] - half, half - ends[1])
-    above = place - half - beside
-    return beside, above, above != 0.0
-
-
-def _poses(strip: RootedStrip, beside: ArrayLike, above: ArrayLike, on_wall: ArrayLike) -> Motion:
-    """Poses along the free rod, z along it, y out of the plane, in the notch's frame."""
-    x = -strip.hand * np.asarray(beside)
-    place = np.stack([x, np.zeros_like(x), strip.middle + np.asarray(above)], axis=-1)
-    about_y = np.where(on_wall, 0.0, -0.5 * np.pi * strip.hand)
-    turns = rotation_about(constant(about_y[:, None] * np.array([0.0, 1.0, 0.0])))
-    return Motion(turns, constant(place))
-
-
-def _between(outer: Motion, inner: Motion) -> Motion:
-    """The inner pose, or many, as seen from the outer one."""
-    return Motion(outer.rotation.T @ inner.rotation, outer.point_inside(inner.translation))
-
-
-def _section(
-    strip: RootedStrip,
-    tube: Tube,
-    beside: np.ndarray,
-    above: np.ndarray,
-    length: float,
-    poisson_ratio: float,
-) -> FibreSection:
-    """Sections of the strip, its walls as wide as the tube's there, and of its roots."""
-    # Beyond the tips of the slots the walls keep the width that they have there.
-    tip = 0.5 * strip.free_length
-    at = np.minimum(np.abs(beside), tip)
-    outer = np.sqrt(tube.outer_radius**2 - at**2)
-    inner = np.sqrt(np.maximum(tube.inner_radius**2 - at**2, 0.0))
-    middle, width = 0.5 * (outer + inner), strip.width_factor * (outer - inner)
-    walls = two_walls(width, strip.thickness, middle)
-    ratio = 2.0 * (1.0 + poisson_ratio)  # E / G
-    wall = strip.width_factor * (tube.outer_radius - tube.inner_radius)
-    radius = 0.5 * (tube.outer_radius + tube.inner_radius)
-    square = np.minimum((at / radius) ** 2, _STEEPEST)
-    oblique = square / (1.0 - square)
-    bar = two_walls(wall, strip.thickness, 0.0)
-    twisting = ratio * float(bar.second_moment_weak / bar.torsion_constant)
-    area = np.asarray(walls.area)
-    along_wall, root = above != 0.0, (above != 0.0) | (np.abs(beside) > tip)
-    in_root = (1.0 + _TWIST * oblique * strip.thickness / wall) / strip.bending - 1.0
-    arch = _arch(strip.thickness, wall, radius, tip) * area / strip.free_length
-    frame = _frame(strip, wall, width) * area / ratio
-    sheared = np.pi * (tube.outer_radius**2 - tube.inner_radius**2) * strip.along
-    in_wall = sheared / max(strip.sheared, sheared / (_RIGID * area.min()))
-    nought = np.zeros(len(at))
-    ends = NotchEnds(
-        weak=constant(np.where(root, in_root, twisting * oblique)),
-        strong=constant(nought),
-        axial=constant(
-            np.where(along_wall, 0.0, _SHEAR_AREA * np.where(root, 1.0, 1.0 + arch) - 1.0)
-        ),
-        torsion=constant(nought),
-        odd=constant(nought),
-        even=constant(nought),
-        material_share=constant(nought + 1.0),  # the root yields where the strip does
-        sway=constant(np.where(root, 0.0, _SHEAR_AREA * frame)),
-    )
-    section = about_neutral_axis(
-        walls, clamped_torsion_constant(walls, middle, length, poisson_ratio)
-    )
-    area = constant(np.where(along_wall, in_wall, _SHEAR_AREA * area))
-    return dataclasses.replace(section, area=area, ends=ends)
-
-
-def _arch(thickness: float, wall: float, radius: float, tip: float) -> float:
-    """Stretch of two walls by straightening as arches, times E over the force, 1/mm."""
-    angle = (
-        np.arcsin(min(tip / radius, np.sqrt(_STEEPEST)))
-        + _CLAMP * np.sqrt(thickness * wall) / radius
-    )
-    spread = 0.5 + 0.25 * np.sin(2.0 * angle) / angle - (np.sin(angle) / angle) ** 2
-    return float(radius**3 * 2.0 * angle * spread / (2.0 * thickness * wall**3 / 12.0))
-
-
-def _frame(strip: RootedStrip, wall: float, width: np.ndarray) -> np.ndarray:
-    """Sway of two walls as the posts of a frame, times E over force and free length, 1/mm²."""
-    length = strip.free_length + 2.0 * _CLAMP_SIDEWAYS * np.sqrt(strip.thickness * wall)
-    return length**3 / (12.0 * 2.0 * strip.thickness * width**3 / 12.0) / strip.free_length

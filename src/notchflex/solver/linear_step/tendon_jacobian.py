@@ -8,15 +8,17 @@ from typing import Any, NamedTuple, cast
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
+from notchflex.loads.applied import BodyLoads
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.contact import ContactGroup
 from notchflex.mechanics.flexure import flexure_state
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.motion import Motion, angular, skew, turned
 from notchflex.mechanics.tendon import TendonGroup
-from notchflex.solver.element import Unknowns
-from notchflex.solver.residual import Evaluation, select_anchors, select_back
-from notchflex.solver.row_layout import UnitRows
+from notchflex.solver.body_poses import select_anchors, select_back
+from notchflex.solver.element import Memory, Unknowns
+from notchflex.solver.linear_step.row_layout import UnitRows
+from notchflex.solver.residual import Evaluation
 
 
 class RelativeMotionJacobian(NamedTuple):
@@ -207,3 +209,36 @@ def contact_jacobian(
         jnp.einsum("nlw,nlwz->nlz", slopes.gap, relative),
         jnp.einsum("nlvw,nlwz->nlvz", slopes.wrench, relative),
     )
+
+
+class StateJacobians(NamedTuple):
+    """A state, and the jacobians of its bodies, tendons and contacts."""
+
+    chain: Chain
+    unknowns: Unknowns
+    memory: Memory
+    applied: BodyLoads | None
+    at: Evaluation
+    unit: UnitRows
+    motion: RelativeMotionJacobian
+    tendons: list[TendonJacobian]
+    contacts: list[ContactJacobian]
+
+
+def state_jacobians(
+    chain: Chain,
+    unknowns: Unknowns,
+    memory: Memory,
+    applied: BodyLoads | None,
+    at: Evaluation,
+    unit: UnitRows,
+) -> StateJacobians:
+    """Differentiate the motions of all bodies, tendons and contacts at a state."""
+    motion = relative_motion_jacobian(chain, at, unit)
+    tendons = [
+        tendon_jacobian(chain, k, unknowns, at, unit, motion) for k in range(len(chain.groups))
+    ]
+    contacts = [
+        contact_jacobian(chain, k, at, unit, motion) for k in range(len(chain.contact_pairs))
+    ]
+    return StateJacobians(chain, unknowns, memory, applied, at, unit, motion, tendons, contacts)

@@ -18,15 +18,14 @@ JAX differentiates only the geometry of a span, a contact or a rod, each on its 
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 from jaxtyping import Array, Float
 
 from notchflex._jax import jax, jnp
-from notchflex.loads.applied import BodyLoads, body_wrench
+from notchflex.loads.applied import BodyLoads
 from notchflex.mechanics.chain import Chain
 from notchflex.mechanics.flexure import geometric_stiffness, material_tangent
-from notchflex.mechanics.motion import Motion, skew, wrench_turn
 from notchflex.solver.element import (
     RATE,
     Memory,
@@ -35,16 +34,14 @@ from notchflex.solver.element import (
     notch_heights,
     trial_log_ratio,
 )
-from notchflex.solver.residual import Evaluation, slip_mask, span_mask
-from notchflex.solver.row_layout import RowLayout, UnitRows
-from notchflex.solver.tendon_jacobian import (
-    ContactJacobian,
-    RelativeMotionJacobian,
-    TendonJacobian,
-    contact_jacobian,
-    relative_motion_jacobian,
-    tendon_jacobian,
+from notchflex.solver.linear_step.row_layout import RowLayout
+from notchflex.solver.linear_step.tendon_jacobian import (
+    StateJacobians,
+    state_jacobians,
 )
+from notchflex.solver.linear_step.wrench_rows import wrench_rows
+from notchflex.solver.residual import Evaluation
+from notchflex.solver.tendon_spans import slip_mask
 
 
 class LinearisedRows(NamedTuple):
@@ -59,20 +56,6 @@ class LinearisedRows(NamedTuple):
     residual: Float[Array, "n u z"]
     onward: Float[Array, "n c z"]
     behind: Float[Array, "n b z"]
-
-
-class _Linearisation(NamedTuple):
-    """A state, and the jacobians of its bodies, tendons and contacts."""
-
-    chain: Chain
-    unknowns: Unknowns
-    memory: Memory
-    applied: BodyLoads | None
-    at: Evaluation
-    unit: UnitRows
-    motion: RelativeMotionJacobian
-    tendons: list[TendonJacobian]
-    contacts: list[ContactJacobian]
 
 
 def linearise(
@@ -97,14 +80,8 @@ def linearise(
         The rows.
     """
     unit = form.unit_rows()
-    motion = relative_motion_jacobian(chain, at, unit)
-    tendons = [
-        tendon_jacobian(chain, k, unknowns, at, unit, motion) for k in range(len(chain.groups))
-    ]
-    contacts = [
-        contact_jacobian(chain, k, at, unit, motion) for k in range(len(chain.contact_pairs))
-    ]
-    here = _Linearisation(chain, unknowns, memory, applied, at, unit, motion, tendons, contacts)
+    here = state_jacobians(chain, unknowns, memory, applied, at, unit)
+    motion, tendons = here.motion, here.tendons
     balance, behind = _balance_rows(here)
     residual = [balance / chain.stiffness[..., None], *_contact_rows(here)]
     residual += [_friction_rows(here, k) for k in range(len(tendons))]
@@ -123,7 +100,7 @@ def _stack(chain: Chain, rows: list[Array], form: RowLayout) -> Float[Array, "n 
     return jnp.concatenate(rows, axis=1)
 
 
-def _balance_rows(here: _Linearisation) -> tuple[Float[Array, "n m z"], list[Array]]:
+def _balance_rows(here: StateJacobians) -> tuple[Float[Array, "n m z"], list[Array]]:
     """Rows of the balance of modes, and of the wrenches handed back."""
     chain, at, unit = here.chain, here.at, here.unit
     elastic = chain.elastic
@@ -142,7 +119,7 @@ def _balance_rows(here: _Linearisation) -> tuple[Float[Array, "n m z"], list[Arr
         elastic = elastic - jax.vmap(geometric_stiffness)(
             chain.rods, here.unknowns.modes, at.flexure.configuration, at.wrenches.resultant
         )
-        resultant, behind = _wrench_rows(here)
+        resultant, behind = wrench_rows(here)
         balance = unit.spread(unit.of_modes(elastic)) - jnp.einsum(
             "nwm,nwz->nmz", at.flexure.twist, resultant
         )
@@ -177,7 +154,7 @@ def _never_singular(chain: Chain, elastic: Float[Array, "n m m"]) -> Float[Array
     return elastic + jax.vmap(jnp.diag)(missing)
 
 
-def _contact_rows(here: _Linearisation) -> list[Array]:
+def _contact_rows(here: StateJacobians) -> list[Array]:
     """Rows of Signorini's condition, for every kind of contacts."""
     chain, rows = here.chain, list[Array]()
     height = notch_heights(chain)[:, None, None]
@@ -200,95 +177,7 @@ def _contact_rows(here: _Linearisation) -> list[Array]:
     return rows
 
 
-def _wrench_rows(here: _Linearisation) -> tuple[Float[Array, "n w z"], list[Array]]:
-    """Rows of the resultant on the distal body and beyond, and of the wrenches handed back."""
-    chain, unit, wrenches = here.chain, here.unit, here.at.wrenches
-    assert wrenches is not None
-    terminating = _terminating_rows(here)
-    resultant = terminating[:, 0]
-    if unit.transmitted:
-        resultant = resultant + unit.transmitted[0][None]
-    behind = []
-    for number in range(1, chain.window):
-        rows = terminating[:, number]
-        if number < len(unit.transmitted):
-            rows = rows + unit.transmitted[number][None]
-        beyond = wrenches.terminating[:, number] + wrenches.transmitted[:, number]
-        behind.append(_hand_back(here, rows, beyond))
-    if here.applied is not None and here.motion.turn is not None:
-        external = _external_rows(here, here.motion.turn)
-        resultant = resultant + external
-        back = _hand_back(here, external, cast("Array", wrenches.external))
-        behind.append(back if chain.follows else back[:, : here.motion.turn.shape[1]])
-    return resultant, behind
-
-
-def _terminating_rows(here: _Linearisation) -> Float[Array, "n window w z"]:
-    """Rows of the wrenches of spans and contacts that end at the distal body."""
-    chain, at, unit = here.chain, here.at, here.unit
-    assert at.wrenches is not None
-    terminating = jnp.zeros((*at.wrenches.terminating.shape, unit.modes.shape[-1]))
-    for group, span, tendon in zip(chain.groups, at.spans, here.tendons, strict=True):
-        if tendon.wrench is not None and span.crossing.wrench is not None:
-            along = tendon.gap_tension[:, :, None] * span.crossing.wrench[..., None]
-            pull = along + unit.spread(span.gap_tension[..., None, None] * tendon.wrench)
-            reach = span_mask(chain, group.back)
-            terminating = terminating - jnp.einsum("ntwz,ntk->nkwz", pull, reach)
-    for group, response, force, unit_force, contact in zip(
-        chain.contact_pairs,
-        at.contacts,
-        here.unknowns.contact_force,
-        unit.contact_pairs,
-        here.contacts,
-        strict=True,
-    ):
-        if contact.wrench is not None and response.wrench is not None:
-            along = unit_force[None, :, None] * response.wrench[..., None]
-            along = along + unit.spread(force[..., None, None] * contact.wrench)
-            push = group.has_contact[..., None, None] * along
-            reach = span_mask(chain, group.back)
-            terminating = terminating + jnp.einsum("nlwz,nlk->nkwz", push, reach)
-    return terminating
-
-
-def _hand_back(
-    here: _Linearisation, rows: Float[Array, "n w z"], wrench: Float[Array, "n w"]
-) -> Float[Array, "n w z"]:
-    """Rows of a wrench that moves with the distal body, in the frame of the body before."""
-    turning = jax.vmap(wrench_turn)(wrench)
-    turned = jnp.einsum("nvw,nwz->nvz", turning, here.motion.relative[0])
-    pose = cast("Motion", here.at.flexure.pose)
-    return jax.vmap(Motion.wrench)(pose, rows + here.unit.spread(turned))
-
-
-def _external_rows(here: _Linearisation, turn: Float[Array, "n a z"]) -> Float[Array, "n w z"]:
-    """Rows of the external loads on the distal body and beyond."""
-    chain, at, unit = here.chain, here.at, here.unit
-    assert at.wrenches is not None
-    assert at.wrenches.external is not None
-    assert at.rotation is not None
-    on_bodies = jax.tree.map(lambda leaf: leaf[1:], here.applied)
-    on_body = jnp.einsum("nwa,naz->nwz", jax.vmap(_by_turn)(at.rotation, on_bodies), turn)
-    if chain.follows:
-        return unit.external[None] + on_body
-    # All forces together keep their direction: they turn against the body.
-    axes = turn.shape[1]
-    against = -jax.vmap(wrench_turn)(at.wrenches.external)[:, axes:, :axes]
-    forces = jnp.einsum("nwa,naz->nwz", against, turn)
-    return jnp.concatenate([unit.external[None] + on_body[:, :axes], forces], axis=1)
-
-
-def _by_turn(rotation: Array, load: BodyLoads) -> Float[Array, "w a"]:
-    """Slope of a body's loads by the turn of the body about its own axes."""
-    axes = 3 if len(rotation) == 3 else 1
-
-    def at_turn(turn: Array) -> Array:
-        return body_wrench(rotation @ (jnp.eye(len(rotation)) + skew(turn)), load)
-
-    return jax.jacfwd(at_turn)(jnp.zeros(axes))
-
-
-def _friction_rows(here: _Linearisation, k: int) -> Float[Array, "n 2t z"]:
+def _friction_rows(here: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     """Rows of the friction law of both edges, of the k-th group."""
     chain, span, tendon = here.chain, here.at.spans[k], here.tendons[k]
     log_ratio, group = here.unknowns.log_ratio[k], here.chain.groups[k]

@@ -27,9 +27,9 @@ from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.actuation import command_residual, command_slopes
 from notchflex.solver.element import Memory, Unknowns
-from notchflex.solver.linearisation import linearise
+from notchflex.solver.linear_step.linearisation import linearise
+from notchflex.solver.linear_step.row_layout import RowLayout, row_layout
 from notchflex.solver.residual import Evaluation
-from notchflex.solver.row_layout import RowLayout, row_layout
 
 _HELD, _TIED = 1e-9, 1e-7
 

@@ -1,0 +1,30 @@
+"""Fits as text."""
+
+from __future__ import annotations
+
+from notchflex.fit.assessment.diagnosis import NO_PROBLEMS, diagnose, with_unit
+from notchflex.fit.assessment.errors_of_parts import edge
+from notchflex.fit.estimation.calibration import Calibration
+from notchflex.fit.estimation.intervals import Interval
+
+
+def summary(found: Calibration) -> str:
+    """Return constants with intervals and units, root-mean-square errors and the diagnosis."""
+    state = "converged" if found.converged else f"not converged: {found.reason}"
+    lines = [f"{', '.join(found.given)}: {found.counted} numbers measured, {state}"]
+    width = max(map(len, found.names))
+    for name, value in found.values.items():
+        unit, interval = found.units[name], found.intervals.get(name)
+        ends = "" if interval is None else f"  95 %: {_ends(interval, unit)}"
+        lines.append(f"  {name:<{width}}  {with_unit(value, unit)}{ends}")
+    errors = [
+        f"{edge(name)[0]} {error * edge(name)[2]:.3g} {edge(name)[1]}"
+        for name, error in found.residuals.root_mean_squares().items()
+    ]
+    lines.append(f"  rms error: {', '.join(errors)}")
+    return "\n".join([*lines, *(diagnose(found) or (NO_PROBLEMS,))])
+
+
+def _ends(interval: Interval, unit: str) -> str:
+    ends = ("open" if end is None else f"{end:.5g}" for end in (interval.lower, interval.upper))
+    return f"{' to '.join(ends)} {unit}".strip()

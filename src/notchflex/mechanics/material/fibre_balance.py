@@ -1,0 +1,162 @@
+"""Balance of the fibres of a section: strain of the neutral axis, and curvature between its ends.
+
+Both follow together: the forces of the fibres vanish in sum, and section and ends (`law.py`) bend
+by s between them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+from jaxtyping import Array
+
+from notchflex._jax import jax, jnp
+from notchflex.mechanics.material.fibre_section import Fibres
+
+# Newton's method ends at this imbalance, as a part of the strain of bending, or after many tries.
+_BALANCED, _MOST_TRIES = 1e-13, 16
+
+
+class FibreSums(NamedTuple):
+    """Sums over the fibres: force (N) and moment (N mm), and how they change.
+
+    Attributes:
+        force: Axial force.
+        moment: Moment.
+        stretch: Change of the force with the strain of the neutral axis.
+        mixed: Change of the force with the curvature, and of the moment with that strain.
+        bending: Change of the moment with the curvature.
+    """
+
+    force: Array
+    moment: Array
+    stretch: Array
+    mixed: Array
+    bending: Array
+
+
+class SectionEnds(NamedTuple):
+    """The section between its ends: own * k + soft * moment = s."""
+
+    own: Array | float
+    soft: Array | float
+    reduced: Array
+
+    def step(self, curvature: Array, sums: FibreSums, slopes: FibreSums) -> tuple[Array, Array]:
+        """Return Newton's step of the strain of the neutral axis and of the curvature."""
+        beyond = self.own * curvature + self.soft * sums.moment - self.reduced
+        by_strain, by_curvature = self.soft * slopes.mixed, self.own + self.soft * slopes.bending
+        determinant = slopes.stretch * by_curvature - slopes.mixed * by_strain
+        strain = slopes.mixed * beyond - by_curvature * sums.force
+        return strain / determinant, (
+            by_strain * sums.force - slopes.stretch * beyond
+        ) / determinant
+
+    def size(self, curvature: Array, sums: FibreSums, scale: tuple[Array, Array]) -> Array:
+        """Return the imbalance of forces and of bending, as strains."""
+        beyond = self.own * curvature + self.soft * sums.moment - self.reduced
+        return jnp.abs(sums.force) / scale[1] + scale[0] * jnp.abs(beyond)
+
+    def slope(self, slopes: FibreSums) -> Array:
+        """Return the change of the moment with s."""
+        free = slopes.bending - slopes.mixed**2 / slopes.stretch
+        return free / (self.own + self.soft * free)
+
+
+class SumsFibres(Protocol):
+    """A law that sums up the stress of fibres."""
+
+    def sum_fibres(self, fibres: Fibres, memory: Any, strain: Array, curvature: Array) -> FibreSums:
+        """Sum over the fibres of a section, or of many."""
+        ...
+
+
+def _settle(
+    law: SumsFibres,
+    fibres: Fibres,
+    memory: Any,
+    joint: SectionEnds,
+    scale: tuple[Array, Array],
+    start: Array,
+) -> tuple[Array, Array, FibreSums]:
+    """Find strain of the neutral axis, curvature and sums of all sections, from a curvature.
+
+    All together, so that one condition stops the search; the sections may have leading axes.
+    """
+
+    def proceed(search: tuple[Array, ...]) -> Array:
+        *_, least, tries = search
+        return jnp.any(least > _BALANCED * scale[0] * jnp.abs(joint.reduced)) & (
+            tries < _MOST_TRIES
+        )
+
+    def improve(search: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Try a step: the next one where the imbalance falls, half of it where not."""
+        strain, curvature, by_strain, by_curvature, sums, least, tries = search
+        trial = strain + by_strain, curvature + by_curvature
+        found = law.sum_fibres(fibres, memory, *trial)
+        size = joint.size(trial[1], found, scale)
+        falls = size < least
+        new = *trial, *joint.step(trial[1], found, found), found, size
+        old = strain, curvature, 0.5 * by_strain, 0.5 * by_curvature, sums, least
+        return *jax.tree.map(lambda *pair: jnp.where(falls, *pair), new, old), tries + 1
+
+    none, far = jnp.zeros_like(start), jnp.full_like(start, jnp.inf)
+    sums = FibreSums(*(none for _ in FibreSums._fields))
+    begin = none, start, none, none, sums, far, jnp.zeros((), int)
+    strain, curvature, _, _, sums, *_ = jax.lax.while_loop(proceed, improve, begin)
+    return strain, curvature, sums
+
+
+settle_fibres = jax.custom_batching.custom_vmap(_settle)
+
+
+@settle_fibres.def_vmap
+def _(size: int, batched: Any, law: SumsFibres, *sections: Any) -> tuple[Any, Any]:
+    all_batched = True, True, FibreSums._make([True] * len(FibreSums._fields))
+    if any(jax.tree.leaves(batched[0])):  # rows of a batch that is not one of sections
+        axes = jax.tree.map(lambda one: 0 if one else None, list(batched))
+        return jax.vmap(_settle, in_axes=tuple(axes))(law, *sections), all_batched
+    every = jax.tree.map(
+        lambda one, leaf: leaf if one else jnp.broadcast_to(leaf, (size, *jnp.shape(leaf))),
+        list(batched[1:]),
+        list(sections),
+    )
+    return settle_fibres(law, *every), all_batched
+
+
+@jax.custom_jvp
+def same_sums(sums: FibreSums, *of: Any) -> FibreSums:
+    """Return sums over fibres that are known, with the derivatives of summing up again.
+
+    Nothing is summed up, or traced, where nothing is differentiated.
+    """
+    del of
+    return sums
+
+
+def _change_of_sums(
+    primals: tuple[Any, ...], tangents: tuple[Any, ...]
+) -> tuple[FibreSums, FibreSums]:
+    """Derivatives along what varies alone."""
+    (sums, *of), (_, *moved) = primals, tangents
+    leaves, tree = jax.tree.flatten(of)
+    by = jax.tree.leaves(moved, is_leaf=_is_still)
+    varies = [place for place, one in enumerate(by) if not _is_still(one)]
+
+    def again(*varied: Array) -> FibreSums:
+        every = list(leaves)
+        for place, one in zip(varies, varied, strict=True):
+            every[place] = one
+        law, *rest = jax.tree.unflatten(tree, every)
+        return law.sum_fibres(*rest)
+
+    at, along = [leaves[place] for place in varies], [by[place] for place in varies]
+    return sums, jax.jvp(again, at, along)[1]
+
+
+def _is_still(tangent: Any) -> bool:
+    return isinstance(tangent, jax.custom_derivatives.SymbolicZero)
+
+
+same_sums.defjvp(_change_of_sums, symbolic_zeros=True)

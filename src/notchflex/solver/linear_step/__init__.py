@@ -1,0 +1,1 @@
+"""Newton's linear step: rows of every element, eliminated along the chain."""
