@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import notchflex as nf
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.sweeping.points import Points
 
 OUTPUTS = ("total_angle", "tip_position", "converged")

@@ -8,7 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex.analysis.closing_loads.search import closing_tensions
 from notchflex.analysis.closing_loads.varied import closing_tensions_of
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 
 YORK = nf.load_robot("york2015")
 

@@ -13,7 +13,7 @@ from notchflex.analysis.uncertainty.draws import sources_of, values_at
 from notchflex.analysis.varied import varied_chains as varied
 from notchflex.analysis.varied.fit_polynomial import PolynomialAccuracy, fit_polynomial
 from notchflex.analysis.varied.sparse_polynomial import leja_points
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 from refusals import refused
 
 WRIST = nf.load_robot("pacheco2021-a")

@@ -16,7 +16,7 @@ from notchflex.analysis.uncertainty.draws import sources_of, values_at
 from notchflex.designing.forms import problems_of
 from notchflex.designing.search.robust_problem import Hold, RobustProblem
 from notchflex.designing.specification.reading import spec_from_table
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 
 TOLERANCE = {
     "notch.depth": {"sd": 0.01, "per_notch": True},

@@ -113,13 +113,13 @@ def check(data):
             at for at in reversed(range(len(values)))
             if values[at].kind == "f" and np.shape(values[at].array) == (2,)
         )  # fmt: skip
-        wanted = []
-        third = tables[2][0]
-        for row in range(rows):
+        # The first row is that with which the function was drawn.
+        wanted = [[np.asarray(values[at].array, float).ravel() for at in out]]
+        third = np.asarray(values[carry].array, float).ravel()
+        for row in range(1, rows):
             own = [tables[0][row], tables[1][row], third if how == "path" else tables[2][row]]
-            *results, last = by_xla(steps, [*out, carry], own, size)
+            *results, third = by_xla(steps, [*out, carry], own, size)
             wanted.append(results)
-            third = last
 
     def function(*arrays):
         if how != "path":

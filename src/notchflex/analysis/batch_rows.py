@@ -23,7 +23,7 @@ from notchflex.loads import LoadPath
 from notchflex.loads.command import make_commands, pad_commands
 from notchflex.loads.validation import one_or_several, short_repr
 from notchflex.robot import Robot
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.solver.programs.prepare import PreparedChain, pad_prepared
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.static_structure import StaticStructure

@@ -11,7 +11,7 @@ from notchflex.mechanics.chain import assemble, sites_of
 from notchflex.mechanics.flexure import Site, rod_at
 from notchflex.results.quantities.registry import DEGREES
 from notchflex.robot import Robot, Tube
-from notchflex.robot.error_messages import fields_of
+from notchflex.robot.fields import fields_of
 from notchflex.robot.kinds import Notch
 
 

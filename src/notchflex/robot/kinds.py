@@ -14,7 +14,7 @@ from typing import Annotated, Any, Union
 from pydantic import Field
 
 from notchflex._packages import import_all
-from notchflex.robot.error_messages import kind_of
+from notchflex.robot.fields import kind_of
 from notchflex.robot.notches.cut import CutLayout
 from notchflex.robot.notches.opening import Opening
 from notchflex.robot.part import MOST_STRAIN, Float, Int, part, quantity

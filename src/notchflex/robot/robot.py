@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, overload
 from pydantic import Field, ValidationError, model_validator
 
 from notchflex.errors import InputError
-from notchflex.robot.error_messages import fields_of, sentences
+from notchflex.robot.error_messages import sentences
+from notchflex.robot.fields import fields_of
 from notchflex.robot.kinds import Friction, Material, Notch, one_of
 from notchflex.robot.part import ProblemError, part
 from notchflex.robot.problems import robot_problems

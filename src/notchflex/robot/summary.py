@@ -7,7 +7,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from notchflex._summary import Summary, short
-from notchflex.robot.error_messages import fields_of, is_list
+from notchflex.robot.fields import fields_of, is_list
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot

@@ -14,7 +14,7 @@ from tomlkit.exceptions import ParseError
 from notchflex._replacing import replacing
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.comments import FITTED_TO, add_note, set_value
-from notchflex.robot.error_messages import fields_of
+from notchflex.robot.fields import fields_of
 from notchflex.robot.reading import robot_from_text
 from notchflex.robot.robot import Robot, source_of, to_table
 from notchflex.robot.tolerance import read_tolerances

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from notchflex.analysis.batch import Batch, simulate_batch, simulate_varied
 from notchflex.analysis.varied.varied_chains import VariedChains, varied_chains
 from notchflex.loads import LoadPath
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.tolerancing.study import Outcomes, Study
 
 SAMPLE = 4096

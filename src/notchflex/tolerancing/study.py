@@ -21,7 +21,7 @@ from notchflex.pieces.codes import ACCEPTED, FAILED, INVALID, REJECTED
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.solver.newton import Settings
 from notchflex.tolerancing.criteria import Criterion, criteria_of
 from notchflex.tolerancing.spec import ToleranceSpec

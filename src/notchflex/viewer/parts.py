@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from notchflex.errors import InputError
 from notchflex.robot import Friction, Material, Robot, kinds_of, list_robots, load_robot, to_table
-from notchflex.robot.error_messages import fields_of, is_list
+from notchflex.robot.fields import fields_of, is_list
 
 SECTIONS: dict[str, type] = {"friction": Friction, "material": Material}
 

@@ -13,7 +13,7 @@ from notchflex.loads import LoadPath
 from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import assemble
 from notchflex.mechanics.contact import closing_travel
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.solver.newton import DEFAULT
 from notchflex.solver.programs.threads import on_cores
 

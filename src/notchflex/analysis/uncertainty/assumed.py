@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from notchflex.errors import InputError
 from notchflex.robot import Robot
-from notchflex.robot.error_messages import fields_of
+from notchflex.robot.fields import fields_of
 from notchflex.robot.tolerance import Tolerance
 from notchflex.robot.value_names import numbers_at
 

@@ -25,7 +25,7 @@ from notchflex.loads import LoadPath
 from notchflex.loads.command import Command, make_commands
 from notchflex.mechanics.chain import Chain
 from notchflex.robot import Robot
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.pytree_layout import PytreeLayout
 from notchflex.solver.programs.static_structure import StaticStructure

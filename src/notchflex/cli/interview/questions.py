@@ -14,7 +14,7 @@ from notchflex.cli.interview.readings import choice, reading, readings, whole
 from notchflex.cli.interview.wordings import OPTIONS, WORDINGS
 from notchflex.errors import InputError
 from notchflex.robot import Nitinol, Robot, Superelastic, Tendon, Tube
-from notchflex.robot.error_messages import fields_of, is_list, kind_of
+from notchflex.robot.fields import fields_of, is_list, kind_of
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.problems import MOST_NOTCHES
 

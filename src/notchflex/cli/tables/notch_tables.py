@@ -10,7 +10,7 @@ import numpy as np
 
 from notchflex.cli import terminal
 from notchflex.robot import Robot
-from notchflex.robot.error_messages import fields_of
+from notchflex.robot.fields import fields_of
 from notchflex.robot.robot import to_table
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from notchflex.designing.search.rows import TOLERANCE, row_reading, row_sizes, r
 from notchflex.designing.search.starts import solved
 from notchflex.robot import Robot
 from notchflex.robot.tolerance import Tolerance
-from notchflex.robot.varied import VariedRobots
+from notchflex.robot.value_names.varied import VariedRobots
 from notchflex.tolerancing.study import TAIL
 from notchflex.tolerancing.yields import points_of_each, replicates
 

@@ -24,7 +24,13 @@ from notchflex.mechanics.flexure.notch_rod import (
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
 from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.roots import rooted_strip_rod, sharp_strip, strip_validity
+from notchflex.mechanics.flexure.roots import (
+    CheckedRange,
+    left_ranges,
+    rooted_strip_rod,
+    sharp_strip,
+    wall_ranges,
+)
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
 from notchflex.robot import StripNotch, Tube
@@ -102,4 +108,20 @@ def strip_rod(
 @unchecked.register
 def _(notch: StripNotch, tube: Tube, site: Site) -> list[str]:
     del site
-    return strip_validity(notch, tube)
+    if not notch.has_elastic_ends:  # a model of a paper
+        return []
+    thickness, outer = notch.strip_thickness, tube.outer_diameter
+    overlap = 2.0 * notch.depth - outer
+    slanting = (
+        ": the body between two pairs is a slanting bar, which bends too; pairs that adjoin were "
+        "found 2.1 times as flexible"
+    )
+    ranges = [
+        CheckedRange("overlap of the cuts / strip thickness", overlap / thickness, 1.6, 5.4),
+        CheckedRange("overlap of the cuts / outer diameter", overlap / outer, 0.24, 0.54),
+        CheckedRange("height / outer diameter", notch.height / outer, 0.2, 0.5),
+        CheckedRange(
+            "uncut length / height", notch.uncut_length / notch.height, 0.7, float("inf"), slanting
+        ),
+    ]
+    return left_ranges([*wall_ranges(thickness, tube), *ranges])

@@ -23,7 +23,13 @@ from notchflex.mechanics.flexure.notch_rod import (
 from notchflex.mechanics.flexure.quadrature import rod_quadrature
 from notchflex.mechanics.flexure.registry import Site, rod, unchecked
 from notchflex.mechanics.flexure.rod import Rod
-from notchflex.mechanics.flexure.roots import rooted_strip_rod, round_strip, strip_validity
+from notchflex.mechanics.flexure.roots import (
+    CheckedRange,
+    left_ranges,
+    rooted_strip_rod,
+    round_strip,
+    wall_ranges,
+)
 from notchflex.mechanics.flexure.u_link_geometry import Course, Link
 from notchflex.mechanics.flexure.wrench_modes import wrench_modes
 from notchflex.mechanics.material import FibreSection
@@ -134,4 +140,12 @@ def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> Fi
 @unchecked.register
 def _(notch: ULink, tube: Tube, site: Site) -> list[str]:
     del site
-    return strip_validity(notch, tube)
+    if not notch.has_elastic_ends:  # a model of a paper
+        return []
+    thickness, length = notch.strip_thickness, notch.strip_length
+    ranges = [
+        CheckedRange("strip length / strip thickness", length / thickness, 1.7, 5.8),
+        CheckedRange("strip length / outer diameter", length / tube.outer_diameter, 0.2, 0.5),
+        CheckedRange("slot radius / strip thickness", notch.slot_radius / thickness, 0.2, 0.8),
+    ]
+    return left_ranges([*wall_ranges(thickness, tube), *ranges])

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, cast
 
 from notchflex.errors import InputError
-from notchflex.robot.error_messages import fields_of, nearest
+from notchflex.robot.error_messages import nearest
+from notchflex.robot.fields import fields_of
 from notchflex.robot.kinds import Friction, Material, Notch, kinds_of
 from notchflex.robot.tendon import Tendon
 from notchflex.robot.tube import Tube

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from notchflex.errors import InputError
-from notchflex.robot.error_messages import fields_of, nearest
+from notchflex.robot.error_messages import nearest
+from notchflex.robot.fields import fields_of
 from notchflex.robot.robot import Robot, to_table
 from notchflex.robot.tolerance import amount
 from notchflex.robot.value_names.paths import EXAMPLES, class_of, parse_path, tables_at

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, cast
 
 from notchflex.errors import InputError
-from notchflex.robot.error_messages import fields_of, nearest, unknown_key
+from notchflex.robot.error_messages import nearest, unknown_key
+from notchflex.robot.fields import fields_of
 from notchflex.robot.kinds import kinds_of
 from notchflex.robot.robot import Robot, from_table, remember_source, source_of, to_table
 from notchflex.robot.value_names.paths import (
