@@ -1,6 +1,15 @@
 """The chain: rigid bodies joined by flexures, as arrays, and how it moves."""
 
-from notchflex.mechanics.chain.chain import Chain, Shaped, assemble, flexure_states, laws, shape_of
+from notchflex.mechanics.chain.chain import (
+    Chain,
+    Shaped,
+    assemble,
+    averages,
+    flexure_states,
+    laws,
+    shape_of,
+)
+from notchflex.mechanics.chain.flexures import FlexureOf, flexure
 from notchflex.mechanics.chain.pad import padded
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
 from notchflex.mechanics.chain.sites import sites_of, unchecked_dimensions
@@ -8,9 +17,12 @@ from notchflex.mechanics.chain.structure import structural
 
 __all__ = [
     "Chain",
+    "FlexureOf",
     "Shaped",
     "assemble",
+    "averages",
     "bending_normal",
+    "flexure",
     "flexure_states",
     "laws",
     "padded",
