@@ -6,10 +6,12 @@ again for what users write around it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jax.core import Tracer
@@ -24,8 +26,8 @@ from notchflex.results.path import EquilibriumPath
 
 TENDONS = ("tension", "stroke")
 TIP = ("tip_force", "tip_moment")
-# Derivatives by numbers of the robot that are kept.
-_REMEMBERED = 256
+# Robots whose derivatives by their numbers are kept.
+_REMEMBERED = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,24 +55,35 @@ class VectorSolver:
         path = self._path(flat)
         return {name: np.asarray(getattr(path, name)) for name in self.outputs}
 
-    def jacobian(
-        self, flat: Float[np.ndarray, " k"], outputs: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
-        """Return the derivatives of some outputs by every value, as last axis."""
+    def slopes(self, flat: Float[np.ndarray, " k"], output: str) -> np.ndarray:
+        """Return the derivatives of an output by every value, as last axis.
+
+        Tangents give those of all outputs at once, which are kept; the adjoint one after the other.
+        """
         path = self._path(flat)
+        kept = self._kept_slopes.setdefault(path, {})
+        if output in kept:
+            return kept[output]
+        if output == "residual":  # what the solver leaves of it does not depend on the values
+            return np.zeros((len(path), len(flat)))
+        names = (output,)
+        if not self.model.takes_adjoint(path, names, len(flat)):
+            names = tuple(name for name in self.outputs if _is_float(path, name))
         changes = self._changes(path, self._named(flat))
-        names = tuple(name for name in outputs if name != "residual")
         by_change = self.model.derivatives(path, changes, names)
-        slopes = {name: np.moveaxis(one, 0, -1) for name, one in by_change.items()}
-        if "residual" in outputs:  # the residual left by the solver does not depend on the values
-            slopes["residual"] = np.zeros((len(path), len(flat)))
-        return slopes
+        kept |= {name: np.moveaxis(one, 0, -1) for name, one in by_change.items()}
+        return kept[output]
 
     def _named(self, flat: Float[np.ndarray, " k"]) -> dict[str, np.ndarray]:
-        shapes = {name: np.shape(at) for name, at in self.start.items()}
-        ends = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])[:-1]
-        parts = zip(shapes.items(), np.split(flat, ends), strict=True)
-        return {name: part.reshape(shape) for (name, shape), part in parts}
+        return {name: flat[part].reshape(shape) for name, part, shape in self._parts}
+
+    @cached_property
+    def _parts(self) -> list[tuple[str, slice, tuple[int, ...]]]:
+        """Where the vector holds which value, and in which shape."""
+        shapes = [np.shape(at) for at in self.start.values()]
+        ends = np.cumsum([0, *(math.prod(shape) for shape in shapes)]).tolist()
+        parts = [slice(*ends[number : number + 2]) for number in range(len(shapes))]
+        return list(zip(self.start, parts, shapes, strict=True))
 
     def _path(self, flat: Float[np.ndarray, " k"]) -> EquilibriumPath:
         """The path at some values; the last one is kept, as its derivatives are asked for next."""
@@ -88,16 +101,21 @@ class VectorSolver:
         return {}
 
     @cached_property
-    def _kept(self) -> dict[Any, Change]:
+    def _kept_slopes(self) -> WeakKeyDictionary[EquilibriumPath, dict[str, np.ndarray]]:
+        return WeakKeyDictionary()
+
+    @cached_property
+    def _kept(self) -> dict[Any, dict[str, Change]]:
         return {}
 
     def _changes(self, path: EquilibriumPath, values: Mapping[str, np.ndarray]) -> Iterator[Change]:
         """Change of loads and chain per unit of every value."""
         # One program for all: with a change of the chain where any value changes it.
         still = np.zeros(self.model.ready.long.chain_layout.size) if self.numbers else None
+        by_number = self._by_numbers(path, values)
         for name, value in values.items():
-            if name in self.numbers:
-                yield self._by_number(path, values, name)
+            if name in by_number:
+                yield by_number[name]
                 continue
             for place in np.ndindex(value.shape):
                 varied = np.array(value)
@@ -105,18 +123,22 @@ class VectorSolver:
                 more = self.load({**values, name: varied})
                 yield Change(self.model.load_change(path, more), still)
 
-    def _by_number(
-        self, path: EquilibriumPath, values: Mapping[str, np.ndarray], name: str
-    ) -> Change:
-        """Change by a number of the robot, kept for the next tensions and strokes."""
+    def _by_numbers(
+        self, path: EquilibriumPath, values: Mapping[str, np.ndarray]
+    ) -> Mapping[str, Change]:
+        """Changes by numbers of the robot, kept for the next tensions and strokes."""
         numbers = [float(values[one]) for one in self.numbers]
-        tip = [values[one].tobytes() for one in values if one in TIP]
-        key = (name, *numbers, *tip)
+        key = (*numbers, *(values[one].tobytes() for one in values if one in TIP))
         if key not in self._kept:
             if len(self._kept) >= _REMEMBERED:
                 del self._kept[next(iter(self._kept))]
-            self._kept[key] = self.model.change(path.robot, path.load, name)
+            changes = self.model.changes(path.robot, path.load, self.numbers)
+            self._kept[key] = dict(zip(self.numbers, changes, strict=True))
         return self._kept[key]
+
+
+def _is_float(path: EquilibriumPath, name: str) -> bool:
+    return name != "residual" and np.asarray(getattr(path, name)).dtype.kind == "f"
 
 
 def outputs_function(
@@ -165,12 +187,16 @@ def _differentiable_once(
         for name, shape in shapes.items()
     }
     values_of = _callback(solver.values, shapes)
-    slopes_of = _callback(lambda at: solver.jacobian(at, names), slope_shapes)
+    # One for each: JAX then leaves out those of outputs that nobody differentiates.
+    slopes_of = {
+        name: _callback(lambda at, name=name: {name: solver.slopes(at, name)}, {name: shape})
+        for name, shape in slope_shapes.items()
+    }
     compiled: list[bool] = []
 
     @jax.custom_jvp
     def slopes(at: Array) -> dict[str, Array]:
-        return slopes_of(at)
+        return {name: slopes_of[name](at)[name] for name in names}
 
     @slopes.defjvp
     def _(primals: Any, tangents: Any) -> Any:
@@ -188,7 +214,8 @@ def _differentiable_once(
         (at,), (change,) = primals, tangents
         # Compiled now: within a program of JAX nothing may be traced.
         if not compiled:
-            solver.jacobian(start, names)
+            for name in names:
+                solver.slopes(start, name)
             compiled.append(True)
         by = slopes(at)
         return values(at), {name: by[name] @ change for name in names}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -197,8 +197,17 @@ class Differentiable:
         return self.model.solve(self._robot(values), self._load(values))
 
     def _robot(self, values: Mapping[str, Any]) -> Robot:
-        numbers = {name: float(values[name]) for name in self.numbers}
-        return self.robot.with_values(numbers) if numbers else self.robot
+        return self._robots(tuple(float(values[name]) for name in self.numbers))
+
+    @cached_property
+    def _robots(self) -> Callable[[tuple[float, ...]], Robot]:
+        """Robots of some numbers; the same is asked for again for other loads."""
+
+        def made(numbers: tuple[float, ...]) -> Robot:
+            values = zip(self.numbers, numbers, strict=True)
+            return self.robot.with_values(values) if numbers else self.robot
+
+        return lru_cache(maxsize=4)(made)
 
     def _load(self, values: Mapping[str, Any]) -> LoadPath:
         load = self.load
@@ -234,7 +243,7 @@ class Differentiable:
         """Refuse what no robot or load can have; traced values only set `converged` to false."""
         numbers = {name: float(values[name]) for name in self.numbers}
         if numbers != {name: float(self.start[name]) for name in self.numbers}:
-            self.robot.with_values(numbers)
+            self._robot(values)
         if "tension" in values and not (values["tension"] >= 0.0).all():
             raise InputError.OUT_OF_RANGE("a tendon can only pull; give tensions of 0 N or more")
 

@@ -7,8 +7,7 @@ makes them.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -16,13 +15,14 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from notchflex.analysis.derivatives.adjoint import gradient
+from notchflex.analysis.derivatives.geometry_slopes import GeometrySlopes
 from notchflex.analysis.derivatives.numbers import slope
 from notchflex.analysis.derivatives.tangent import Change, PathTangents
 from notchflex.analysis.solve import prepare_for
 from notchflex.errors import InputError
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import LoadPath
-from notchflex.mechanics.chain import Shaped, laws, shape_of
+from notchflex.mechanics.chain import FlexureOf, Shaped, assemble, laws, shape_of
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.robot.value_names import number_at
@@ -81,30 +81,46 @@ class ForwardModel:
         return EquilibriumPath(robot, load, ready, came, settings=self.settings)
 
     def change(self, robot: Robot, load: LoadPath, name: str) -> Change:
-        """Differentiate arrays and loads by a number of the robot.
+        """Differentiate arrays and loads by a number of the robot; as `changes` does."""
+        return self.changes(robot, load, (name,))[0]
+
+    def changes(self, robot: Robot, load: LoadPath, names: Sequence[str]) -> list[Change]:
+        """Differentiate arrays and loads by numbers of the robot.
+
+        Numbers that change other parts of the robot, such as dimensions of its notches, are moved
+        together.
 
         Args:
-            robot: The robot, with the value where.
+            robot: The robot, with the values where.
             load: The loads.
-            name: Which number.
+            names: Which numbers.
 
         Raises:
-            InputError: The number cannot be varied.
+            InputError: A number cannot be varied.
         """
+        found = {name: self._of_law(robot, name) for name in names if _is_of_law(name)}
+        others = tuple(name for name in names if name not in found)
+        if len(others) == 1:
+            at = number_at(robot, others[0])
+            one = self.change_along(lambda value: robot.with_value(others[0], value), at, load)
+            return [found.get(name, one) for name in names]
+        if others not in self._geometry:
+            self._geometry[others] = GeometrySlopes(self.ready, others)
+        slopes = self._geometry[others].at(self._moved, robot, load)
+        found |= zip(others, slopes, strict=True)
+        return [found[name] for name in names]
+
+    def _of_law(self, robot: Robot, name: str) -> Change:
+        """Differentiate the law of the material, or of friction, by a number of its own."""
         section, _, key = name.partition(".")
-        if section in ("material", "friction") and key not in _OF_THE_CHAIN:
-            part, shape = getattr(robot, section), self._shape(robot)
+        part, shape = getattr(robot, section), self._shape(robot)
 
-            def of_laws(value: float) -> np.ndarray:
-                return flat(laws(replace(part, **{key: value}), shape))
+        def of_laws(value: float) -> np.ndarray:
+            return flat(laws(replace(part, **{key: value}), shape))
 
-            chain = np.zeros(self.ready.long.chain_layout.size)
-            chain[self._places[section]] = slope(of_laws, getattr(part, key), order=2)
-            return Change(None, chain)
-
-        return self.change_along(
-            lambda value: robot.with_value(name, value), number_at(robot, name), load
-        )
+        chain = np.zeros(self.ready.long.chain_layout.size)
+        chain[self._places[section]] = slope(of_laws, getattr(part, key), order=2)
+        return Change(None, chain)
 
     def change_along(
         self, robot_at: Callable[[float], Robot], at: float, load: LoadPath, *, order: int = 6
@@ -121,15 +137,33 @@ class ForwardModel:
             InputError: The number cannot be varied.
         """
 
-        def packed(value: float) -> np.ndarray:
-            varied = robot_at(value)
-            ready = self._prepared(varied)
-            loads, _ = ready.padded_commands(make_commands(load, varied, ready.chain))
-            return np.concatenate([ready.long.vector, loads.ravel()])
-
         size = self.ready.long.chain_layout.size
-        by_number = slope(packed, at, order=order)
+        by_number = slope(lambda value: self._packed(robot_at(value), load), at, order=order)
         return Change(by_number[size:].reshape(len(load), -1), by_number[:size])
+
+    def _packed(self, robot: Robot, load: LoadPath) -> Float[np.ndarray, " packed"]:
+        """The long chain and the loads of all steps as one vector."""
+        return _vector_of(self._prepared(robot), robot, load)
+
+    def _moved(self, robot: Robot, load: LoadPath, flexures: FlexureOf) -> np.ndarray:
+        """The same of one of many robots that differ little, whose flexures are given."""
+        chain = self.ready.chain
+        ready = PreparedChain(
+            assemble(
+                robot,
+                chain.level,
+                loaded=chain.loaded,
+                follows=chain.follows,
+                refinement=chain.refinement,
+                flat=not self.any_load,
+                flexures=flexures,
+            )
+        )
+        return _vector_of(self._of_form(ready), robot, load)
+
+    @cached_property
+    def _geometry(self) -> dict[tuple[str, ...], GeometrySlopes]:
+        return {}
 
     def load_change(
         self, path: EquilibriumPath, load: LoadPath
@@ -162,7 +196,7 @@ class ForwardModel:
         """
         directions = tuple(changes)
         shapes = {name: np.shape(path.quantity(name)) for name in outputs}
-        if not remembers or _ADJOINT * sum(map(math.prod, shapes.values())) > len(directions):
+        if not remembers or not self.takes_adjoint(path, outputs, len(directions)):
             tangents = PathTangents(path, outputs, remembers)
             columns = [tangents.along(one) for one in directions]
             return {name: np.stack([one[name] for one in columns]) for name in outputs}
@@ -174,6 +208,13 @@ class ForwardModel:
                 by = gradient(path, {name: weight})
                 derivatives[name][:, *place] = [by.along(one) for one in directions]
         return derivatives
+
+    def takes_adjoint(
+        self, path: EquilibriumPath, outputs: tuple[str, ...], directions: int
+    ) -> bool:
+        """Whether derivatives along so many directions are found by the adjoint of each number."""
+        numbers = sum(np.asarray(path.quantity(name)).size for name in outputs)
+        return _ADJOINT * numbers <= directions
 
     def _assembled(self, robot: Robot) -> PreparedChain:
         if self.any_load:
@@ -193,7 +234,10 @@ class ForwardModel:
         if shape is self._shape(present) and robot.material.density == present.material.density:
             fields = laws(robot.material, shape) | laws(robot.friction, shape)
             return self.ready.with_fields(fields)
-        ready = self._assembled(robot)
+        return self._of_form(self._assembled(robot))
+
+    def _of_form(self, ready: PreparedChain) -> PreparedChain:
+        """Raise if a robot has other arrays."""
         if ready.chain_layout is not self.ready.chain_layout:
             raise InputError.UNSUPPORTED(
                 "with these values the robot has another form; it must stay the same"
@@ -210,3 +254,15 @@ class ForwardModel:
     def _shape(self, robot: Robot) -> Shaped:
         chain = self.ready.chain
         return shape_of(robot, chain.level, chain.refinement)
+
+
+def _is_of_law(name: str) -> bool:
+    """Whether only the law of the material, or of friction, depends on a number."""
+    section, _, key = name.partition(".")
+    return section in ("material", "friction") and key not in _OF_THE_CHAIN
+
+
+def _vector_of(ready: PreparedChain, robot: Robot, load: LoadPath) -> np.ndarray:
+    """The long chain and the loads of all steps as one vector."""
+    loads, _ = ready.padded_commands(make_commands(load, robot, ready.chain))
+    return np.concatenate([ready.long.vector, loads.ravel()])

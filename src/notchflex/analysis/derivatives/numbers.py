@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
 
@@ -35,17 +36,44 @@ def slope(
     Raises:
         InputError: The number cannot be varied.
     """
-    width = _WIDTHS[order] * (abs(value) or 1.0)
+    return differences(lambda values: vector_of(float(values)), value, order) / width_at(value, order)
+
+
+def differences(
+    vector_of: Callable[[Float[np.ndarray, "*k"]], Float[np.ndarray, "*m"]],
+    values: ArrayLike,
+    order: int,
+) -> Float[np.ndarray, "*m"]:
+    """Differentiate by numbers that move together, each by so many of its `width_at`.
+
+    Args:
+        vector_of: As for `slope`.
+        values: Where, one number or several.
+        order: As for `slope`.
+
+    Returns:
+        The derivative per width.
+
+    Raises:
+        InputError: The numbers cannot be varied.
+    """
+    width = width_at(values, order)
     for side in (0, 1, -1):
         points, weights = _stencil(order, side)
         try:
-            values = np.stack([vector_of(float(value + width * point)) for point in points])
-        except InputError:  # beyond what the number may be
+            found = np.stack([vector_of(values + width * point) for point in points])
+        except InputError:  # beyond what a number may be
             continue
-        values = np.where(np.isfinite(values), values, 0.0)
+        found = np.where(np.isfinite(found), found, 0.0)
         # What does not change is 0, not a rounding error.
-        return np.tensordot(weights, values - values[0], 1) / width
-    raise InputError.OUT_OF_RANGE(f"the number cannot be varied around {value:g}")
+        return np.tensordot(weights, found - found[0], 1)
+    raise InputError.OUT_OF_RANGE(f"the number cannot be varied around {np.ravel(values)[0]:g}")
+
+
+def width_at(values: ArrayLike, order: int) -> Float[np.ndarray, "*k"]:
+    """Return the widths of differences, of the numbers themselves, and of 1 for 0."""
+    size = np.abs(values)
+    return _WIDTHS[order] * np.where(size == 0.0, 1.0, size)
 
 
 @lru_cache

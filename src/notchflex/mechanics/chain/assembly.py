@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from notchflex._jax import constant, jax
 from notchflex.mechanics.chain.arrays import Chain
-from notchflex.mechanics.chain.fibres import with_fibres
+from notchflex.mechanics.chain.flexures import FlexureOf, flexure
 from notchflex.mechanics.chain.mass import body_lengths, body_masses
 from notchflex.mechanics.chain.plane import bending_normal, tendons_in_plane
 from notchflex.mechanics.chain.sites import sites_of
@@ -21,10 +21,7 @@ from notchflex.mechanics.flexure import (
     Site,
     fibre_stretch,
     flattened,
-    free_pose,
-    rod_at,
     stack,
-    with_level,
 )
 from notchflex.mechanics.flexure.rod import planar_points
 from notchflex.mechanics.friction import friction_law
@@ -45,6 +42,7 @@ def assemble(
     follows: bool = True,
     refinement: int = 0,
     flat: bool = True,
+    flexures: FlexureOf | None = None,
 ) -> Chain:
     """Turn the description of a robot into the arrays of its chain.
 
@@ -56,6 +54,7 @@ def assemble(
         follows: Whether any of them may turn with a body.
         refinement: How many times more modes than the flexures need for usual loads.
         flat: Whether a robot that stays in a plane, under such loads, is given as one of the plane.
+        flexures: Gives the flexures of the notches in the place of `flexure`.
 
     Returns:
         Its chain.
@@ -65,7 +64,7 @@ def assemble(
         >>> assemble(load_robot("pacheco2021-a")).flexures
         5
     """
-    shaped = shape_of(robot, level, refinement)
+    shaped = shape_of(robot, level, refinement, flexures)
     rods, laid, body_length = shaped.rods, shaped.laid, shaped.body_length
     body_mass, body_centre = body_masses(robot, rods)
     tendons = robot.tendon
@@ -119,8 +118,23 @@ def laws(part: Material | Friction, shaped: Shaped) -> dict[str, Any]:
         "elastic": constant(elastic) if linear else None,
         "contact_stiffness": constant(contact_stiffness),
         "contact_flexibility": None if stop is None else constant(stop / contact_stiffness),
-        "closing_force": constant(contact_stiffness @ shaped.height / len(contact_stiffness)),
-        "stroke_stiffness": constant(contact_stiffness.sum() / len(contact_stiffness) ** 2),
+        **averages(contact_stiffness, shaped.height),
+    }
+
+
+def averages(
+    contact_stiffness: Float[np.ndarray, " n"], height: Float[np.ndarray, " n"]
+) -> dict[str, Any]:
+    """Return the fields of a chain to which every notch contributes, linear in each argument.
+
+    Args:
+        contact_stiffness: Stiffness of every notch against closing, N/mm.
+        height: Length of the neutral axis of every flexure, mm.
+    """
+    count = len(contact_stiffness)
+    return {
+        "closing_force": constant(contact_stiffness @ height / count),
+        "stroke_stiffness": constant(contact_stiffness.sum() / count**2),
     }
 
 
@@ -150,15 +164,17 @@ class Shaped(NamedTuple):
     lip_slope: Float[np.ndarray, "n modes"]
 
 
-def shape_of(robot: Robot, level: str, refinement: int) -> Shaped:
-    """What of a robot's chain follows from its shape alone."""
+def shape_of(
+    robot: Robot, level: str, refinement: int, flexures: FlexureOf | None = None
+) -> Shaped:
+    """What of a robot's chain follows from its shape alone; for the arguments see `assemble`."""
     chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
-    sites = sites_of(robot)
-    return _shaped(robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres)
+    given = (robot.tube, robot.notches, sites_of(robot), robot.tendon, level, refinement, chord)
+    if flexures is None:
+        return _kept_shape(*given, fibres)
+    return _shaped(*given, fibres, flexures)
 
 
-# A search for constants of the material or of friction assembles one shape hundreds of times.
-@lru_cache(maxsize=64)
 def _shaped(
     tube: Tube,
     notches: tuple[Notch, ...],
@@ -168,11 +184,12 @@ def _shaped(
     refinement: int,
     turns_with_chord: bool,
     by_fibres: bool,
+    flexures: FlexureOf,
 ) -> Shaped:
     # Notches that are alike are worked out once.
     placed = tuple(zip(notches, sites, strict=True))
     different = dict.fromkeys(placed)
-    unlike = {each: _flexure(*each, tube, level, refinement, by_fibres) for each in different}
+    unlike = {each: flexures(*each, tube, level, refinement, by_fibres) for each in different}
     own_rods, free_poses = zip(*unlike.values(), strict=True)
     alike = stack(own_rods)
     number = {each: index for index, each in enumerate(unlike)}
@@ -202,14 +219,8 @@ def _shaped(
     )
 
 
-@lru_cache(maxsize=512)
-def _flexure(
-    notch: Notch, site: Site | None, tube: Tube, level: str, refinement: int, by_fibres: bool
-) -> tuple[Rod, Motion]:
-    """A flexure and its pose in the free robot."""
-    made = with_level(rod_at(site, notch, tube, refinement), level)
-    made = with_fibres(made, notch, tube) if by_fibres else made
-    return made, free_pose(made)
+# A search for constants of the material or of friction assembles one shape hundreds of times.
+_kept_shape = lru_cache(maxsize=64)(partial(_shaped, flexures=flexure))
 
 
 def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:

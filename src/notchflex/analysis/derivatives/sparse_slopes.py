@@ -1,0 +1,154 @@
+"""Slopes of one vector by several numbers: a sparse Jacobian by compressed differences.
+
+A dimension of a notch changes what belongs to that notch, and little beside it. Numbers that change
+different entries of the vector are moved together, and each takes the slopes of its own entries
+(Curtis, Powell & Reid 1974, J. Inst. Maths Applics 13:117). Which entries a number changes is
+observed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
+
+from notchflex.analysis.derivatives.numbers import differences, slope, width_at
+from notchflex.errors import InputError
+
+# Changes that rounding makes, of the largest number of a part.
+_ROUNDING = 1e-13
+
+Vector = Callable[[Float[np.ndarray, " k"]], Float[np.ndarray, " m"]]
+
+
+@dataclass(frozen=True, eq=False)
+class SparseSlopes:
+    """Slopes by k numbers, with what is known of which entries each of them changes.
+
+    Attributes:
+        order: Order of accuracy, as for `slope`.
+        parts: Entries that belong together and are of one size.
+        derived: Entries that follow from others and count as constant: to averages over all notches
+            every number contributes.
+    """
+
+    order: int
+    parts: Sequence[Int[np.ndarray, "..."]]
+    derived: Int[np.ndarray, " d"]
+
+    def at(
+        self, vector_of: Vector, at: Float[np.ndarray, " k"], form: bytes = b""
+    ) -> list[Float[np.ndarray, " m"]]:
+        """Differentiate.
+
+        Args:
+            vector_of: The vector of k numbers, m finite or infinite entries.
+            at: Where.
+            form: Distinguishes vectors in which numbers change other entries.
+
+        Returns:
+            The slopes by each number, as `slope` finds them.
+
+        Raises:
+            InputError: A number cannot be varied.
+        """
+        if form not in self._changed:
+            self._changed[form] = self._observed(vector_of, at)
+        found = self._compressed(vector_of, at, self._changed[form])
+        if found is None:  # a number changes more than it did where it was observed
+            self._changed[form] |= self._observed(vector_of, at)
+            found = self._compressed(vector_of, at, self._changed[form])
+        if found is None:
+            return [self._alone(vector_of, at, number) for number in range(len(at))]
+        return found
+
+    @cached_property
+    def _changed(self) -> dict[bytes, Bool[np.ndarray, "k m"]]:
+        return {}
+
+    def _observed(self, vector_of: Vector, at: Float[np.ndarray, " k"]) -> Bool[np.ndarray, "k m"]:
+        """Which entries each number changes."""
+        here, width = vector_of(at), width_at(at, self.order)
+        changed = np.empty((len(at), len(here)), bool)
+        for number in range(len(at)):
+            try:
+                moved = vector_of(_with(at, number, at[number] + width[number]))
+            except InputError:  # at the end of its range
+                moved = vector_of(_with(at, number, at[number] - width[number]))
+            with np.errstate(invalid="ignore"):
+                changed[number] = self._differs(moved - here, here)
+        changed[:, self.derived] = False
+        return changed
+
+    def _differs(
+        self, change: Float[np.ndarray, " m"], values: Float[np.ndarray, " m"]
+    ) -> Bool[np.ndarray, " m"]:
+        """Which entries change by more than rounding; NaN, between infinite ones, counts as none."""
+        differs = np.zeros(len(change), bool)
+        for part in self.parts:
+            finite = np.abs(values[part])
+            size = np.max(finite, where=np.isfinite(finite), initial=0.0)
+            differs[part] = np.abs(change[part]) > _ROUNDING * size
+        return differs
+
+    def _compressed(
+        self, vector_of: Vector, at: Float[np.ndarray, " k"], changed: Bool[np.ndarray, "k m"]
+    ) -> list[Float[np.ndarray, " m"]] | None:
+        """Slopes of numbers that are moved together; None where something else changes too."""
+        found, here = [np.zeros(0)] * len(at), vector_of(at)
+        for group in _groups(changed):
+            try:
+                together = differences(
+                    lambda values, group=group: vector_of(_with(at, group, values)),
+                    at[group],
+                    self.order,
+                )
+            except InputError:  # one is at the lower end of its range, one perhaps at the upper
+                for number in group:
+                    found[number] = self._alone(vector_of, at, number)
+                continue
+            together[self.derived] = 0.0
+            if np.any(self._differs(together, here) & ~changed[group].any(axis=0)):
+                return None
+            for number in group:
+                own = np.where(changed[number], together, 0.0)
+                found[number] = own / width_at(at[number], self.order)
+        return found
+
+    def _alone(
+        self, vector_of: Vector, at: Float[np.ndarray, " k"], number: int
+    ) -> Float[np.ndarray, " m"]:
+        by = slope(lambda value: vector_of(_with(at, number, value)), at[number], order=self.order)
+        by[self.derived] = 0.0
+        return by
+
+
+def _with(at: Float[np.ndarray, " k"], numbers: Any, values: ArrayLike) -> np.ndarray:
+    """Numbers of which some have other values."""
+    moved = np.array(at)
+    moved[numbers] = values
+    return moved
+
+
+def _groups(changed: Bool[np.ndarray, "k m"]) -> list[list[int]]:
+    """Numbers that change no entry in common, each number in one group."""
+    groups: list[list[int]] = []
+    taken: list[np.ndarray] = []
+    for number, own in enumerate(changed):
+        for group, every in zip(groups, taken, strict=True):
+            if not np.any(every & own):
+                group.append(number)
+                every |= own
+                break
+        else:
+            groups.append([number])
+            taken.append(own.copy())
+    return groups
+
+
+__all__ = ["SparseSlopes"]
