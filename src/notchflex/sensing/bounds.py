@@ -14,9 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
+from notchflex.sensing.candidates import Known, ReadingProblem
 from notchflex.sensing.history import History, Progress, whitening_of
 from notchflex.sensing.own_reading import OwnReading
-from notchflex.sensing.search import ReadingProblem, bad_fit, best, best_of_all, extreme
+from notchflex.sensing.search import bad_fit, best, best_of_all, extreme
 from notchflex.solver.solver_state import SolverState
 
 
@@ -91,15 +92,18 @@ def _add(
     before, size = trackers[0].state, history.model.size
     forces: list[np.ndarray] = []
     worse: list[float] = []
+    solved = _SolvedFrom()
     for tracker in trackers:
         # The noise of the readings before is in the covariance for the best history, and for the
         # others in what they are.
         covariance = history.covariance if tracker.direction is None else history.alone
         white = whitening_of(covariance[number] + reading.extra)
-        problem = ReadingProblem(model, reading.step, tracker.state, white)
+        problem = ReadingProblem(
+            model, reading.step, tracker.state, white, solved.known(tracker.state)
+        )
         at = best_of_all(problem, np.stack([tracker.force, found.force]))
         if bad_fit(at):  # no force makes this history fit: it was none, the best goes on
-            problem = replace(problem, start=before)
+            problem = replace(problem, start=before, known=solved.known(before))
             at = best(problem, found.force[None])
         if tracker is trackers[0]:
             # What noise does not explain of its distance from the mean is a change of the force.
@@ -127,3 +131,19 @@ class _Tracker:
     state: SolverState | None
     force: Float[np.ndarray, " d"]
     direction: Float[np.ndarray, " d"] | None
+
+
+class _SolvedFrom:
+    """What was solved in one reading, by the state that it began at: histories may share one."""
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._known: list[tuple[SolverState | None, Known]] = []
+
+    def known(self, state: SolverState | None) -> Known:
+        """Return what was solved from a state."""
+        for one, known in self._known:
+            if one is state:
+                return known
+        self._known.append((state, {}))
+        return self._known[-1][1]

@@ -14,8 +14,9 @@ from jaxtyping import Float
 
 from notchflex.analysis.derivatives.tangent import Change, PathTangents
 from notchflex.results.path import EquilibriumPath
+from notchflex.sensing.candidates import Candidate, ReadingProblem
 from notchflex.sensing.model import SensingModel, Step
-from notchflex.sensing.search import Candidate, ReadingProblem, best, best_of_all
+from notchflex.sensing.search import best, best_of_all
 from notchflex.solver.solver_state import SolverState
 
 Progress = Callable[[int, int], None]
@@ -79,7 +80,7 @@ def _estimate_one(
     if not len(step.entries):
         return step, at
     if np.isfinite(at.misfit):
-        drives = model.slopes(at.alone, of_drives=True)[0][step.entries]
+        drives = model.slopes(at.solved.alone, of_drives=True)[0][step.entries]
         noise = np.diag(step.variance) + (np.nan_to_num(drives) * step.driving) @ drives.T
         problem = replace(problem, whitening=whitening_of(noise))
         at = best(problem, at.force[None])

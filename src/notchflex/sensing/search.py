@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.results.path import EquilibriumPath
-from notchflex.sensing.model import SensingModel, Step
-from notchflex.solver.programs.run import SolverRun
-from notchflex.solver.solver_state import SolverState
+from notchflex.sensing.candidates import Candidate, ReadingProblem
 
 # Lengths that are tried of a step: of what slopes promise, and where that fails of any.
 _WHOLE = np.array([1.0])
@@ -19,6 +16,8 @@ _NEAR = np.array([1.02, 1.0, 0.98, 0.9])
 _REACH = np.array([2.0, 1.4, 1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001])
 _BETWEEN = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 _MOST_STEPS, _MOST_REACHES, _MOST_HALVINGS = 20, 16, 6
+# So many forces are solved at once.
+_TOGETHER = 3
 # A fit that misses the readings by more than this, in squares of the noise for each number that
 # was read, is tried again from all over the range.
 _BAD_FIT, _STARTS = 12.0, 9
@@ -26,101 +25,10 @@ _BAD_FIT, _STARTS = 12.0, 9
 _GOOD_GAIN = 0.5
 # The search ends where the misfit falls, or an extreme moves, by less than these parts.
 _SMALL_GAIN, _SMALL_MOVE = 1e-9, 1e-3
-# Ends of an interval are found to this part of the range.
-_NARROW = 1e-7
+# Ends of an interval are found to the first part of the range; a step below the second is none.
+_NARROW, _NO_MOVE = 1e-7, 1e-9
 # A force far outside the range, by which nothing is measured, weighs this little against readings.
 _WEAK = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A force for one reading and how it fits.
-
-    Attributes:
-        force: Components, N, (d,).
-        misfit: Sum of squares of the whitened deviations.
-        deviations: Measured minus computed, whitened, (m,).
-        path: The solved state in a path of candidates.
-        row: Which of them it is.
-    """
-
-    force: Float[np.ndarray, " d"]
-    misfit: float
-    deviations: Float[np.ndarray, " m"]
-    path: EquilibriumPath
-    row: int
-
-    @property
-    def state(self) -> SolverState:
-        """The solved state, to go on from."""
-        return self.path.prepared.state.unpack(self.run.states[self.row])
-
-    @property
-    def alone(self) -> EquilibriumPath:
-        """The path of this candidate alone, for its derivatives."""
-        if len(self.path) == 1:
-            return self.path
-        return replace(
-            self.path, load=self.path.load.part(self.row, 1), run=self.run.only(self.row)
-        )
-
-    @property
-    def run(self) -> SolverRun:
-        """How the candidates were solved."""
-        run = self.path.run
-        assert isinstance(run, SolverRun)
-        return run
-
-
-@dataclass(frozen=True, eq=False)
-class ReadingProblem:
-    """What a force must meet in one reading, from the state after the reading before.
-
-    Attributes:
-        model: The robot.
-        step: The reading.
-        start: The state before; None for rest.
-        whitening: Matrix that makes the deviations independent of unit variance, (m, m).
-    """
-
-    model: SensingModel
-    step: Step
-    start: SolverState | None
-    whitening: Float[np.ndarray, "m m"]
-
-    def candidates(self, forces: Float[np.ndarray, "k d"]) -> list[Candidate]:
-        """Solve some forces; the misfit is infinite where it does not converge."""
-        path = self.model.solve(self.start, self.step.number, forces)
-        computed = self.model.values(path)[:, self.step.entries]
-        deviations = (self.step.measured - computed) @ self.whitening.T
-        misfit = np.where(path.converged, (deviations**2).sum(1), np.inf)
-        misfit = np.where(np.isnan(misfit), np.inf, misfit)
-        rows = zip(forces, misfit.tolist(), deviations, strict=True)
-        return [Candidate(*row, path, number) for number, row in enumerate(rows)]
-
-    def slopes(self, at: Candidate) -> Float[np.ndarray, "m d"]:
-        """Return the change of what is read by the force, whitened.
-
-        Where a state was so hard to reach that its derivatives are not known, by differences.
-        """
-        change = self.model.slopes(at.alone)[0][self.step.entries]
-        if not np.isfinite(change).all():
-            change = self._differences(at)
-        return self.whitening @ change
-
-    def _differences(self, at: Candidate) -> Float[np.ndarray, "m d"]:
-        width = 1e-5 * self.model.largest
-        moves = width * np.eye(self.model.size)
-        path = self.model.solve(
-            self.start, self.step.number, np.concatenate([at.force + moves, at.force - moves])
-        )
-        values = self.model.values(path)[:, self.step.entries]
-        half = len(moves)
-        return np.nan_to_num((values[:half] - values[half:]).T / (2.0 * width))
-
-    def clipped(self, forces: Float[np.ndarray, "k d"]) -> Float[np.ndarray, "k d"]:
-        """Return forces within the range of the search."""
-        return np.clip(forces, -self.model.largest, self.model.largest)
 
 
 def best(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate:
@@ -140,6 +48,8 @@ def best(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate
         step = np.linalg.solve(normal, slopes.T @ at.deviations)
         size = np.abs(step).max()
         step *= min(1.0, 0.5 * problem.model.largest / max(size, 1e-300))
+        if size <= _NO_MOVE * problem.model.largest:
+            break
         promised = at.misfit - ((at.deviations - slopes @ step) ** 2).sum()
         new = at
         for lengths in (_WHOLE, _FULL):
@@ -236,12 +146,21 @@ def _farthest(
     direction: Float[np.ndarray, " d"],
     most: float,
 ) -> tuple[Candidate, Float[np.ndarray, " d"] | None]:
-    """Return the farthest of some forces that fits, and the next beyond it, which does not."""
-    candidates = problem.candidates(problem.clipped(forces))
-    fitting = [one for one in candidates if one.misfit <= most]
-    ahead = max([at, *fitting], key=lambda one: float(direction @ one.force))
-    past = [one.force for one in candidates if direction @ one.force > direction @ ahead.force]
-    return ahead, min(past, key=lambda one: float(direction @ one), default=None)
+    """Return the farthest of some forces that fits, and the next beyond it, which does not.
+
+    The farthest are tried first, so that those nearer than one that fits need not be solved.
+    """
+    forces = problem.clipped(forces)
+    order = np.argsort(-(forces @ direction), kind="stable")
+    ahead, beyond = at, []
+    for first in range(0, len(order), _TOGETHER):
+        some = problem.candidates(forces[order[first : first + _TOGETHER]])
+        fitting = [one for one in some if one.misfit <= most]
+        ahead = max([ahead, *fitting], key=lambda one: float(direction @ one.force))
+        beyond += [one.force for one in some if direction @ one.force > direction @ ahead.force]
+        if ahead is not at:
+            break
+    return ahead, min(beyond, key=lambda one: float(direction @ one), default=None)
 
 
 def _step_along(
@@ -261,4 +180,4 @@ def _step_along(
     return move * min(1.0, 2.0 * problem.model.largest / max(size, 1e-300))
 
 
-__all__ = ["Candidate", "Extreme", "ReadingProblem", "bad_fit", "best", "best_of_all", "extreme"]
+__all__ = ["Extreme", "bad_fit", "best", "best_of_all", "extreme"]
