@@ -87,7 +87,7 @@ def refine(
             numbers = _stepped(model, numbers, jacobian, edges.offset, weighed)
             continue
         early = number < _EARLY
-        weighed = _weighed(lines, edges.offset, None if early else len(numbers))
+        weighed = _weighed(lines, edges, None if early else len(numbers))
         numbers = _stepped(model, numbers, jacobian, edges.offset, weighed)
         if not early and np.abs((numbers - before) / _scales(model, numbers)).max() < _DONE:
             break
@@ -113,16 +113,16 @@ def _quick(offset: Numbers, robust: float) -> _Weighed:
     return _Weighed(weight / _EDGE**2, np.zeros((len(offset), 0)), np.zeros(0))
 
 
-def _weighed(lines: Lines, offset: Numbers, fitted: int | None) -> _Weighed:
+def _weighed(lines: Lines, edges: Edges, fitted: int | None) -> _Weighed:
     """Weigh edges by their distance from their line, and lines by their distance from others."""
-    noise = 0.3
-    errors, left = lines.errors(offset, _ROBUST * noise)
+    noise, strength = 0.3, edges.strength
+    errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
     for _ in range(2):
         noise = max(1.4826 * float(np.nanmedian(np.abs(left))), _LEAST_NOISE)
-        errors, left = lines.errors(offset, _ROBUST * noise)
-    weight = 1.0 / (1.0 + (np.nan_to_num(left) / (_ROBUST * noise)) ** 2) / noise**2
+        errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
+    weight = strength**2 / (1.0 + (np.nan_to_num(left) / (_ROBUST * noise)) ** 2) / noise**2
     weight = np.where(np.isfinite(left), weight, 0.0)
-    return _Weighed(weight, lines.columns(), lines.spreads(errors, fitted))
+    return _Weighed(weight, lines.columns(), lines.spreads(errors, fitted, strength))
 
 
 def _stepped(
@@ -227,7 +227,7 @@ def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], floa
 
     Errors of lines are among the unknowns (`lines.py`): edges beside each other err alike.
     """
-    weighed = _weighed(lines_of(model), fit.residual, len(fit.numbers))
+    weighed = _weighed(lines_of(model), fit.edges, len(fit.numbers))
     normal, _ = _normal(model, fit.numbers, fit.jacobian, fit.residual, weighed)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal * scale[:, None] * scale, hermitian=True)

@@ -23,6 +23,7 @@ _LEAST_SPREAD, _MOST_SPREAD = (0.06, 0.04), 2.0  # px
 _LEAST_POINTS = 5
 _ROBUST = 2.5  # spreads: lines farther off count less
 _ROUNDS = 4
+_STRONG, _POWER = 0.9, 0.0
 
 
 class Lines(NamedTuple):
@@ -49,12 +50,15 @@ class Lines(NamedTuple):
         made[:, -1] = 1.0
         return made
 
-    def errors(self, offset: Numbers, robust: float) -> tuple[Numbers, Numbers]:
+    def errors(
+        self, offset: Numbers, robust: float, strength: Numbers | float = 1.0
+    ) -> tuple[Numbers, Numbers]:
         """Fit a shift and a turn to each line, by reweighted least squares.
 
         Args:
             offset: Distance of each edge from the outline, px, (N,); NaN if there is none.
             robust: Distance from the line beyond which an edge counts less, px.
+            strength: Strengths of the edges (`Edges`), by whose square they count, (N,).
 
         Returns:
             Shift and turn, px, (number, 2), NaN for lines of few edges; offsets less these, (N,).
@@ -71,7 +75,7 @@ class Lines(NamedTuple):
         shift[:] = [np.median(one) if len(one) else 0.0 for one in starts]
         left = value - shift[self.which]
         for _ in range(_ROUNDS):
-            weight = seen / (1.0 + (left / robust) ** 2)
+            weight = seen * strength**2 / (1.0 + (left / robust) ** 2)
             w, wx = total(weight), total(weight * place)
             wxx = total(weight * place**2) + 1e-9
             wy, wxy = total(weight * value), total(weight * place * value)
@@ -83,13 +87,14 @@ class Lines(NamedTuple):
         both[~enough] = np.nan
         return both, np.where(seen, left, np.nan)
 
-    def spreads(self, errors: Numbers, fitted: int | None) -> Numbers:
+    def spreads(self, errors: Numbers, fitted: int | None, strength: Numbers) -> Numbers:
         """Return the spreads of all columns, px, (m,).
 
         Args:
             errors: Shifts and turns of the lines, (number, 2).
             fitted: How many unknowns were fitted to the lines, which makes their errors look
                 small; None in first rounds, whose errors say little about the lines.
+            strength: Strengths of the edges, (N,): what shifts weak edges shifts them farther.
         """
         known = errors[np.isfinite(errors[:, 0])]
         own = errors - np.array([np.median(known[:, 0]) if len(known) else 0.0, 0.0])
@@ -99,6 +104,9 @@ class Lines(NamedTuple):
             typical = 1.4826 * np.nanmedian(np.abs(own), axis=0) / np.sqrt(freedom)
             typical = np.clip(np.nan_to_num(typical, nan=_MOST_SPREAD), _LEAST_SPREAD, _MOST_SPREAD)
         far = np.nan_to_num(np.abs(own), nan=_MOST_SPREAD)
+        strong = np.maximum(np.bincount(self.which, strength, self.number), 1e-9)
+        strong /= np.maximum(np.bincount(self.which, strength > 0.0, self.number), 1.0)
+        typical = typical * np.maximum(1.0, _STRONG / strong)[:, None] ** _POWER
         spread = np.hypot(typical, far / _ROBUST)
         return np.concatenate([spread[:, 0], spread[:, 1], [self.shift]])
 

@@ -26,6 +26,8 @@ _LAST_REACHES = [5.0, 5.0] + 10 * [4.0]
 _KEPT = 4
 _WORSE = 0.1  # by how much the cost of a fit may be higher than the best and be looked into
 _TILT = 0.06
+_VIEWS = np.radians([[0.0, 6.0], [0.0, -6.0], [8.0, 0.0], [-8.0, 0.0]])
+"""Roll and tilt by which the view of the best fit is turned: fits end in the wrong one at times."""
 EDGE_NOISE = 0.08
 """No edge is known better, px."""
 
@@ -74,9 +76,15 @@ def locate(
     contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
     model = OutlineModel(table, base=BASE * table.outer, known=known)
     fits = _fine(model, contrast, middle, [_scaled(numbers, fine) for numbers in coarse])
+    if all(missing(model, fit) for fit in fits):
+        near = min(fits, key=lambda fit: cost(fit, model))
+        fits += _slipped(model, contrast, near, middle)
     whole = [fit for fit in fits if not missing(model, fit)] or fits
     first = min(whole, key=lambda fit: cost(fit, model))
     noise = max(EDGE_NOISE, covariance(first, model)[1])
+    best = min(whole, key=lambda fit: misfit(fit, model, noise))
+    turned = _turned(model, contrast, best, middle)
+    whole += [fit for fit in turned if not missing(model, fit)]
     misfits = [misfit(fit, model, noise) for fit in whole]
     least = min(misfits)
     best = whole[misfits.index(least)]
@@ -85,6 +93,31 @@ def locate(
         for one, fit in zip(misfits, whole, strict=True)
     ]
     return Located(best, model, tuple(rivals), fine)
+
+
+def _turned(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) -> list[Fit]:
+    """Fit again from views that are turned a little."""
+    views = fit.numbers + np.zeros((len(_VIEWS), 1))
+    views[:, 4:6] += _VIEWS
+    return [refine(model, contrast, one, _LAST_REACHES, middle, NEAR) for one in views]
+
+
+def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) -> list[Fit]:
+    """Fit again from chains that lie one pitch nearer to the tip, and to the base.
+
+    Where a ring looks like the background, a fit may end a ring beside its place.
+    """
+    points = axis_points(model.table, fit.numbers)
+    ahead = np.vstack([points[1:], 2.0 * points[-1] - points[-2]])
+    behind = np.vstack([2.0 * points[:1] - points[1:2], points[:-1]])
+    side = math.cos(fit.numbers[4])
+    found = []
+    for chain in (ahead, behind):
+        for numbers in on_axis_points(model.table, chain):
+            if math.cos(numbers[4]) * side > 0.0:
+                reaches = [*_FINE_REACHES, *_LAST_REACHES]
+                found.append(refine(model, contrast, numbers, reaches, middle, NEAR))
+    return found
 
 
 def _fine(
