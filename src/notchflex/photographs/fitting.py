@@ -122,7 +122,7 @@ def _weighed(lines: Lines, edges: Edges, fitted: int | None) -> _Weighed:
         errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
     weight = strength**2 / (1.0 + (np.nan_to_num(left) / (_ROBUST * noise)) ** 2) / noise**2
     weight = np.where(np.isfinite(left), weight, 0.0)
-    return _Weighed(weight, lines.columns(), lines.spreads(errors, fitted, strength))
+    return _Weighed(weight, lines.columns(), lines.spreads(errors, fitted))
 
 
 def _stepped(

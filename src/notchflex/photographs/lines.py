@@ -23,7 +23,6 @@ _LEAST_SPREAD, _MOST_SPREAD = (0.06, 0.04), 2.0  # px
 _LEAST_POINTS = 5
 _ROBUST = 2.5  # spreads: lines farther off count less
 _ROUNDS = 4
-_STRONG, _POWER = 0.9, 0.0
 
 
 class Lines(NamedTuple):
@@ -87,14 +86,13 @@ class Lines(NamedTuple):
         both[~enough] = np.nan
         return both, np.where(seen, left, np.nan)
 
-    def spreads(self, errors: Numbers, fitted: int | None, strength: Numbers) -> Numbers:
+    def spreads(self, errors: Numbers, fitted: int | None) -> Numbers:
         """Return the spreads of all columns, px, (m,).
 
         Args:
             errors: Shifts and turns of the lines, (number, 2).
             fitted: How many unknowns were fitted to the lines, which makes their errors look
                 small; None in first rounds, whose errors say little about the lines.
-            strength: Strengths of the edges, (N,): what shifts weak edges shifts them farther.
         """
         known = errors[np.isfinite(errors[:, 0])]
         own = errors - np.array([np.median(known[:, 0]) if len(known) else 0.0, 0.0])
@@ -104,9 +102,6 @@ class Lines(NamedTuple):
             typical = 1.4826 * np.nanmedian(np.abs(own), axis=0) / np.sqrt(freedom)
             typical = np.clip(np.nan_to_num(typical, nan=_MOST_SPREAD), _LEAST_SPREAD, _MOST_SPREAD)
         far = np.nan_to_num(np.abs(own), nan=_MOST_SPREAD)
-        strong = np.maximum(np.bincount(self.which, strength, self.number), 1e-9)
-        strong /= np.maximum(np.bincount(self.which, strength > 0.0, self.number), 1.0)
-        typical = typical * np.maximum(1.0, _STRONG / strong)[:, None] ** _POWER
         spread = np.hypot(typical, far / _ROBUST)
         return np.concatenate([spread[:, 0], spread[:, 1], [self.shift]])
 
