@@ -13,8 +13,9 @@ from notchflex.photographs.contrast import Contrast
 STEP = 0.5
 """Distance of samples along a normal, px."""
 
-_BESIDE = 3.0  # how far out the background is looked at, px
+_BESIDE = 5.0  # how far out the background is looked at, px
 _BLURRED = 0.35  # contrast outside over that inside: what blur leaves of a sharp edge
+_USUAL = 70.0  # percentile of the rises that is called usual
 _LEAST_ROOM = 5.0  # gaps that are narrower show no background, px
 
 
@@ -24,10 +25,12 @@ class Edges(NamedTuple):
     Attributes:
         offset: Distance of each edge from the predicted point, outward, px, (N,); NaN if none.
         looked: Whether an edge should be seen there, (N,).
+        strength: How steep the contrast rises there, over that of most edges, 1 at most, (N,).
     """
 
     offset: Numbers
     looked: NDArray[np.bool_]
+    strength: Numbers
 
 
 def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbers) -> Edges:
@@ -78,4 +81,11 @@ def find_edges(contrast: Contrast, outline: Outline, reach: float, middle: Numbe
     bend = before - 2.0 * here + after
     shift = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, -1.0), 0.0)
     offset = place[best] + np.clip(shift, -1.0, 1.0) * STEP
-    return Edges(np.where(found, offset, np.nan), looked)
+    return Edges(np.where(found, offset, np.nan), looked, _strength(here, found))
+
+
+def _strength(rise: Numbers, found: NDArray[np.bool_]) -> Numbers:
+    if not found.any():
+        return np.zeros(len(rise))
+    usual = max(float(np.percentile(rise[found], _USUAL)), 1e-9)
+    return np.where(found, np.clip(rise / usual, 0.0, 1.0), 0.0)

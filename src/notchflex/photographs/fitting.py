@@ -77,23 +77,22 @@ def refine(
     """
     lines = lines_of(model)
     for number, reach in enumerate(reaches):
-        outline = model.outline(numbers)
+        outline, jacobian = _outline(model, numbers)
         edges = find_edges(contrast, outline, reach, middle)
         if np.count_nonzero(np.isfinite(edges.offset)) < 2 * len(numbers):
             break
         before = numbers
         if quick:
             weighed = _quick(edges.offset, 0.25 * reach)
-            numbers = _stepped(model, numbers, outline, edges.offset, weighed)
+            numbers = _stepped(model, numbers, jacobian, edges.offset, weighed)
             continue
         early = number < _EARLY
-        weighed = _weighed(lines, edges.offset, None if early else len(numbers))
-        numbers = _stepped(model, numbers, outline, edges.offset, weighed)
+        weighed = _weighed(lines, edges, None if early else len(numbers))
+        numbers = _stepped(model, numbers, jacobian, edges.offset, weighed)
         if not early and np.abs((numbers - before) / _scales(model, numbers)).max() < _DONE:
             break
-    outline = model.outline(numbers)
+    outline, jacobian = _outline(model, numbers)
     edges = find_edges(contrast, outline, max(reaches[-1], 3.0), middle)
-    jacobian = _jacobian(model, numbers, outline.normal)
     good = np.abs(edges.offset) < near
     score = float(good[edges.looked].sum() / max(1, len(good) // 2, edges.looked.sum()))
     return Fit(numbers, outline, edges, jacobian, edges.offset, score)
@@ -114,24 +113,23 @@ def _quick(offset: Numbers, robust: float) -> _Weighed:
     return _Weighed(weight / _EDGE**2, np.zeros((len(offset), 0)), np.zeros(0))
 
 
-def _weighed(lines: Lines, offset: Numbers, fitted: int | None) -> _Weighed:
+def _weighed(lines: Lines, edges: Edges, fitted: int | None) -> _Weighed:
     """Weigh edges by their distance from their line, and lines by their distance from others."""
-    noise = 0.3
-    errors, left = lines.errors(offset, _ROBUST * noise)
+    noise, strength = 0.3, edges.strength
+    errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
     for _ in range(2):
         noise = max(1.4826 * float(np.nanmedian(np.abs(left))), _LEAST_NOISE)
-        errors, left = lines.errors(offset, _ROBUST * noise)
-    weight = 1.0 / (1.0 + (np.nan_to_num(left) / (_ROBUST * noise)) ** 2) / noise**2
+        errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
+    weight = strength**2 / (1.0 + (np.nan_to_num(left) / (_ROBUST * noise)) ** 2) / noise**2
     weight = np.where(np.isfinite(left), weight, 0.0)
     return _Weighed(weight, lines.columns(), lines.spreads(errors, fitted))
 
 
 def _stepped(
-    model: OutlineModel, numbers: Numbers, outline: Outline, offset: Numbers, weighed: _Weighed
+    model: OutlineModel, numbers: Numbers, jacobian: Numbers, offset: Numbers, weighed: _Weighed
 ) -> Numbers:
     """Take one damped Gauss-Newton step within the bounds."""
     count = len(numbers)
-    jacobian = _jacobian(model, numbers, outline.normal)
     normal, pull = _normal(model, numbers, jacobian, offset, weighed)
     scales = np.append(_scales(model, numbers), np.ones(len(weighed.spreads)))
     normal = normal * scales[:, None] * scales
@@ -216,12 +214,12 @@ def _scales(model: OutlineModel, numbers: Numbers) -> Numbers:
     return np.array([*view, *[0.01] * model.table.notches, *[1.0 / scale] * own])
 
 
-def _jacobian(model: OutlineModel, numbers: Numbers, normal: Numbers) -> Numbers:
-    """Return derivatives of where the outline lies along fixed normals, (N, numbers)."""
+def _outline(model: OutlineModel, numbers: Numbers) -> tuple[Outline, Numbers]:
+    """Return the outline and its derivatives along its normals, (N, numbers)."""
     steps = np.concatenate([_STEPS, np.full(len(numbers) - NUMBERS, 1e-4)])
-    both = np.vstack([numbers, numbers + np.diag(steps)])
-    seen = np.einsum("bnk,nk->bn", model.outline(both).point, normal)
-    return ((seen[1:] - seen[0]) / steps[:, None]).T
+    outline = model.outline(np.vstack([numbers, numbers + np.diag(steps)]))
+    seen = np.einsum("bnk,nk->bn", outline.point, outline.normal)
+    return outline, ((seen[1:] - seen[0]) / steps[:, None]).T
 
 
 def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], float]:
@@ -229,7 +227,7 @@ def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], floa
 
     Errors of lines are among the unknowns (`lines.py`): edges beside each other err alike.
     """
-    weighed = _weighed(lines_of(model), fit.residual, len(fit.numbers))
+    weighed = _weighed(lines_of(model), fit.edges, len(fit.numbers))
     normal, _ = _normal(model, fit.numbers, fit.jacobian, fit.residual, weighed)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal * scale[:, None] * scale, hermitian=True)

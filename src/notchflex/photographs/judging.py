@@ -15,7 +15,10 @@ LEAST_WIDTH = 25.0
 """Width of the tube below which angles are not measured, px."""
 
 MOST_SPREAD = math.radians(0.5)
-"""Standard deviation of an angle beyond which it is not reported, rad."""
+"""Standard deviation of one angle beyond which none is reported, rad."""
+
+UNCERTAINTY = math.radians(0.11)
+"""Root mean square of the standard deviations beyond which no angles are reported, rad."""
 
 _MOST_NOISE = 1.0
 _RIVAL = 12.0  # by how much the misfit of another shape must be larger
@@ -23,13 +26,14 @@ _OTHER = math.radians(0.7)  # by how much the angles of another shape differ
 _MADE = 0.04  # of the outer diameter: how far notches may differ from the robot file
 
 
-def doubt(located: Located, deviation: Numbers, noise: float) -> str:
+def doubt(located: Located, deviation: Numbers, noise: float, uncertainty: float = math.inf) -> str:
     """Return why angles are not reported; "" if nothing speaks against them.
 
     Args:
         located: The best fit.
         deviation: Standard deviations of its angles, rad.
         noise: Robust spread of its edges, px.
+        uncertainty: Root mean square of the deviations that is allowed, rad.
     """
     # Where parts are missing, view and cut are those of something else.
     reasons = (
@@ -37,6 +41,7 @@ def doubt(located: Located, deviation: Numbers, noise: float) -> str:
         missing(located.model, located.fit),
         _of_view(located),
         _of_spread(located, deviation, noise),
+        _of_uncertainty(deviation, uncertainty),
     )
     return next((reason for reason in reasons if reason), "")
 
@@ -81,3 +86,14 @@ def _of_spread(located: Located, deviation: Numbers, noise: float) -> str:
                 f"{math.degrees(differs):.1f} deg"
             )
     return ""
+
+
+def _of_uncertainty(deviation: Numbers, most: float) -> str:
+    mean = float(np.sqrt((deviation**2).mean()))
+    if mean <= most:
+        return ""
+    return (
+        f"the angles are uncertain by {math.degrees(mean):.2f} deg (standard deviations, root mean "
+        f"square), and {math.degrees(most):g} deg are allowed; go nearer, take it sharper and in "
+        "even light, or allow more"
+    )

@@ -49,12 +49,15 @@ class Lines(NamedTuple):
         made[:, -1] = 1.0
         return made
 
-    def errors(self, offset: Numbers, robust: float) -> tuple[Numbers, Numbers]:
+    def errors(
+        self, offset: Numbers, robust: float, strength: Numbers | float = 1.0
+    ) -> tuple[Numbers, Numbers]:
         """Fit a shift and a turn to each line, by reweighted least squares.
 
         Args:
             offset: Distance of each edge from the outline, px, (N,); NaN if there is none.
             robust: Distance from the line beyond which an edge counts less, px.
+            strength: Strengths of the edges (`Edges`), by whose square they count, (N,).
 
         Returns:
             Shift and turn, px, (number, 2), NaN for lines of few edges; offsets less these, (N,).
@@ -71,7 +74,7 @@ class Lines(NamedTuple):
         shift[:] = [np.median(one) if len(one) else 0.0 for one in starts]
         left = value - shift[self.which]
         for _ in range(_ROUNDS):
-            weight = seen / (1.0 + (left / robust) ** 2)
+            weight = seen * strength**2 / (1.0 + (left / robust) ** 2)
             w, wx = total(weight), total(weight * place)
             wxx = total(weight * place**2) + 1e-9
             wy, wxy = total(weight * value), total(weight * place * value)

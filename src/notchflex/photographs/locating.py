@@ -26,8 +26,13 @@ _LAST_REACHES = [5.0, 5.0] + 10 * [4.0]
 _KEPT = 4
 _WORSE = 0.1  # by how much the cost of a fit may be higher than the best and be looked into
 _TILT = 0.06
+_VIEWS = np.radians([[0.0, 6.0], [0.0, -6.0], [8.0, 0.0], [-8.0, 0.0]])
+"""Roll and tilt by which the view of the best fit is turned: fits end in the wrong one at times."""
 EDGE_NOISE = 0.08
 """No edge is known better, px."""
+
+_MOVES = 2
+"""So often chains are moved along themselves where parts of the robot are missing."""
 
 _SAME = math.radians(1.5)
 
@@ -74,9 +79,18 @@ def locate(
     contrast, middle = contrast.reduced(fine), (middle + 0.5) * fine - 0.5
     model = OutlineModel(table, base=BASE * table.outer, known=known)
     fits = _fine(model, contrast, middle, [_scaled(numbers, fine) for numbers in coarse])
+    latest = fits
+    for _ in range(_MOVES):
+        if all(missing(model, fit) for fit in fits):
+            near = min(latest, key=lambda fit: cost(fit, model))
+            latest = _slipped(model, contrast, near, middle)
+            fits += latest
     whole = [fit for fit in fits if not missing(model, fit)] or fits
     first = min(whole, key=lambda fit: cost(fit, model))
     noise = max(EDGE_NOISE, covariance(first, model)[1])
+    best = min(whole, key=lambda fit: misfit(fit, model, noise))
+    turned = _turned(model, contrast, best, middle)
+    whole += [fit for fit in turned if not missing(model, fit)]
     misfits = [misfit(fit, model, noise) for fit in whole]
     least = min(misfits)
     best = whole[misfits.index(least)]
@@ -85,6 +99,43 @@ def locate(
         for one, fit in zip(misfits, whole, strict=True)
     ]
     return Located(best, model, tuple(rivals), fine)
+
+
+def _turned(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) -> list[Fit]:
+    """Fit again from views that are turned a little."""
+    views = fit.numbers + np.zeros((len(_VIEWS), 1))
+    views[:, 4:6] += _VIEWS
+    return [refine(model, contrast, one, _LAST_REACHES, middle, NEAR) for one in views]
+
+
+def _slipped(model: OutlineModel, contrast: Contrast, fit: Fit, middle: Numbers) -> list[Fit]:
+    """Fit again from chains that lie one pitch nearer to the tip or the base, and the other way.
+
+    Where a ring looks like the background, a fit may end a ring beside its place, or at the base.
+    """
+    table, scale = model.table, math.exp(fit.numbers[3])
+    points, height = axis_points(table, fit.numbers), scale * float(table.height.mean())
+    pitch = scale * table.length / table.notches
+    side, found = math.cos(fit.numbers[4]), []
+    # The ends of bodies are their starts as seen from the tip, where notches lie on the other side.
+    for chain, way, hand in (
+        (points, pitch, side),
+        (points, -pitch, side),
+        (points[::-1], -height, -side),
+    ):
+        both = on_axis_points(table, _moved(chain, way))
+        numbers = next(one for one in both if hand * math.cos(one[4]) > 0.0)
+        quick = refine(model, contrast, numbers, _FINE_REACHES, middle, NEAR, quick=True)
+        found.append(refine(model, contrast, quick.numbers, _LAST_REACHES, middle, NEAR))
+    return found
+
+
+def _moved(points: Numbers, way: float) -> Numbers:
+    """Return points farther along their line, which goes on straight at both ends, px."""
+    ends = [2.0 * points[:1] - points[1:2], 2.0 * points[-1:] - points[-2:-1]]
+    line = np.vstack([ends[0], points, ends[1]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    return np.stack([np.interp(along[1:-1] + way, along, one) for one in line.T], axis=1)
 
 
 def _fine(

@@ -20,7 +20,7 @@ from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers, chain_table
 from notchflex.photographs.contrast import contrast
 from notchflex.photographs.fitting import covariance
-from notchflex.photographs.judging import doubt
+from notchflex.photographs.judging import UNCERTAINTY, doubt
 from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.missing import NEAR
@@ -42,6 +42,7 @@ def measure(
     exif: bool = False,
     scale: float | None = None,
     board: Board | None = None,
+    uncertainty_deg: float = math.degrees(UNCERTAINTY),
     progress: Callable[[str, int, int], None] | None = None,
 ) -> MeasuredPhotographs:
     """Measure the angle of every notch in photographs of a robot from the side.
@@ -62,6 +63,8 @@ def measure(
         scale: Pixels of the photographs per mm at the robot, known to 0.3 %.
         board: Board of markers beside the robot, in the plane in which it bends: it gives the
             scale and the tilt.
+        uncertainty_deg: Photographs whose standard deviations have a larger root mean square are
+            refused, deg.
         progress: Called with the stage, how many photographs are done, and how many there are.
 
     Returns:
@@ -81,13 +84,29 @@ def measure(
     if not names:
         raise InputError.NO_DATA("there is no photograph to measure; name one or more")
     table, ruler = chain_table(robot), Ruler(scale, board)
+    uncertainty = checked_uncertainty(uncertainty_deg)
     given = loads_of(names, robot, loads, pattern, exif)
     measured: list[MeasuredPhotograph] = []
     for number, name in enumerate(names):
-        measured.append(measure_picture(read_photograph(name), table, name, ruler))
+        picture = read_photograph(name)
+        measured.append(measure_picture(picture, table, name, ruler, uncertainty=uncertainty))
         if progress is not None:
             progress("measuring", number + 1, len(names))
     return MeasuredPhotographs(robot, tuple(measured), given)
+
+
+def checked_uncertainty(value: float) -> float:
+    """Return an uncertainty in rad that was given in deg.
+
+    Raises:
+        InputError: It is not a number above 0.
+    """
+    number: Any = value
+    if isinstance(number, bool) or not isinstance(number, (int, float, np.number)):
+        raise InputError.WRONG_TYPE(f"uncertainty_deg must be a number of deg, not {value!r}")
+    if not number > 0.0:
+        raise InputError.OUT_OF_RANGE(f"uncertainty_deg must be above 0 deg, not {value:g}")
+    return math.radians(number)
 
 
 # Of matrices this small, threads of the linear algebra only cost.
@@ -98,6 +117,7 @@ def measure_picture(
     name: str,
     ruler: Ruler = NO_RULER,
     chain: Numbers | None = None,
+    uncertainty: float = UNCERTAINTY,
 ) -> MeasuredPhotograph:
     """Measure a photograph that was read, (height, width, 3).
 
@@ -108,6 +128,7 @@ def measure_picture(
         ruler: What gives the scale.
         chain: Points of the tube axis from which the fit is started, px, (n + 2, 2), as in
             `MeasuredPhotograph.chain`; without them the robot is searched.
+        uncertainty: Largest root mean square of the standard deviations, rad.
 
     Raises:
         InputError: The points of the chain are invalid.
@@ -125,7 +146,7 @@ def measure_picture(
     both, noise = covariance(located.fit, located.model)
     angles = slice(NUMBERS, NUMBERS + table.notches)
     deviation = np.sqrt(np.maximum(np.diag(both)[angles], 0.0))
-    reason = doubt(located, deviation, noise)
+    reason = doubt(located, deviation, noise, uncertainty)
     middle = (np.array([picture.shape[1], picture.shape[0]]) * located.factor - 1.0) / 2.0
     return judged_photograph(name, located, both[angles, angles], (reason, noise, factor), middle)
 

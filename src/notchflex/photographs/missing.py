@@ -11,6 +11,7 @@ NEAR = 2.0
 """Distance from the outline within which an edge counts as its own, px."""
 
 _LEAST_SCORE, _LEAST_SIDE, _LEAST_BASE, _LEAST_TIP = 0.7, 0.5, 0.35, 0.5
+_MOST_HIDDEN, _LEAST_OTHER = 1, 0.7  # rings of which one side looks like the background
 _LEAST_FACES, _LEAST_SPINES, _LEAST_INNER = 0.35, 0.5, 0.3
 
 
@@ -24,12 +25,16 @@ def missing(model: OutlineModel, fit: Fit) -> str:
         return float(good[part].mean()) if part.any() else 0.0
 
     side, face = model.kind == SIDE, model.kind == FACE
+    hidden: list[int] = []
     for ring in range(n + 1):
-        for which in (-1.0, 1.0):
-            part = side & (model.ring == ring) & (model.which == which)
-            if share(part) < (_LEAST_SIDE if ring else _LEAST_BASE):
-                where = f"the tube behind notch {ring}" if ring else "the tube before notch 1"
-                return f"a side of {where} is not seen clearly"
+        shares = [share(side & (model.ring == ring) & (model.which == one)) for one in (-1.0, 1.0)]
+        least = _LEAST_SIDE if ring else _LEAST_BASE
+        if min(shares) < least:
+            hidden.append(ring)
+            if max(shares) < _LEAST_OTHER:
+                return _hidden(ring)
+    if len(hidden) > _MOST_HIDDEN:
+        return _hidden(hidden[0])
     tip = face & (model.ring == n) & (model.which > 0)
     if share(tip) < _LEAST_TIP:
         return "the tip is not seen clearly where the robot file has it"
@@ -54,3 +59,8 @@ def missing(model: OutlineModel, fit: Fit) -> str:
     if fit.score < _LEAST_SCORE:
         return f"only {100 * fit.score:.0f} % of the outline is found in the photograph"
     return ""
+
+
+def _hidden(ring: int) -> str:
+    where = f"the tube behind notch {ring}" if ring else "the tube before notch 1"
+    return f"a side of {where} is not seen clearly"

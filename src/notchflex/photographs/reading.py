@@ -64,7 +64,9 @@ def photograph_bytes(name: str) -> bytes:
         is_folder, size = path.is_dir(), path.stat().st_size
         data = b"" if is_folder or size > LARGEST_FILE else path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError.FILE_NOT_FOUND(f"there is no photograph {name}") from None
+        raise InputError.FILE_NOT_FOUND(
+            f"there is no photograph {name}; check the name and the folder it is in"
+        ) from None
     except (OSError, ValueError) as problem:
         words = getattr(problem, "strerror", None) or problem
         raise InputError.FILE_UNREADABLE(f"{name} cannot be read: {words}") from None

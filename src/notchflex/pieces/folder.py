@@ -159,16 +159,38 @@ def tidy(folder: str | os.PathLike[str], kind: str, first: int, last: int) -> No
 
 def head_of(file: Path, manifest: Manifest, piece: int) -> dict[str, Any] | None:
     """Return the head of a piece, None where its file is missing, damaged or of another sweep."""
+    head = _any_head(file)
+    if head is None or (head["sweep"], head["piece"]) != (manifest.digest, piece):
+        return None
+    return head
+
+
+def _any_head(file: Path) -> dict[str, Any] | None:
+    """Return the head of a piece of any sweep, None where its file is missing or damaged."""
     import polars
     from polars.exceptions import PolarsError
 
     if not file.exists():
         return None
     try:
-        head = json.loads(polars.read_parquet_metadata(file)[KEY])
+        return json.loads(polars.read_parquet_metadata(file)[KEY])
     except (OSError, PolarsError, KeyError, ValueError):
         return None
-    return head if (head["sweep"], head["piece"]) == (manifest.digest, piece) else None
+
+
+def check_own(folder: str | os.PathLike[str], manifest: Manifest) -> None:
+    """Raise if finished pieces belong to another manifest: that in the folder was changed.
+
+    Raises:
+        InputError: There is such a piece.
+    """
+    for file in sorted((Path(folder) / PIECES).glob("piece-*.parquet")):
+        head = _any_head(file)
+        if head is not None and head["sweep"] != manifest.digest:
+            raise InputError.FILE_DAMAGED(
+                f"{folder} cannot be read: its {manifest.kind}.json was changed after "
+                f"{file.name} was written; put the former file back, or take another folder."
+            )
 
 
 def finished_head(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> dict[str, Any]:

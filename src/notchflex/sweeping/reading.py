@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from notchflex._extras import need
 from notchflex.errors import InputError
 from notchflex.pieces.codes import CODES
-from notchflex.pieces.folder import head_of, manifest_in
+from notchflex.pieces.folder import check_own, head_of, manifest_in
 from notchflex.pieces.piece import piece_file
 from notchflex.pieces.sketch import Scale, Sketch
 from notchflex.sweeping.manifest import KIND, SweepManifest
-
-if TYPE_CHECKING:
-    pass
 from notchflex.sweeping.result import Sweep
 
 
@@ -49,7 +45,8 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
         The sweep: `lazy` and `to_xarray` are its rows.
 
     Raises:
-        InputError: It is not a folder of a sweep, or polars is not installed.
+        InputError: It is not a folder of a sweep, its `sweep.json` was changed, or polars is not
+            installed.
     """
     need("polars", "data", "read_sweep")
     manifest = SweepManifest(manifest_in(directory, KIND).document)
@@ -71,5 +68,7 @@ def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
         scales = {name: Scale(*pair) for name, pair in head["scales"].items()}
         for name, document in head["columns"].items():
             sketches[name] = sketches[name].merged(Sketch.read(document), output.extremes)
+    if not pieces:
+        check_own(directory, manifest)
     counts: dict[str, int] = dict(zip(CODES, codes.tolist(), strict=True))
     return Sweep(Path(directory), manifest, tuple(pieces), counts, failures, sketches, scales)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from notchflex.photographs.chain.camera import Frame, View
+from notchflex.photographs.chain.camera import Frame, View, dot
 from notchflex.photographs.chain.chain_table import ChainTable, Numbers
 from notchflex.photographs.chain.known import NOTHING, Known
 
@@ -198,7 +198,7 @@ class OutlineModel:
         q = side * (low + (0.92 * r - low) * self.place[part]) / r
         depth = np.sqrt(1.0 - q**2)
         # The half of the circle that bulges out of the ring.
-        tilt = (frame.axis * view.ray(centre)).sum(axis=-1)
+        tilt = dot(frame.axis, view.ray(centre))
         sign = np.where(tilt * which > 0.0, 1.0, -1.0)
         point = centre + r * (q[..., None] * lateral + (sign * depth)[..., None] * toward)
         tangent = depth[..., None] * lateral - (sign * q)[..., None] * toward
@@ -233,8 +233,8 @@ class OutlineModel:
     ) -> Numbers:
         """Return where the inner edge of a spine is seen, along `lateral` from the axis, mm."""
         side = self.table.side[notch]
-        x = (lateral * frame.x).sum(axis=-1) * side
-        y = np.abs((lateral * view.y[:, None]).sum(axis=-1))
+        x = dot(lateral, frame.x) * side
+        y = np.abs(dot(lateral, view.y[:, None]))
         return side * spine_edge(self.table, notch, view.cut[:, notch], x, y)
 
 
