@@ -90,7 +90,7 @@ class BatchRows:
     layouts: tuple[StaticStructure, PytreeLayout, tuple[str, ...]]
 
     def pieces(self, cores: int) -> Iterator[slice]:
-        """Rows that are solved in one call of the program: pieces alike, as many for each core."""
+        """Rows that are solved in one call of the program: equal pieces, as many for each core."""
         rows = len(self.rows)
         most = max(size for least, size in _PIECES.items() if rows >= least)
         each = -(-rows // (most * cores))

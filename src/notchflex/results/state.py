@@ -247,7 +247,7 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solver
             # The modes of every level are the first ones of the next.
             array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
         if name == _MATERIAL and array.ndim == leaf.ndim and array.shape[1] == 1:
-            # A notch under tendons alone bends alike all along: it has one node.
+            # A notch under tendons alone bends uniformly: it has one node.
             array = np.repeat(array, leaf.shape[1], axis=1)
         if array.shape != leaf.shape:
             raise InputError.STATE_OF_ANOTHER_ROBOT(

@@ -16,7 +16,7 @@ from notchflex.mechanics.chain import Chain
 # The friction law x = clip(x + rate (slip - give (x - x_prev))). The rate is how strongly slip
 # changes the log ratio while Newton searches, and drops out at the solution; what sticking contacts
 # give only keeps the equation regular where a slack tendon makes the tension ratio meaningless.
-# Slip is in heights of the notch, so that a scaled robot is solved alike.
+# Slip is in heights of the notch, so that a scaled robot is solved in the same way.
 RATE = 8.0
 LEAST_GIVE = 1e-15
 

@@ -73,7 +73,7 @@ def gauss_nodes(
 def rod_quadrature(
     ends: tuple[float, ...], nodes: tuple[int, ...], poses: tuple[int, ...]
 ) -> RodQuadrature:
-    """Return the places along a rod, the same object for notches that are alike but for sites."""
+    """Return the places along a rod; notches that differ by their sites only share one object."""
     return RodQuadrature(ends, nodes, poses)
 
 

@@ -58,8 +58,8 @@ def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
     """What the strains are weighted with to give the length of a fibre per length of the rod.
 
     A fibre at (x, y) from the neutral axis has the length of the rod's stretch plus its
-    curvatures times their levers, v_z + u_x y - u_y x. This is the concentric wall arc of
-    Pacheco's tendon (its l = h - theta (r_i + ybar)) and the edge of a notch alike.
+    curvatures times their levers, v_z + u_x y - u_y x. This is both the concentric wall arc
+    of Pacheco's tendon (its l = h - theta (r_i + ybar)) and the edge of a notch.
     """
     weights = across @ _ACROSS
     return weights + np.broadcast_to(_ALONG, weights.shape)

@@ -5,7 +5,7 @@ A law lives in a file of its own in this folder and registers itself for its des
 
 Every material answers the same question for one cross-section of a flexure, so the chain never
 asks which material it is. A law says how the bending moment follows the curvature; the rest is
-linear, and the ends of the notch are added here, for all laws alike:
+linear, and the ends of the notch are added here, for all laws:
 
     s = kappa / q,   (1 + c w) k + (1 - c) w Phi(k) / (E I) = s,   M = Phi(k) / q
 

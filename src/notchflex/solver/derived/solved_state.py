@@ -181,7 +181,7 @@ def notch_angles(chain: Chain, relative: Float[Array, "n d d"]) -> Float[Array, 
     """Rotation of every body against the one before, about the axis of bending of its notch.
 
     The axis is y of the notch's frame, turned by the notch's direction about the tube; angles of
-    up to half a turn are told apart.
+    up to half a turn are distinguished.
     """
     across = chain.notch_frame[..., IN_PLANE]
     if chain.frame is not None:
