@@ -144,7 +144,7 @@ def test_no_answer_for_long(many, tmp_path, start, monkeypatch, victims):
 
 
 def test_workers_of_this_machine_and_a_killed_client(many, tmp_path, start):
-    """The first client is stopped and killed; two workers do what is left."""
+    """The first client is stopped and killed; four workers do what is left."""
     folder = tmp_path / "swept"
     file = tmp_path / "plan.toml"
     file.write_text(tomlkit.dumps(TABLE | MANY), encoding="utf-8")
@@ -158,7 +158,7 @@ def test_workers_of_this_machine_and_a_killed_client(many, tmp_path, start):
     assert caught.value.code.name == "CONFLICT"
     os.kill(client.pid, signal.SIGKILL)
     client.wait()
-    nf.sweep(plan(**MANY), folder, workers=2)
+    nf.sweep(plan(**MANY), folder, workers=4)
     assert digests(folder) == digests(many)
 
 
