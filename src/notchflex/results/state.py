@@ -159,7 +159,7 @@ class SavedState:
         return self.loaded
 
     def fitted(self, chain: Chain) -> SolverState:
-        """The state for a chain.
+        """Return the state for a chain.
 
         Raises:
             InputError: It is damaged, or belongs to a robot of another make.
@@ -224,7 +224,7 @@ def check_robot(state: object, robot: Robot) -> None:
 
 
 def fitted(state: State | SavedState | None, chain: Chain) -> SolverState:
-    """What to start from: rest, or a state that must fit the chain."""
+    """Return what to start from: rest, or a state that must fit the chain."""
     if state is None:
         return at_rest(chain)
     if isinstance(state, SavedState):

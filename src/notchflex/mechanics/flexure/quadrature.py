@@ -152,7 +152,7 @@ class RodQuadrature:
         basis: Float[np.ndarray, "every 6 modes"],
         reference: Float[np.ndarray, "every 6"] | None = None,
     ) -> dict[str, Any]:
-        """The fields of a rod that tell its strains and its pose.
+        """Return the fields of a rod that tell its strains and its pose.
 
         Args:
             curve: Pose of the followed curve at every place, as leading axis; None for a point.
