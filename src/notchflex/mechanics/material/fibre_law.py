@@ -90,7 +90,7 @@ class FibreLaw(SectionLaw):
     def respond_all(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
     ) -> SectionResponse:
-        """Respond for all sections together: mapped one by one, tracing takes three times as long."""
+        """Respond for all sections at once: tracing them one by one takes three times as long."""
         return self.respond(strain, section, memory)
 
     def bent(self, reduced: Float[Array, "*shape"], section: FibreSection, memory: Any) -> Bending:
@@ -180,7 +180,7 @@ class FibreLaw(SectionLaw):
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Return the energy in the fibres: with hysteresis that of the curve halfway, and elastic."""
+        """Return the energy of fibres: with hysteresis that of the curve halfway, and elastic."""
         fibres, plain = section.fibres, dataclasses.replace(section, ends=None)
         assert fibres is not None
         bent = self.bent(curvature, plain, memory)
