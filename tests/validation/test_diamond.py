@@ -50,7 +50,7 @@ def forces(law: SectionLaw, ends: Array) -> tuple[Array, Array]:
             force = (end - (WEIGHT * ARM) @ held) / ((WEIGHT * ARM) @ by_force)
             return held + by_force * force, force
 
-        curvature, force = jax.lax.fori_loop(0, 8, improve, (curvature, jnp.zeros(())))
+        curvature, force = jax.lax.fori_loop(0, 4, improve, (curvature, jnp.zeros(())))
         at = bent(curvature, memory)
         error = jnp.max(jnp.abs(at.moment - force * ARM)) + jnp.abs(
             (WEIGHT * ARM) @ curvature - end

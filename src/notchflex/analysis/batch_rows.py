@@ -90,7 +90,7 @@ class BatchRows:
     layouts: tuple[StaticStructure, PytreeLayout, tuple[str, ...]]
 
     def pieces(self, cores: int) -> Iterator[slice]:
-        """Rows that are solved in one call of the program: pieces alike, as many for each core."""
+        """Return the rows of each call of the program: equal pieces, as many for each core."""
         rows = len(self.rows)
         most = max(size for least, size in _PIECES.items() if rows >= least)
         each = -(-rows // (most * cores))
@@ -157,7 +157,7 @@ def tables_of(
     outputs: tuple[str, ...],
     refinement: int,
 ) -> Sequence[BatchRows]:
-    """The rows of a batch by the layout of their robots, shorter ones padded to the longest."""
+    """Return rows of a batch by the layout of their robots, shorter ones padded to the longest."""
     steps = len(joined) // paths
     if robots.varied is not None and paths == 1:
         varied = varied_chains(robots.varied, joined, refinement)

@@ -52,7 +52,7 @@ def write(
 
 
 def is_animation(target: str) -> bool:
-    """Whether a picture moves."""
+    """Return whether a picture moves."""
     return Path(target).suffix.lower() in MOVING
 
 

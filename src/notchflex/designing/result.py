@@ -141,7 +141,7 @@ class Design(Displayed):
         return write_design(self, folder)
 
     def raise_if_failed(self) -> Design:
-        """Itself, if it converged.
+        """Return itself, if it converged.
 
         Raises:
             ConvergenceError: It did not; the message says why.

@@ -53,7 +53,7 @@ class Motion(NamedTuple):
         return _times(self.rotation.T, (outside - self.translation).T).T
 
     def wrench(self, inside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
-        """A wrench (moment, force) about the inner origin, about and along the outer frame.
+        """Return a wrench (moment, force) about the inner origin, about and along the outer frame.
 
         Or many as columns, as for the two functions that follow.
         """
@@ -63,7 +63,7 @@ class Motion(NamedTuple):
         return array_module(inside, force).concatenate([moment, force])
 
     def wrench_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
-        """A wrench about the outer origin, about the inner origin and along the inner frame."""
+        """Return a wrench about the outer origin, about the inner one and along the inner frame."""
         axes = angular(outside)
         force = outside[axes:]
         moment = outside[:axes] - moment_of(self.translation, force)
@@ -72,7 +72,7 @@ class Motion(NamedTuple):
         return array_module(outside, inside).concatenate([inside, along])
 
     def twist_inside(self, outside: Float[Array, "w ..."]) -> Float[Array, "w ..."]:
-        """A twist at the outer origin, at and along the inner frame."""
+        """Return a twist at the outer origin, at and along the inner frame."""
         axes = angular(outside)
         moved = outside[axes:] + cross(outside[:axes], self.translation)
         turn = turned(self.rotation.T, outside[:axes])
@@ -92,12 +92,12 @@ def _times(matrix: Float[Array, "d d"], other: Float[Array, "d ..."]) -> Float[A
 
 
 def angular(twist: Float[Array, "w ..."]) -> int:
-    """Number of angular components of a twist or wrench: 3 in space, 1 in the plane."""
+    """Return the number of angular components of a twist or wrench: 3 in space, 1 in the plane."""
     return 3 if twist.shape[0] == 6 else 1
 
 
 def identity(dimensions: int = 3) -> Motion:
-    """The motion of space, or of the plane, that moves nothing."""
+    """Return the motion of space, or of the plane, that moves nothing."""
     return Motion(constant(np.eye(dimensions)), constant(np.zeros(dimensions)))
 
 
@@ -135,7 +135,7 @@ def cross(first: Float[Array, "a ..."], second: Float[Array, "d ..."]) -> Float[
 
 
 def moment_of(point: Float[Array, "d ..."], force: Float[Array, "d ..."]) -> Float[Array, "a ..."]:
-    """Moment about the origin of a force at a point, or of any two linear vectors."""
+    """Return the moment about the origin of a force at a point, or of any two linear vectors."""
     if point.shape[0] == 3:
         return cross(point, force)
     xp = array_module(point, force)
@@ -212,12 +212,12 @@ def exponential(twist: Float[Array, " w"]) -> Motion:
 
 
 def wrench_at(point: Float[Array, " d"], force: Float[Array, " d"]) -> Float[Array, " w"]:
-    """A force at a point as a wrench (moment, force) about the origin."""
+    """Return a force at a point as a wrench (moment, force) about the origin."""
     return array_module(point, force).concatenate([moment_of(point, force), force])
 
 
 def wrench_turn(wrench: Float[Array, " w"]) -> Float[Array, "w w"]:
-    """How a wrench that goes along with a frame changes, per unit of the frame's own twist.
+    """Return how a wrench that goes along with a frame changes, per unit of the frame's own twist.
 
     With moment m and force f, a twist (omega, v) changes it by (omega x m + v x f, omega x f).
     """
@@ -247,7 +247,7 @@ def outer_twists(motion: Motion, twists: Float[Array, "*n 6 k"]) -> Float[Array,
 
 
 def rotation_about(vector: Float[Array, "*n a"]) -> Float[Array, "*n d d"]:
-    """Rotation matrix of a rotation vector (rad); in space of many at once."""
+    """Return the rotation matrix of a rotation vector (rad); in space of many at once."""
     xp = array_module(vector)
     if vector.shape[-1] == 1:
         sine, cosine = sine_cosine(vector[0])
@@ -265,7 +265,7 @@ def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
 
 
 def left_slope_change(vector: Float[Array, " 3"], held: Float[Array, " 3"]) -> Float[Array, "3 3"]:
-    """Change of `left_slope(vector).T @ held` per change of the rotation vector.
+    """Return the change of `left_slope(vector).T @ held` per change of the rotation vector.
 
     That product is held - b (v x held) + c v x (v x held), with coefficients b and c of |v|^2.
     """

@@ -96,7 +96,7 @@ def scheduler_at(address: str) -> Generator[Any]:
         return distributed.Client(address, timeout=_CONNECT, set_as_default=False)
 
     client = None
-    with silence_logging_cmgr(logging.CRITICAL + 1):  # what is lost is told by an error of ours
+    with silence_logging_cmgr(logging.CRITICAL + 1):  # an error of ours reports the loss
         try:
             client = within(_CONNECT + _CLOSE, connect)
             _wait_for_workers(ClusterConnection(client))

@@ -121,7 +121,7 @@ class Equilibrium(EquilibriumQuantities, Displayed):
         return plot(self, ax=ax)
 
     def raise_if_failed(self) -> Equilibrium:
-        """Itself, if it converged.
+        """Return itself, if it converged.
 
         Raises:
             ConvergenceError: It did not; the message says why.

@@ -149,7 +149,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         return np.asarray(value), np.asarray(sign)
 
     def state_at(self, step: int) -> State:
-        """State after a step (or the last good one before it), to save or continue from."""
+        """Return state after a step (or the last good one before it), to save or continue from."""
         solved: SolverState = tree_util.tree_map(
             lambda leaf: np.asarray(leaf)[step], self.run.solved
         )
@@ -165,7 +165,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         return self.state_at(-1)
 
     def to_xarray(self) -> Dataset:
-        """The whole path as a labelled data set: every quantity, with its name and unit.
+        """Return the whole path as a labelled data set: every quantity, with its name and unit.
 
         Units are those of Python: mm, N, rad. `notchflex.save_path` writes a NetCDF file of it
         that `notchflex.read_path` reads back, with the states that a simulation continues from.
@@ -184,7 +184,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         return dataset_of(self)
 
     def to_dataframe(self, library: str = "polars") -> Any:
-        """The path as a table of one row per step, with the columns of the CSV file.
+        """Return the path as a table of one row per step, with the columns of the CSV file.
 
         Units stand in the names of the columns: mm, N and, unlike the properties, deg.
 
@@ -237,7 +237,7 @@ class EquilibriumPath(PathQuantities, Displayed):
         return path_summary(self)
 
     def raise_if_failed(self) -> EquilibriumPath:
-        """Itself, if every step converged.
+        """Return itself, if every step converged.
 
         Raises:
             ConvergenceError: A step did not; the message says which and why.

@@ -33,7 +33,7 @@ _STIFFNESSES, _GROWS = (1e2, 1e3, 1e4), 3.0
 
 
 def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
-    """What stopped the solver at a step, and the sentence that says so; None and "" if nothing."""
+    """Return what stopped the solver at a step, and a sentence on it; None and "" if nothing."""
     if path.converged[step]:
         return None, ""
     if not path.run.tried[step]:

@@ -68,6 +68,6 @@ class Recorded:
         return self.held
 
     def stable(self, commands: Command) -> Bool[np.ndarray, " s"]:
-        """Whether each state is stable."""
+        """Return whether each state is stable."""
         eigenvalue, sign = self.stability(commands)
         return (eigenvalue > 0.0) & (sign > 0.0)

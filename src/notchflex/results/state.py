@@ -159,7 +159,7 @@ class SavedState:
         return self.loaded
 
     def fitted(self, chain: Chain) -> SolverState:
-        """The state for a chain.
+        """Return the state for a chain.
 
         Raises:
             InputError: It is damaged, or belongs to a robot of another make.
@@ -224,7 +224,7 @@ def check_robot(state: object, robot: Robot) -> None:
 
 
 def fitted(state: State | SavedState | None, chain: Chain) -> SolverState:
-    """What to start from: rest, or a state that must fit the chain."""
+    """Return what to start from: rest, or a state that must fit the chain."""
     if state is None:
         return at_rest(chain)
     if isinstance(state, SavedState):
@@ -247,7 +247,7 @@ def _on_chain(arrays: dict[str, np.ndarray], chain: Chain, whose: str) -> Solver
             # The modes of every level are the first ones of the next.
             array = np.pad(array, ((0, 0), (0, leaf.shape[-1] - array.shape[-1])))
         if name == _MATERIAL and array.ndim == leaf.ndim and array.shape[1] == 1:
-            # A notch under tendons alone bends alike all along: it has one node.
+            # A notch under tendons alone bends uniformly: it has one node.
             array = np.repeat(array, leaf.shape[1], axis=1)
         if array.shape != leaf.shape:
             raise InputError.STATE_OF_ANOTHER_ROBOT(

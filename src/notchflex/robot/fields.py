@@ -19,7 +19,7 @@ def kinds_in(annotation: Any) -> list[type]:
 
 
 def is_list(field: Any) -> bool:
-    """Whether a field, pydantic's record of it, takes a list of values; None takes nothing."""
+    """Return whether a field (pydantic's record of it; None takes nothing) takes a list."""
 
     def takes(annotation: Any) -> bool:
         origin = typing.get_origin(annotation)

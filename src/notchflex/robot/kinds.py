@@ -211,5 +211,5 @@ def kinds_of(base: type) -> dict[str, type]:
 
 
 def one_of(base: type) -> Any:
-    """Make the type of a field that takes any kind of `base`, told apart by its key `kind`."""
+    """Make the type of a field that takes any kind of `base`, selected by its key `kind`."""
     return Annotated[Union[tuple(kinds_of(base).values())], Field(discriminator="kind")]  # noqa: UP007

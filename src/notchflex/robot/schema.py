@@ -21,7 +21,7 @@ def json_schema() -> dict[str, Any]:
 
     Returns:
         The schema; every number has its unit under `unit`.  It holds nothing that JSON lacks: an
-        infinite default is left out and told in the description.
+        infinite default is left out and stated in the description.
 
     Example:
         >>> sorted(json_schema()["required"])

@@ -44,7 +44,7 @@ def save_robot(
         template: The file whose comments and order are kept; None takes the file that the robot
             was read from, or a fresh layout with the meaning and unit of every key.
         fitted: Of fitted values, by the names that `Robot.with_value` takes, to what and how
-            well: each is told beside its value.
+            well: each is written beside its value.
 
     Raises:
         RobotFileError: The template cannot be read, or the file cannot be written.

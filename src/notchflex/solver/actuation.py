@@ -76,7 +76,7 @@ _MOST_CLOSING_FORCES = 1e5
 def tension_is_bounded(
     chain: Chain, command: Command, base_tension: Float[Array, " t"]
 ) -> Bool[Array, ""] | bool:
-    """Whether the tensions of tendons driven by stroke are below what any robot could bear.
+    """Return whether the tensions of tendons driven by stroke are below what any robot could bear.
 
     An inextensible tendon cannot be drawn further once the shape is rigid; its tension would then
     be determined by rounding. One that stretches bounds its tension itself.

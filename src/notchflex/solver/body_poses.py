@@ -54,7 +54,7 @@ def external_wrenches(
 
 
 def anchor_poses(chain: Chain, pose: Motion | None) -> Motion | None:
-    """Pose of every body in the frames of those before it, as far back as the window reaches."""
+    """Return the pose of every body in the frames of those before it, within the window."""
     if pose is None:
         return None
     poses = [pose]
@@ -87,5 +87,5 @@ def select_back(by_body: Sequence[Array], back: Array) -> Float[Array, "n t *k"]
 
 
 def shift_from_base(values: Array, first: Array) -> Array:
-    """Values of the flexure before; `first` for the first flexure."""
+    """Return the values of the flexure before; `first` for the first flexure."""
     return jnp.concatenate([jnp.asarray(first)[None], values[:-1]])

@@ -16,7 +16,7 @@ from notchflex.mechanics.chain import Chain
 # The friction law x = clip(x + rate (slip - give (x - x_prev))). The rate is how strongly slip
 # changes the log ratio while Newton searches, and drops out at the solution; what sticking contacts
 # give only keeps the equation regular where a slack tendon makes the tension ratio meaningless.
-# Slip is in heights of the notch, so that a scaled robot is solved alike.
+# Slip is in heights of the notch, so that a scaled robot is solved in the same way.
 RATE = 8.0
 LEAST_GIVE = 1e-15
 
@@ -64,7 +64,7 @@ class Memory(NamedTuple):
 
 
 def notch_heights(chain: Chain) -> Float[Array, " n"]:
-    """Length of every flexure, mm: the scale of lengths."""
+    """Return the length of every flexure, mm: the scale of lengths."""
     return jnp.sum(chain.rods.length, axis=-1)
 
 
@@ -75,7 +75,7 @@ def trial_log_ratio(
     memory: Memory,
     k: int,
 ) -> Float[Array, "n t 2"]:
-    """Log ratios of the k-th group as slip drives them, before they are clipped to their bound."""
+    """Return the log ratios of the k-th group that slip asks for, before they are clipped."""
     slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
     return log_ratio + RATE * (slip - memory.give * (log_ratio - memory.log_ratio[k]))
 
@@ -97,7 +97,7 @@ def is_active(
     force: Float[Array, "n l"],
     gap: Float[Array, "n l"],
 ) -> Bool[Array, "n l"]:
-    """Which contacts press, by Signorini's condition: force >= 0, gap >= 0, product 0."""
+    """Return which contacts press, by Signorini's condition: force >= 0, gap >= 0, product 0."""
     return (force - stiffness[:, None] * gap > 0.0) & (has_contact > 0.0)
 
 
@@ -107,7 +107,7 @@ def signorini(
     force: Float[Array, "n l"],
     gap: Float[Array, "n l"],
 ) -> Float[Array, "n l"]:
-    """Residual of Signorini's condition as one equation, as a part of the notch's height."""
+    """Return residual of Signorini's condition as one equation, as a part of the notch's height."""
     stiffness = chain.contact_stiffness
     by_force = force / (stiffness * notch_heights(chain))[:, None]
     by_gap = gap / notch_heights(chain)[:, None]

@@ -263,5 +263,5 @@ def _wrenches(
 
 
 def span_mask(chain: Chain, back: Array) -> Float[Array, "n t window"]:
-    """1 where a span or contact that ends at a body reaches back over so many flexures more."""
+    """Return 1 where a span or contact that ends at a body reaches back over more flexures."""
     return 1.0 * (back[..., None] > jnp.arange(chain.window)[None, None])

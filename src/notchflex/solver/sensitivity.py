@@ -45,7 +45,7 @@ _PARTS_FOLLOWED = 2
 def attach_derivatives(
     chain: Chain, command: Command, last: SolverState, solved: SolverState, way: SubstepHistory
 ) -> SolverState:
-    """A solved state with its derivatives by chain, command and the state before.
+    """Return a solved state with its derivatives by chain, command and the state before.
 
     Contacts and material remember: where a load was taken in two parts, the derivatives go through
     both. Of more parts only the last states are known; with memory the derivatives are then NaN.

@@ -46,18 +46,18 @@ class TendonSpans(NamedTuple):
 def crossings(
     group: TendonGroup, chain: Chain, flexure: FlexureState, anchors: Motion | None
 ) -> Crossing:
-    """Paths of a group of tendons over all gaps."""
+    """Return the paths of a group of tendons over all gaps."""
     selected = select_anchors(anchors, group.back) if group.acts_on_bodies else None
     return jax.vmap(type(group).cross)(group, chain.rods, flexure, selected)
 
 
 def of_group(values: Float[Array, " all"], group: TendonGroup) -> Float[Array, " t"]:
-    """Values of the tendons of a group; by slices, whose adjoint the native compiler knows."""
+    """Select the tendons of a group; by slices, whose adjoint the native compiler knows."""
     return jnp.stack([values[number] for number in group.numbers])
 
 
 def slip_mask(group: TendonGroup) -> Float[Array, "n t 2"]:
-    """1 where a tendon can slide over an edge: not where it is fixed, nor where it does not run."""
+    """Return 1 where a tendon can slide over an edge: where it runs and is not fixed."""
     return jnp.stack([group.visits, group.visits * (1.0 - group.ends)], axis=-1)
 
 

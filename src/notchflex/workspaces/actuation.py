@@ -110,7 +110,7 @@ def rays_at(
         pretension: Tension that every tendon has at least, N.
     """
     groups, count = _groups(robot, largest), len(drawn)
-    # Rays side by side take as many iterations as the hardest of them: alike ones together.
+    # Rays side by side take as many iterations as the hardest of them: similar ones together.
     drawn = drawn[np.argsort(drawn[:, 0], kind="stable")]
     directions = np.zeros((count, robot.number_of_tendons))
     for number, group in enumerate(groups):

@@ -147,7 +147,7 @@ class Workspace(Displayed):
         return max(side, 1e-6) / (_VOXELS * finer)
 
     def to_xarray(self) -> Dataset:
-        """The states as a labelled data set, in mm, N and rad.
+        """Return the states as a labelled data set, in mm, N and rad.
 
         Raises:
             InputError: xarray is not installed.

@@ -1,8 +1,8 @@
 """A workspace of more states than fit into memory: pieces of rays, thinned by voxels.
 
 Of the states whose tips lie in the same voxel, point the same way (one of the directions of the
-dexterity) and are loaded or unloaded alike, that with the largest hysteresis is kept. Corners of
-the convex hull of each piece are kept too, so that the hull is that of all states.
+dexterity) and are both loaded or both unloaded, that with the largest hysteresis is kept. Corners
+of the convex hull of each piece are kept too, so that the hull is that of all states.
 """
 
 from __future__ import annotations

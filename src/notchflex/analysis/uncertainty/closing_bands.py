@@ -17,7 +17,7 @@ from notchflex.robot import Robot
 from notchflex.robot.value_names import numbers_at
 
 DEPTH = 0.010
-"""The change of depth whose effect is told, mm."""
+"""The change of depth whose effect is reported, mm."""
 
 _DRAWS, _STEPS, _BEYOND = 128, 32, 1.6
 _NEVER = 1e12

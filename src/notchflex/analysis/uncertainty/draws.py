@@ -49,7 +49,7 @@ class ToleranceSource(NamedTuple):
         return next(iter(self.nominal)) if self.tolerance.per_notch else self.tolerance.value
 
     def values(self, level: Any) -> dict[str, Any]:
-        """The values at levels of the distribution, each between 0 and 1."""
+        """Return the values at levels of the distribution, each between 0 and 1."""
         return {
             name: one + deviation(self.tolerance, one, level) for name, one in self.nominal.items()
         }

@@ -59,7 +59,7 @@ def fit_polynomial(
         high: Upper ends, above the lower ones.
         cliques: Places of variables that act together.
         scale_of: From the largest size of every entry to what errors are measured in.
-        parts: Places of entries that answer the numbers alike; of each it is found by itself which
+        parts: Groups of entries that respond to the numbers in one way; for each it is found which
             products of powers it needs.
         wanted: Errors that are allowed, the largest first, which must be met. A smaller one is met
             as far as it may cost.

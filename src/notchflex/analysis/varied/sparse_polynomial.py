@@ -115,7 +115,7 @@ class SparsePolynomial(NamedTuple):
     error: float = np.inf
 
     def covers(self, numbers: Float[np.ndarray, "rows d"]) -> bool:
-        """Whether numbers lie in the range that the polynomial was made for."""
+        """Return whether numbers lie in the range that the polynomial was made for."""
         return bool((np.abs(numbers - self.middle) <= self.half * (1.0 + 1e-12)).all())
 
     def varied(self, numbers: Float[np.ndarray, "rows d"]) -> Float[np.ndarray, "v rows"]:

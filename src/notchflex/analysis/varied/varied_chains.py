@@ -148,7 +148,7 @@ class _Known(NamedTuple):
     most: int
 
     def serves(self, table: Float[np.ndarray, "robots d"], wanted: PolynomialAccuracy) -> bool:
-        """Whether a new one would be no better."""
+        """Return whether a new one would be no better."""
         good = self.polynomial.error <= wanted.tolerance or self.most >= wanted.most
         return good and self.polynomial.covers(table)
 

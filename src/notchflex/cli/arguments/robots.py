@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from notchflex.robot import Robot
 
 MOST_BESIDE = 4
-"""Robots beside the first: five can be told apart by colour."""
+"""Robots beside the first: five can be distinguished by colour."""
 
 _MOST_CHANGES = 4
 """More values of `--set` than this are only counted in a title."""

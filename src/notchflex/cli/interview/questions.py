@@ -117,7 +117,7 @@ def _ask_notches(interview: Interview, tube: Tube) -> tuple[Notch, ...]:
             lambda text: whole(text, at_least=1, at_most=MOST_NOTCHES),
         )
     )
-    # From the drawing, unless told otherwise: the papers' kind of ends stands first.
+    # From the drawing, unless set otherwise: the papers' kind of ends stands first.
     ends = fields_of(kind).get("ends")
     further = {} if ends is None else {"ends": typing.get_args(ends.annotation)[-1]}
     further |= interview.set_values("notch", but=tuple(keys))

@@ -71,11 +71,13 @@ def description_tables(robot: Robot) -> list[Table]:
         names[kind] = [SHORTER.get(name, name).replace("_", "\n") for name in values]
         kinds.setdefault(kind, {}).setdefault(tuple(values.values()), []).append(number)
     tables: list[Table] = []
-    for kind, alike in kinds.items():
-        used = [any(value not in _USUAL for value in column) for column in zip(*alike, strict=True)]
+    for kind, of_kind in kinds.items():
+        used = [
+            any(value not in _USUAL for value in column) for column in zip(*of_kind, strict=True)
+        ]
         rows = [
             [run_of(numbers), *map(_value, compress(values, used))]
-            for values, numbers in alike.items()
+            for values, numbers in of_kind.items()
         ]
         tables.append(_filled([f"{kind}\nnotch", *compress(names[kind], used)], rows))
     return tables

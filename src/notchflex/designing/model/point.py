@@ -60,7 +60,7 @@ class Point:
         return replace(self, slopes_of=None)
 
     def of_state(self, name: str, state: str) -> Reading:
-        """A quantity of a state, flat, in the unit of the edges."""
+        """Return a quantity of a state, flat, in the unit of the edges."""
         return self._at(name, self.paths.step[state]).scaled(edge_unit(name)[1])
 
     def _at(self, name: str, step: int) -> Reading:
@@ -90,11 +90,11 @@ class Point:
         return self.kept[key]
 
     def of_robot(self, name: str) -> Reading:
-        """A quantity of the robot alone."""
+        """Return a quantity of the robot alone."""
         return self._of_robot(OF_ROBOTS[name].formula)
 
     def value(self, path: str) -> Reading:
-        """Values of the robot file."""
+        """Return the values of the robot file."""
         found = numbers_at(self.robot, path)
         values = np.array(list(found.values()))
         if self.slopes_of is None:
@@ -130,7 +130,7 @@ class Point:
         return self.once("deviations", lambda: deviations_of(self.robot, tolerances))
 
     def compliance(self, state: str, direction: Direction) -> Reading:
-        """The tip compliance along a direction, mm/N: a force to either side, and its travel."""
+        """Return tip compliance along a direction, mm/N: a force to either side, and its travel."""
         plus, minus = (
             self._at("tip_position", self.paths.step[Probe(state, direction, side)])
             for side in (1, -1)
@@ -139,11 +139,11 @@ class Point:
         return plus.minus(minus).map(row)
 
     def curve(self, curve: TargetCurve) -> Reading:
-        """Distances of the points of a curve, mm."""
+        """Return the distances of the points of a curve, mm."""
         return distances(self.offsets(curve))
 
     def offsets(self, curve: TargetCurve) -> Reading:
-        """Vectors from the points of a curve to the axis, mm."""
+        """Return the vectors from the points of a curve to the axis, mm."""
         step, points = self.paths.step[curve.state], target_points(curve)
         poses = [self.arrays[name][step] for name in ("body_position", "body_rotation")]
         if self.slopes_of is None:

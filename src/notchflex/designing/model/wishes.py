@@ -22,7 +22,7 @@ class Source(Protocol):
     """What readings are taken from: a robot solved under its states."""
 
     def of_state(self, name: str, state: str) -> Reading:
-        """A quantity of a state, flat, in the unit of the edges."""
+        """Return a quantity of a state, flat, in the unit of the edges."""
         ...
 
     def closings(self) -> Reading:
@@ -30,23 +30,23 @@ class Source(Protocol):
         ...
 
     def of_robot(self, name: str) -> Reading:
-        """A quantity of the robot alone."""
+        """Return a quantity of the robot alone."""
         ...
 
     def value(self, path: str) -> Reading:
-        """Values of the robot file."""
+        """Return the values of the robot file."""
         ...
 
     def compliance(self, state: str, direction: Direction) -> Reading:
-        """The tip compliance, mm/N."""
+        """Return the tip compliance, mm/N."""
         ...
 
     def curve(self, curve: TargetCurve) -> Reading:
-        """Distances of the points of a curve, mm."""
+        """Return the distances of the points of a curve, mm."""
         ...
 
     def offsets(self, curve: TargetCurve) -> Reading:
-        """Vectors from the points of a curve to the axis, mm."""
+        """Return the vectors from the points of a curve to the axis, mm."""
         ...
 
 

@@ -108,7 +108,7 @@ def search_on(problem: DesignProblem, found: Found, iterations: int) -> Found:
 
 
 def is_stationary(problem: DesignProblem, z: Vector, one: DesignEvaluation) -> bool:
-    """Whether all constraints hold and no small change improves the design, to first order."""
+    """Return whether all constraints hold and no small change improves a design to first order."""
     return problem.worst(one) <= TOLERANCE and multipliers(problem, z, one).is_stationary
 
 

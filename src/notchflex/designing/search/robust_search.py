@@ -39,7 +39,7 @@ class YieldOf:
 
     Attributes:
         title: The constraint; "all limits" for all together.
-        wanted: The part that is wanted; None where it is to be as great as possible or only told.
+        wanted: The part that is wanted; None where it is maximised or only reported.
         achieved: The part of the robots drawn of the design.
         interval: Its 95 % interval.
         plain: The same part of the design without regard to tolerances.

@@ -183,7 +183,7 @@ class Scaled:
 
 
 def is_better(problem: DesignProblem, one: DesignEvaluation, other: DesignEvaluation) -> bool:
-    """Whether a robot is better than another: nearer to all limits, or as near and with less."""
+    """Return whether a robot is better: nearer to all limits, or as near and with less."""
     from notchflex.designing.search.rows import TOLERANCE
 
     a, b = problem.worst(one), problem.worst(other)

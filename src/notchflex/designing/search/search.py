@@ -78,7 +78,7 @@ class Searches:
         return found
 
     def has_agreed(self, number: int, count: int) -> bool:
-        """Whether nothing is to be gained from further searches of a form.
+        """Return whether nothing is to be gained from further searches of a form.
 
         So many have settled at the best robot that it has, or a curve is followed.
         """

@@ -25,7 +25,7 @@ class _Enough(Exception):  # noqa: N818 - no error
 
 
 def is_sum_of_squares(problem: DesignProblem) -> bool:
-    """Whether all that is asked is to come near to something."""
+    """Return whether all that is asked is to come near to something."""
     return (
         bool(problem.objectives) and not problem.rows and all(map(_is_square, problem.objectives))
     )
@@ -109,7 +109,7 @@ def _least(
 
 
 def is_followed(problem: DesignProblem, total: float) -> bool:
-    """Whether nothing but curves is asked, and all are followed well enough."""
+    """Return whether nothing but curves is asked, and all are followed well enough."""
     return is_sum_of_squares(problem) and total <= _enough(problem)
 
 

@@ -1,4 +1,4 @@
-"""A pattern as layers of lines and texts, which DXF and SVG write alike."""
+"""A pattern as layers of lines and texts, that DXF and SVG both write."""
 
 from __future__ import annotations
 

@@ -135,5 +135,5 @@ def _compare(
 
 
 def loop_area(tension: Float[np.ndarray, " s"], angle: Float[np.ndarray, " s"]) -> float:
-    """Area between the two branches of a loop, N rad."""
+    """Return the area between the two branches of a loop, N rad."""
     return float(abs(np.trapezoid(angle, tension)))

@@ -174,7 +174,7 @@ def _friction(angle: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 3"]:
 
 
 def potential_range(spring: HingeSpring) -> float:
-    """Largest value of the friction potential over the range of a hinge, N mm; 0 for rounding."""
+    """Return the range of the friction potential over that of a hinge, N mm; 0 for rounding."""
     at = np.linspace(spring.low, spring.high, 201)
     rounding = _ROUNDING * np.abs(spring.moment(at)).max()
     if np.abs(spring.friction_moment(at)).max() <= rounding:

@@ -83,7 +83,7 @@ class Zone:
 
 
 def is_bent(subject: Subject) -> bool:
-    """Whether the solid is that of a robot under loads, or of one that is bent without any."""
+    """Return whether the robot of a solid is bent, under loads or without any."""
     curved = any(notch.precurvature_deg for notch in subject.robot.notches)
     return subject.path is not None or curved
 

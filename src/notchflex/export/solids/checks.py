@@ -1,4 +1,4 @@
-"""What no solid can be made of, in STL and STEP alike."""
+"""Shapes of which no solid can be made, in STL or in STEP."""
 
 from __future__ import annotations
 

@@ -166,8 +166,8 @@ def prior_of(unknown: Unknown, found: Calibration) -> tuple[float, float]:
     Raises:
         InputError: There is no prior, and fewer than two fitted specimens.
     """
-    alike = [one.path == unknown.path and one.each for one in found.problem.unknowns]
-    values, variance = found.best.values[alike], np.diag(found.covariance)[alike]
+    of_specimens = [one.path == unknown.path and one.each for one in found.problem.unknowns]
+    values, variance = found.best.values[of_specimens], np.diag(found.covariance)[of_specimens]
     if unknown.prior is not None:
         mean, size = unknown.prior
         squares = (values - mean) ** 2 + np.where(np.isfinite(variance), variance, size**2)

@@ -229,7 +229,7 @@ class Calibration:
     def by_pulls(self) -> ByPulls:
         """Uncertainty of the constants from the scatter between whole pulls.
 
-        Model errors are much alike within a pull: rows are not worth as much as their number.
+        Model errors correlate strongly within a pull: rows are not worth as much as their number.
         """
         residuals = self.residuals
         return by_pulls(self.reached, residuals.slopes, residuals.pull, self.covariance_by_rows)

@@ -1,4 +1,4 @@
-"""Covariance of constants: of independent rows, and robust to rows that are alike within a pull.
+"""Covariance of constants: of independent rows, and robust to rows that correlate within a pull.
 
 Model errors, and how a robot was held and photographed, stay much the same through a pull. Rows of
 a pull are then not worth as much as their number (Huber 1967; Liang and Zeger 1986).

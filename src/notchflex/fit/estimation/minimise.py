@@ -128,7 +128,7 @@ class _Scaled:
         self.tried: dict[bytes, Cost | None] = {np.zeros(len(self.free)).tobytes(): first}
 
     def values(self, step: Vector) -> Vector:
-        """Values after a step, exactly at a limit where the step is."""
+        """Return the values after a step, exactly at a limit where the step is."""
         values, lower, upper = (one.copy() for one in (self.start, self.lower, self.upper))
         moved = values[self.free] + self.scale * step
         moved = np.where(step >= self.most, upper[self.free], moved)

@@ -128,15 +128,17 @@ def _histories(measurements: Measurements, commands: Numbers) -> list[Hashable]:
     histories: list[Hashable] = []
     known: list[list[tuple[int, float]]] = []
     for history in turned:
-        alike = (n for n, other in enumerate(known) if _alike(history, other, TURN * span))
-        number = next(alike, len(known))
+        equal = (n for n, other in enumerate(known) if _are_equal(history, other, TURN * span))
+        number = next(equal, len(known))
         if number == len(known):
             known.append(history)
         histories.append(number)
     return histories
 
 
-def _alike(first: list[tuple[int, float]], second: list[tuple[int, float]], near: Numbers) -> bool:
+def _are_equal(
+    first: list[tuple[int, float]], second: list[tuple[int, float]], near: Numbers
+) -> bool:
     if [column for column, _ in first] != [column for column, _ in second]:
         return False
     return all(

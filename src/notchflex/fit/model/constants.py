@@ -193,7 +193,7 @@ def _unknown(robots: Mapping[str, Robot], path: str, constant: Constant, each: b
         upper = math.inf
     else:
         rule, number, read = _parsed(path)
-        # Without a rule robots have one value each, alike in all their parts.
+        # Without a rule robots have one value each, the same in all their parts.
         here = [
             value
             for label, one, *_ in sets

@@ -52,7 +52,7 @@ class Residuals:
         return len(self.values)
 
     def of(self, sample: int, quantity: str) -> np.ndarray:
-        """Whether each number belongs to a quantity of some measurements, (R,)."""
+        """Return whether each number belongs to a quantity of some measurements, (R,)."""
         return (self.sample == sample) & (self.quantity == OBSERVED.index(quantity))
 
     def root_mean_squares(self) -> dict[str, float]:

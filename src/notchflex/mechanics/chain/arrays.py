@@ -125,7 +125,7 @@ class Chain(Pytree):
 def flexure_states(
     chain: Chain, modes: Float[Array, "n modes"], memory: Any, *, with_pose: bool
 ) -> FlexureState:
-    """State of all flexures at once, after a memory of the material at every node."""
+    """Return the state of all flexures at once, after a memory of the material at every node."""
     rods, law = chain.rods, chain.law
     strain = in_space(jnp.einsum("nicm,nm->nic", rods.basis, modes))
     response = law.respond_all(strain, rods.section, memory)

@@ -16,7 +16,7 @@ _GRAMS = 1e-6
 
 
 def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[np.ndarray, " bodies"]:
-    """Length of each rigid piece on the tube axis, base first, mm."""
+    """Return the length of each rigid piece on the tube axis, base first, mm."""
     following = (*notches[1:], None)
     behind = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
     return np.array([tube.base_length, *behind])

@@ -30,7 +30,7 @@ _NOTHING = (
 
 
 def padded(chain: Chain, flexures: int, edges: int) -> Chain:
-    """The same robot with more flexures beyond its tip, and more places for edges met.
+    """Return the same robot with more flexures beyond its tip, and more places for edges met.
 
     What is added is stiff, straight and of no length, crossed by no tendon: the last body's frame
     is then the tip, and no other number of the robot changes.
@@ -51,7 +51,7 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         return np.concatenate([leaf, np.repeat(leaf[-1:], more, axis=0)])  # pyright: ignore
 
     def changed(part: Any, **values: Any) -> Any:
-        """A part whose added entries have other values."""
+        """Return a part whose added entries have other values."""
         wider = jax.tree.map(longer, part)
         own = {name: getattr(wider, name).copy() for name in values}
         for name, value in values.items():

@@ -24,7 +24,7 @@ def bending_normal(robot: Robot) -> Float[np.ndarray, " 3"] | None:
 
 @lru_cache(maxsize=64)
 def tendons_in_plane(robot: Robot) -> bool:
-    """Whether every tendon runs in the one plane in which all notches bend."""
+    """Return whether every tendon runs in the one plane in which all notches bend."""
     normal = bending_normal(robot)
     if normal is None:
         return False

@@ -31,7 +31,7 @@ class SpineContact(ContactGroup):
         return rods.closure
 
     def gap_response(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> GapResponse:
-        """Length of the fibre between the lips."""
+        """Return the length of the fibre between the lips."""
         del anchors
         to_lip = of_rod(rod, fibre_stretch(rod.closure))[None]
         strain = rod.length @ (rod.reference_strain + flexure.strain)

@@ -118,7 +118,7 @@ _EDGE[:_COUNT, 0] = _IN_SURFACE[0, 0]
 _EDGE[2 * _COUNT :, 1] = _OUTWARD[1, 0]
 
 
-@lru_cache(maxsize=256)  # rings of one length are alike, however deep the notches beside them
+@lru_cache(maxsize=256)  # rings of one length are equal, however deep the notches beside them
 def edge_compliance(
     radius: float, wall: float, length: float, poisson_ratio: float, boundary: str
 ) -> np.ndarray:

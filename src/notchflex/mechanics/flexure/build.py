@@ -38,8 +38,8 @@ def with_level(rod: Rod, level: str) -> Rod:
     kept |= {"basis": rod.basis[..., :modes], "padding_mask": rod.padding_mask[..., :modes]}
     if rod.turn_pair is not None:
         kept["turn_pair"] = rod.turn_pair[..., : modes + 1, : modes + 1]
-    alike = (rod.reference_strain, kept["basis"], *jax.tree.leaves(rod.section))
-    if all((leaf == leaf[:1]).all() for leaf in alike):
+    arrays = (rod.reference_strain, kept["basis"], *jax.tree.leaves(rod.section))
+    if all((leaf == leaf[:1]).all() for leaf in arrays):
         # The one node in the middle.
         middle = slice(len(rod.length) // 2, len(rod.length) // 2 + 1)
         kept |= {name: kept.get(name, getattr(rod, name))[middle] for name in _AT_NODES}

@@ -22,7 +22,7 @@ from notchflex.mechanics.motion import (
 def geometric_stiffness(
     rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration, wrench: Float[Array, " w"]
 ) -> Float[Array, "modes modes"]:
-    """How what a wrench on the distal body does to each mode changes with the modes.
+    """Return how what a wrench on the distal body does to each mode changes with the modes.
 
     It is the derivative of twist_slope^T wrench, the wrench going along with the body; rows are the
     modes that it acts on. With F the force and M the moment about the end, along the axes of the

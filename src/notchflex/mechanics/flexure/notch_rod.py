@@ -168,8 +168,8 @@ def build_rod(
 
     def at_nodes(values: Array, own_axes: int = 0) -> Array:
         each = np.asarray(values)
-        alike = each.ndim == own_axes
-        return constant(np.broadcast_to(each, (nodes, *each.shape)) if alike else each[:nodes])
+        is_uniform = each.ndim == own_axes
+        return constant(np.broadcast_to(each, (nodes, *each.shape)) if is_uniform else each[:nodes])
 
     return Rod(
         start_rotation=constant(turned @ axis.start.rotation),

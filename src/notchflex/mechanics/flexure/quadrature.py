@@ -73,7 +73,7 @@ def gauss_nodes(
 def rod_quadrature(
     ends: tuple[float, ...], nodes: tuple[int, ...], poses: tuple[int, ...]
 ) -> RodQuadrature:
-    """Return the places along a rod, the same object for notches that are alike but for sites."""
+    """Return the places along a rod; notches that differ by their sites only share one object."""
     return RodQuadrature(ends, nodes, poses)
 
 
@@ -152,7 +152,7 @@ class RodQuadrature:
         basis: Float[np.ndarray, "every 6 modes"],
         reference: Float[np.ndarray, "every 6"] | None = None,
     ) -> dict[str, Any]:
-        """The fields of a rod that tell its strains and its pose.
+        """Return the fields of a rod that tell its strains and its pose.
 
         Args:
             curve: Pose of the followed curve at every place, as leading axis; None for a point.

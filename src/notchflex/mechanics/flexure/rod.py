@@ -126,10 +126,10 @@ def flattened(rods: Rod, frame: Float[np.ndarray, "3 3"]) -> Rod:
 
 
 def planar_points(points: Float[Array, "*shape 3"]) -> Float[Array, "*shape 2"]:
-    """The components of points or forces in the plane."""
+    """Return the components of points or forces in the plane."""
     return constant(np.asarray(points)[..., IN_PLANE])
 
 
 def planar_rotations(rotations: Float[Array, "*shape 3 3"]) -> Float[Array, "*shape 2 2"]:
-    """What rotations do in the plane."""
+    """Return what rotations do in the plane."""
     return constant(np.asarray(rotations)[..., IN_PLANE, :][..., IN_PLANE])

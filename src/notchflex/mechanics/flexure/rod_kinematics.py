@@ -55,7 +55,7 @@ class RodConfiguration(NamedTuple):
 
 
 def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
-    """Turns and steps of a rod under given modes."""
+    """Return the turns and steps of a rod under given modes."""
     xp = array_module(modes)
     hat = xp.concatenate([np.ones(1), modes])
     from_place = None
@@ -71,7 +71,7 @@ def integrate_rod(rod: Rod, modes: Float[Array, " modes"]) -> RodConfiguration:
 
 
 def free_pose(rod: Rod) -> Motion:
-    """Pose of the distal body as seen from the proximal one, of a rod in space that nothing bends.
+    """Return the pose of the distal body from the proximal one, of a free rod in space.
 
     The same as `relative_pose` without modes, and without what only its slopes need.
     """
@@ -143,7 +143,7 @@ def _products(parts: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
 
 
 def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
-    """Rotation at the place before each; none before the first."""
+    """Return the rotation at the place before each; none before the first."""
     return array_module(values).concatenate([np.eye(3)[None], values[:-1]])
 
 
@@ -166,14 +166,14 @@ def _beside(rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration) -> M
 
 
 def rod_end(rod: Rod, modes: Float[Array, " modes"]) -> Motion:
-    """Pose of the rod's last section as seen from its first."""
+    """Return the pose of the rod's last section as seen from its first."""
     return _beside(rod, modes, integrate_rod(rod, modes)).then(
         Motion(rod.curve_rotation, rod.curve_offset)
     )
 
 
 def tail_pose(rod: Rod) -> Motion:
-    """The distal body as seen from where the motion beside the curve ends."""
+    """Return the distal body as seen from where the motion beside the curve ends."""
     return Motion(rod.curve_rotation, rod.curve_offset).then(
         Motion(rod.end_rotation, rod.end_offset)
     )
@@ -182,7 +182,7 @@ def tail_pose(rod: Rod) -> Motion:
 def relative_pose(
     rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
 ) -> Motion:
-    """Pose of the distal body as seen from the proximal one."""
+    """Return the pose of the distal body as seen from the proximal one."""
     beside = _beside(rod, modes, integrate_rod(rod, modes) if own is None else own)
     return Motion(rod.start_rotation, rod.start_offset).then(beside).then(tail_pose(rod))
 
@@ -190,7 +190,7 @@ def relative_pose(
 def twist_slope(
     rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration
 ) -> Float[Array, "w modes"]:
-    """Twist (angular, linear) of the distal body, in its own frame, per unit of mode."""
+    """Return the twist (angular, linear) of the distal body, in its own frame, per unit of mode."""
     end = own.rotation[-1]
     turn = own.turn[-1] if len(end) == 2 else end.T @ own.turn[-1]
     twist = jnp.concatenate([turn, end.T @ end_displacement(own)])
@@ -200,7 +200,7 @@ def twist_slope(
 
 
 def end_displacement(own: RodConfiguration) -> Float[Array, "d modes"]:
-    """Displacement of the end per unit of mode, along the axes of the start."""
+    """Return the displacement of the end per unit of mode, along the axes of the start."""
     return jnp.sum(own.stepped + _crossed(own.turn[:-1], own.step[..., None]), axis=0)
 
 
@@ -212,7 +212,7 @@ def _crossed(turn: Array, vector: Array) -> Array:
 
 
 def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w modes"]:
-    """Twist of the end beside the curve, in its frame, per unit of mode, of a small deflection."""
+    """Return the twist of the end in its frame, per unit of mode, of a small deflection."""
     motion = _small_motion(rod, modes)
     slope: Motion = jax.jacfwd(lambda varied: _small_motion(rod, varied))(modes)
     turned = jnp.einsum("ji,jkm->ikm", motion.rotation, slope.rotation)
@@ -223,7 +223,7 @@ def small_twist(rod: Rod, modes: Float[Array, " modes"]) -> Float[Array, "w mode
 def node_poses(
     rod: Rod, modes: Float[Array, " modes"], own: RodConfiguration | None = None
 ) -> Motion:
-    """Poses of the sections at the nodes of the strains, in the frame of the proximal body.
+    """Return poses of the sections at the nodes of the strains, in the frame of the proximal body.
 
     Between the places of the turn its order is left out, and steps are summed up by the polynomials
     through their nodes: enough to judge a result by, not to compute it.

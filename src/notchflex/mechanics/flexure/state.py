@@ -58,8 +58,8 @@ def fibre_stretch(across: Float[Array, "*shape 2"]) -> Float[Array, "*shape 6"]:
     """What the strains are weighted with to give the length of a fibre per length of the rod.
 
     A fibre at (x, y) from the neutral axis has the length of the rod's stretch plus its
-    curvatures times their levers, v_z + u_x y - u_y x. This is the concentric wall arc of
-    Pacheco's tendon (its l = h - theta (r_i + ybar)) and the edge of a notch alike.
+    curvatures times their levers, v_z + u_x y - u_y x. This is both the concentric wall arc
+    of Pacheco's tendon (its l = h - theta (r_i + ybar)) and the edge of a notch.
     """
     weights = across @ _ACROSS
     return weights + np.broadcast_to(_ALONG, weights.shape)
@@ -75,12 +75,12 @@ def of_rod(rod: Rod, values: Float[Array, "*shape 6"]) -> Float[Array, "*shape w
 
 
 def in_space(values: Float[Array, "*shape w"]) -> Float[Array, "*shape 6"]:
-    """All six components, last axis, of what may be of a plane."""
+    """Return all six components, last axis, of what may be of a plane."""
     return values if values.shape[-1] == 6 else values @ np.eye(6)[PLANE]
 
 
 def fibre_slope(rod: Rod, weights: Float[Array, "t w"]) -> Float[Array, "t modes"]:
-    """Change of the length of fibres, by their weights on the strains, per unit of mode."""
+    """Return change of the length of fibres, by their weights on the strains, per unit of mode."""
     return weights @ jnp.einsum("icm,i->cm", rod.basis, rod.length)
 
 
@@ -140,7 +140,7 @@ def flexure_state(
 def material_tangent(
     rod: Rod, law: SectionLaw, memory: Any, state: FlexureState
 ) -> Float[Array, "modes modes"]:
-    """Change of what the strains do to each mode (`internal`), per unit of mode.
+    """Return the change of what the strains do to each mode (`internal`), per unit of mode.
 
     Args:
         rod: The flexure.
@@ -171,7 +171,7 @@ def material_tangent(
 
 
 def chord(rod: Rod, modes: Float[Array, " modes"]) -> tuple[Float[Array, "d d"], Float[Array, ""]]:
-    """How far the chord of a rod has turned in its plane of bending (Liu 2022, eq. 19).
+    """Return how far the chord of a rod has turned in its plane of bending (Liu 2022, eq. 19).
 
     The chord is the straight line from the rod's start to its end; for a strip this is the angle
     that the paper calls bending angle, about two thirds of the slope at the end.

@@ -38,7 +38,7 @@ class FrictionLaw(Pytree, ABC):
     def bounds(
         self, exit_turning: Float[Array, "*t"], entry_turning: Float[Array, "*t"]
     ) -> tuple[Float[Array, "*t"], Float[Array, "*t"]]:
-        """Largest |ln(tension on the base side / tension on the tip side)| at both edges.
+        """Return largest |ln(tension on the base side / tension on the tip side)| at both edges.
 
         Args:
             exit_turning: Angle by which the tendon turns where it leaves the proximal body, rad.

@@ -84,13 +84,13 @@ class FibreLaw(SectionLaw):
         return constant(np.zeros(np.shape(section.fibres.arm))) if self.remembers else ()
 
     def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
-        """Moment halfway between loading and unloading."""
+        """Return the moment halfway between loading and unloading."""
         return self.bent(curvature, dataclasses.replace(section, ends=None), ()).moment
 
     def respond_all(
         self, strain: Float[Array, "*shape 6"], section: FibreSection, memory: Any
     ) -> SectionResponse:
-        """All sections together: mapped one by one they would be traced three times as long."""
+        """Respond for all sections at once: tracing them one by one takes three times as long."""
         return self.respond(strain, section, memory)
 
     def bent(self, reduced: Float[Array, "*shape"], section: FibreSection, memory: Any) -> Bending:
@@ -180,7 +180,7 @@ class FibreLaw(SectionLaw):
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Energy that the fibres hold: with hysteresis that of the curve halfway, and elastic."""
+        """Return the energy of fibres: with hysteresis that of the curve halfway, and elastic."""
         fibres, plain = section.fibres, dataclasses.replace(section, ends=None)
         assert fibres is not None
         bent = self.bent(curvature, plain, memory)
@@ -203,7 +203,7 @@ class FibreLaw(SectionLaw):
         return 0.5 * self.elastic_modulus * square
 
     def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
-        """Energy per length turned to heat between two memories, N mm/mm; for plain arrays."""
+        """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
         if not self.remembers or section.fibres is None:
             return super().dissipated(section, before, after)
         loss = 0.0

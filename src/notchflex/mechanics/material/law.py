@@ -5,7 +5,7 @@ A law lives in a file of its own in this folder and registers itself for its des
 
 Every material answers the same question for one cross-section of a flexure, so the chain never
 asks which material it is. A law says how the bending moment follows the curvature; the rest is
-linear, and the ends of the notch are added here, for all laws alike:
+linear, and the ends of the notch are added here, for all laws:
 
     s = kappa / q,   (1 + c w) k + (1 - c) w Phi(k) / (E I) = s,   M = Phi(k) / q
 
@@ -91,19 +91,19 @@ class SectionLaw(Pytree, ABC):
         return ()
 
     def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
-        """Energy per length turned to heat between two memories, N mm/mm; for plain arrays."""
+        """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
         del before, after
         return np.zeros(np.shape(section.area))
 
     @abstractmethod
     def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
-        """Moment of a section without ends at a curvature about its weak axis, N mm."""
+        """Return the moment of a section without ends at a curvature about its weak axis, N mm."""
 
     @abstractmethod
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Energy that a section without ends holds per length at a curvature, N mm/mm."""
+        """Return energy that a section without ends holds per length at a curvature, N mm/mm."""
 
     def bent(self, reduced: Float[Array, ""], section: FibreSection, memory: Any) -> Bending:
         """Bend a section between its ends by s = kappa / q; for laws without memory."""
@@ -149,7 +149,7 @@ class SectionLaw(Pytree, ABC):
     def energy(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Energy stored per length under given strains, N mm/mm.
+        """Return the energy stored per length under given strains, N mm/mm.
 
         The area under the moment over the curvature, and the elastic rest. Of a law with
         hysteresis it is what fibres, ends and flattening hold; the rest of the area is dissipated.
@@ -186,7 +186,7 @@ class SectionLaw(Pytree, ABC):
     def tangent(
         self, strain: Float[Array, " 6"], section: FibreSection, memory: Any
     ) -> Float[Array, "6 6"]:
-        """Change of the resultants with the strains."""
+        """Return the change of the resultants with the strains."""
         return jax.jacfwd(lambda varied: self.respond(varied, section, memory).resultants)(strain)
 
 

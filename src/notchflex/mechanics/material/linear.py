@@ -18,7 +18,7 @@ class LinearLaw(SectionLaw):
     is_linear = True
 
     def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
-        """Moment in proportion to the curvature."""
+        """Return the moment in proportion to the curvature."""
         return self.elastic_modulus * section.second_moment_weak * curvature
 
     def bending_energy(

@@ -39,7 +39,7 @@ class SuperelasticLaw(SectionLaw):
         return linear, before_plastic - linear, strain - before_plastic
 
     def stress(self, strain: Float[Array, ""]) -> Float[Array, ""]:
-        """Stress of a fibre (MPa), Pacheco 2021 eq. 13, odd in strain."""
+        """Return the stress of a fibre (MPa), Pacheco 2021 eq. 13, odd in strain."""
         linear, superelastic, plastic = self._branches(strain)
         # exp(b/x) with b < 0 vanishes with all its derivatives at x = 0
         safe = jnp.where(plastic == 0.0, 1.0, jnp.abs(plastic))
@@ -51,7 +51,7 @@ class SuperelasticLaw(SectionLaw):
         )
 
     def energy_density(self, strain: Float[Array, ""]) -> Float[Array, ""]:
-        """Area under the curve of `stress` up to a strain, N mm/mm^3."""
+        """Return the area under the curve of `stress` up to a strain, N mm/mm^3."""
         linear, superelastic, plastic = (jnp.abs(part) for part in self._branches(strain))
         at_transition = self.elastic_modulus * linear
         at_plastic = at_transition + self.superelastic_modulus * superelastic
@@ -67,14 +67,14 @@ class SuperelasticLaw(SectionLaw):
         )
 
     def moment(self, curvature: Float[Array, ""], section: FibreSection) -> Float[Array, ""]:
-        """Moment taken from the outer fibre on the spine."""
+        """Return the moment taken from the outer fibre on the spine."""
         stress = self.stress(curvature * section.edge_spine)
         return section.second_moment_weak / section.edge_spine * stress
 
     def bending_energy(
         self, curvature: Float[Array, ""], section: FibreSection, memory: Any
     ) -> Float[Array, ""]:
-        """Area under the moment over the curvature."""
+        """Return the area under the moment over the curvature."""
         del memory
         density = self.energy_density(curvature * section.edge_spine)
         return section.second_moment_weak / section.edge_spine**2 * density

@@ -94,7 +94,7 @@ class TendonGroup(Pytree, ABC):
 
 
 def guarded_norm(vector: Float[Array, "... d"]) -> Float[Array, ...]:
-    """Length of vectors, with derivative 0 where it is 0 (a straight tendon has no kink)."""
+    """Return length of vectors, with derivative 0 where it is 0 (a straight tendon has no kink)."""
     squared = jnp.sum(vector * vector, axis=-1)
     zero = squared == 0.0
     return jnp.where(zero, 0.0, jnp.sqrt(jnp.where(zero, 1.0, squared)))

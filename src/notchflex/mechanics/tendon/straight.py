@@ -2,7 +2,7 @@
 
 It may skip bodies. The pull between two bodies is a force along the straight span on each of
 them; cutting beam and tendon in a gap shows that contact forces need not be summed
-(physics of Gao 2017 and Liu 2022 alike).
+(physics of both Gao 2017 and Liu 2022).
 
 Liu 2022 also reads the pull as a dead load or a follower: it then stands along the channel of
 the proximal or the distal body, on the same point, while the way and its turning stay as they

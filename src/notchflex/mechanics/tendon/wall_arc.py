@@ -37,7 +37,7 @@ class WallArc(TendonGroup):
         return self.present
 
     def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
-        """Length and turning on the wall arc; half the turning at each edge."""
+        """Return the length and turning on the wall arc; half the turning at each edge."""
         del anchors
         weights = of_rod(rod, fibre_stretch(self.across))
         half_turning = 0.5 * jnp.broadcast_to(guarded_norm(flexure.bend), self.natural_gap.shape)

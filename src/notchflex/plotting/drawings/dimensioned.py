@@ -84,8 +84,8 @@ def _shapes(robot: Robot) -> list[tuple[str, int]]:
     first = 1
     for place, notch in enumerate(robot.notch):
         last = first + notch.repeat - 1
-        alike = dataclasses.replace(notch, repeat=1, precurvature_deg=0.0)
-        names, _ = shapes.setdefault(alike, ([], place))
+        single = dataclasses.replace(notch, repeat=1, precurvature_deg=0.0)
+        names, _ = shapes.setdefault(single, ([], place))
         names.append(str(first) if first == last else f"{first}–{last}")
         first = last + 1
     return [(", ".join(names), place) for names, place in shapes.values()]

@@ -192,16 +192,18 @@ def shape_from_modes(
     flexures: dict[int, FlexureShape] = {}
     counts = (rods.length > 0.0).sum(axis=1)
     for count in np.unique(counts):  # flexures with the same number of nodes together
-        alike = np.flatnonzero(counts == count)
-        there = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in alike])
-        kept = np.concatenate([np.zeros((len(alike), 1), int), there + 1], axis=1)
-        kept = np.concatenate([kept, np.full((len(alike), 1), axes.shape[1] - 1)], axis=1)
+        same_count = np.flatnonzero(counts == count)
+        there = np.stack([np.flatnonzero(rods.length[j] > 0.0) for j in same_count])
+        kept = np.concatenate([np.zeros((len(same_count), 1), int), there + 1], axis=1)
+        kept = np.concatenate([kept, np.full((len(same_count), 1), axes.shape[1] - 1)], axis=1)
         parts = -(-pieces // (int(count) + 1))
-        row = alike[:, None]
+        row = same_count[:, None]
         turned, points = interpolate_poses(axes[row, kept], line[row, kept], parts)
         at_node = np.arange(points.shape[1]) / parts - 1.0
         section = rods.section
-        for j, nodes_there, frames, places_there in zip(alike, there, turned, points, strict=True):
+        for j, nodes_there, frames, places_there in zip(
+            same_count, there, turned, points, strict=True
+        ):
             spine, near, area = (
                 np.interp(at_node, np.arange(count), values[j, nodes_there])
                 for values in (section.edge_spine, section.edge_near, section.area)

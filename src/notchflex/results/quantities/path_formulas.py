@@ -179,7 +179,7 @@ def _before_and_after(
 def friction_front(
     ratio: Float[np.ndarray, "s t contacts"], bound: Float[np.ndarray, "s t contacts"]
 ) -> tuple[Int[np.ndarray, "s t"], Float[np.ndarray, "s t"]]:
-    """The contact that turns, and its friction over the largest (Gao 2017, eq. 26).
+    """Return the contact that turns, and its friction over the largest (Gao 2017, eq. 26).
 
     Args:
         ratio: Log ratio of the tension at every contact, base to tip; NaN where there is none.

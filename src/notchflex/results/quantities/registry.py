@@ -45,7 +45,7 @@ def units() -> dict[str, str]:
 
 
 def holds(path: EquilibriumPath, quantity: Quantity) -> bool:
-    """Whether a path has a quantity; an optional one without any number counts as missing."""
+    """Return whether a path has a quantity; an optional one without any number is missing."""
     values = getattr(path, quantity.name, None)
     if values is None:
         return False

@@ -22,7 +22,7 @@ _NOTHING = 1e-12
 
 
 def moment_error(chain: Chain, unknowns: Unknowns, at: Evaluation) -> Float[Array, ""]:
-    """Largest imbalance of bending moment at any node, over the largest moment."""
+    """Return the largest imbalance of bending moment at any node, over the largest moment."""
     # Bending about x and y in space, about y in the plane.
     bending = np.array([0, 1]) if chain.frame is None else np.array([0])
     internal = at.flexure.resultants[..., bending]

@@ -32,7 +32,7 @@ class Shape(namedtuple("Shape", _reported("solve"))):  # pyright: ignore[reportU
 
     @staticmethod
     def form(flexures: int, tendons: int) -> PytreeLayout:
-        """How it is packed for a robot of so many flexures and tendons."""
+        """Return how it is packed for a robot of so many flexures and tendons."""
         sizes = {"tendon": tendons, "notch": flexures, "body": flexures + 1, "row": 3, "axis": 3}
         own = (REGISTERED[name] for name in Shape._fields)
         return PytreeLayout.of(
@@ -41,7 +41,7 @@ class Shape(namedtuple("Shape", _reported("solve"))):  # pyright: ignore[reportU
 
 
 def shape(chain: Chain, solved: SolverState) -> Shape:
-    """What the program of a solve reports of a solved state."""
+    """Return what the program of a solve reports of a solved state."""
     state = SolvedState(chain, solved)
     return Shape(*(state.quantity(name) for name in Shape._fields))
 
@@ -53,7 +53,7 @@ def quantities(chain: Chain, solved: SolverState) -> dict[str, Array]:
 
 
 def believable(value: Callable[[str], Any]) -> Any:
-    """Whether states lie within what friction law, modes and geometry are for.
+    """Return whether states lie within what friction law, modes and geometry are for.
 
     Args:
         value: Gives the values of a quantity by its name.

@@ -109,7 +109,7 @@ class SolvedState:
         return jnp.broadcast_to(1.0 / self.chain.axial_stiffness, self.tensions[0].shape)
 
     def by_tendon(self, name: str) -> Float[Array, "n t"]:
-        """What the chain knows of every gap and tendon."""
+        """Return what the chain knows of every gap and tendon."""
         return in_tendon_order(
             self.chain, tuple(getattr(group, name) for group in self.chain.groups)
         )
@@ -160,7 +160,7 @@ def largest_moment(flexure: FlexureState) -> Float[Array, " n"]:
 def base_wrench(
     chain: Chain, base_tension: Float[Array, " t"], at: Evaluation, applied: BodyLoads | None
 ) -> Float[Array, " 6"]:
-    """What the holder does to the tube: moment about the base's origin, and force.
+    """Return what the holder does to the tube: moment about the base's origin, and force.
 
     It balances the loads, and the drives' pull on the tendons where they enter the base.
     """
@@ -178,10 +178,10 @@ def base_wrench(
 
 
 def notch_angles(chain: Chain, relative: Float[Array, "n d d"]) -> Float[Array, " n"]:
-    """Rotation of every body against the one before, about the axis of bending of its notch.
+    """Return rotation of every body against the one before, about the axis of bending of its notch.
 
     The axis is y of the notch's frame, turned by the notch's direction about the tube; angles of
-    up to half a turn are told apart.
+    up to half a turn are distinguished.
     """
     across = chain.notch_frame[..., IN_PLANE]
     if chain.frame is not None:
@@ -210,7 +210,7 @@ def _in_space(chain: Chain, poses: Motion) -> Motion:
 def along_edges(
     chain: Chain, exit_value: Float[Array, "n t"], entry_value: Float[Array, "n t"]
 ) -> Float[Array, "t edges"]:
-    """Values at the edges that each tendon meets, base to tip; NaN beyond its end."""
+    """Return the values at the edges that each tendon meets, base to tip; NaN beyond its end."""
     pairs = jnp.stack([exit_value, entry_value], axis=1)
     flat = pairs.reshape(-1, pairs.shape[-1]).T
     met = jnp.take_along_axis(flat, jnp.maximum(chain.contacts, 0), axis=1)
@@ -222,5 +222,5 @@ def along_edges(
 def along_contacts(
     chain: Chain, exit_value: Float[Array, "n t"], entry_value: Float[Array, "n t"]
 ) -> Float[Array, "t contacts"]:
-    """Values at the contacts of each tendon, base to tip; NaN beyond its end."""
+    """Return the values at the contacts of each tendon, base to tip; NaN beyond its end."""
     return along_edges(chain, exit_value, entry_value)[:, :-1]

@@ -186,7 +186,7 @@ def _friction_rows(here: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     none, one = jnp.zeros_like(ahead), jnp.ones_like(ahead)
 
     def slope(turns: tuple[Array, Array], pulls: tuple[Array, Array]) -> Array:
-        """Change of the limits with turning angles and tensions, where contacts can slide."""
+        """Differentiate the limits by turning angles and tensions, where contacts can slide."""
         limits = partial(chain.friction.limits, log_ratio=log_ratio)
         return slip_mask(group) * jax.jvp(limits, (*turning, tension), (*turns, pulls))[1]
 

@@ -38,7 +38,7 @@ class UnitRows(NamedTuple):
         return [constant(rows) for rows in np.split(units, max(len(self.older), 1)) if len(rows)]
 
     def of_modes(self, rows: Array) -> Array:
-        """Rows over the modes as short rows."""
+        """Return the rows over the modes as short rows."""
         return _pad(rows, sum(len(motion) for motion in self.older))
 
     def spread(self, rows: Array) -> Array:
@@ -98,7 +98,7 @@ class RowLayout:
         return self.wrench if self.turn and self.follows else self.turn
 
     def unit_rows(self) -> UnitRows:
-        """Unit rows of all columns, in order."""
+        """Return the unit rows of all columns, in order."""
         wrenches = [self.wrench] * self.older
         edges = [2 * count for count in self.tendons]
         lengths = self.tendons if self.by_stroke else ()

@@ -16,7 +16,7 @@ from notchflex.solver.residual import span_mask
 
 
 def wrench_rows(here: StateJacobians) -> tuple[Float[Array, "n w z"], list[Array]]:
-    """Rows of the resultant on the distal body and beyond, and of the wrenches handed back."""
+    """Return rows of the resultant on the distal body and beyond, and of wrenches handed back."""
     chain, unit, wrenches = here.chain, here.unit, here.at.wrenches
     assert wrenches is not None
     terminating = _terminating_rows(here)

@@ -65,7 +65,7 @@ class PreparedChain:
         return PreparedChain(dataclasses.replace(more, contacts=edges))
 
     def places(self, fields: Mapping[str, Any]) -> Int[np.ndarray, " m"]:
-        """Where the vector of the long chain holds some fields of the chain, flattened.
+        """Return where the vector of the long chain holds some fields of the chain, flattened.
 
         Args:
             fields: As `chain.laws` returns them.

@@ -240,7 +240,7 @@ def _user_cache() -> Path:
 def _machine() -> str:
     """Return a short name of the kind of processor, its instruction sets included.
 
-    A home folder may be shared by machines that are not alike.
+    A home folder may be shared by machines of different kinds.
     """
     facts = [platform.machine(), platform.processor()]
     try:

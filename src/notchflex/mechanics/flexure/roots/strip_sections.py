@@ -32,7 +32,7 @@ def strip_sections(
     length: float,
     poisson_ratio: float,
 ) -> FibreSection:
-    """Sections of the strip, its walls as wide as the tube's there, and of its roots."""
+    """Return the sections of the strip, its walls as wide as the tube's there, and of its roots."""
     # Beyond the tips of the slots the walls keep the width that they have there.
     tip = 0.5 * strip.free_length
     at = np.minimum(np.abs(beside), tip)
