@@ -137,7 +137,6 @@ class ForwardModel:
         Raises:
             InputError: The number cannot be varied.
         """
-
         size = self.ready.long.chain_layout.size
         by_number = slope(lambda value: self._packed(robot_at(value), load), at, order=order)
         return Change(by_number[size:].reshape(len(load), -1), by_number[:size])

@@ -38,7 +38,7 @@ class SparseSlopes:
     """
 
     order: int
-    parts: Sequence[Int[np.ndarray, "..."]]
+    parts: Sequence[Int[np.ndarray, ...]]
     derived: Int[np.ndarray, " d"]
 
     def at(
@@ -88,7 +88,7 @@ class SparseSlopes:
     def _differs(
         self, change: Float[np.ndarray, " m"], values: Float[np.ndarray, " m"]
     ) -> Bool[np.ndarray, " m"]:
-        """Which entries change by more than rounding; NaN, between infinite ones, counts as none."""
+        """Which entries change by more than rounding; NaN, between infinite ones, does not."""
         differs = np.zeros(len(change), bool)
         for part in self.parts:
             finite = np.abs(values[part])
