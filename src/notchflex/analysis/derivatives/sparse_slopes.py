@@ -76,10 +76,13 @@ class SparseSlopes:
         here, width = vector_of(at), width_at(at, self.order)
         changed = np.empty((len(at), len(here)), bool)
         for number in range(len(at)):
-            try:
-                moved = vector_of(_with(at, number, at[number] + width[number]))
-            except InputError:  # at the end of its range
-                moved = vector_of(_with(at, number, at[number] - width[number]))
+            moved = here
+            for side in (1.0, -1.0):
+                try:
+                    moved = vector_of(_with(at, number, at[number] + side * width[number]))
+                except InputError:  # at an end of its range; `slope` raises where at both
+                    continue
+                break
             with np.errstate(invalid="ignore"):
                 changed[number] = self._differs(moved - here, here)
         changed[:, self.derived] = False
