@@ -130,8 +130,10 @@ def test_numbers_at_different_ends_of_their_ranges():
 
 
 def test_a_number_that_cannot_be_varied_is_refused():
-    robot = nf.load_robot("pacheco2021-a")
-    model = ForwardModel(robot, PULL)
+    """Two links share a slot, so that its radius cannot be that of one."""
+    robot, load = nf.load_robot("gao2017"), nf.pull(6.0, 6.0, steps=1)
+    model = ForwardModel(robot, load)
     with pytest.raises(InputError) as refused:
-        model.changes(robot, PULL, ["notch[1].depth", "notch[9].depth"])
-    assert "9" in str(refused.value)
+        model.changes(robot, load, ["notch[1].strip_length", "notch[2].slot_radius"])
+    assert refused.value.code is nf.ErrorCode.OUT_OF_RANGE
+    assert "0.275" in str(refused.value)

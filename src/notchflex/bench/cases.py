@@ -7,8 +7,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,7 +84,7 @@ def _batch(robot: Callable[[], nf.Robot], highest: float, count: int, **tip: Any
 
 
 def _derivative(kind: str) -> Callable[[], Run]:
-    """Time a function of the robot with 27 links, or derivatives of it."""
+    """Time a function of the robot with 27 links, or derivatives of it, under other tensions."""
 
     def make() -> Run:
         numbers = ["material.elastic_modulus", "friction.coefficient", "notch[1].strip_thickness"]
@@ -92,24 +93,50 @@ def _derivative(kind: str) -> Callable[[], Run]:
         def angle(values: dict[str, jax.Array]) -> jax.Array:
             return bend(values)["total_angle"][-1]
 
-        def along(tangent: dict[str, jax.Array]) -> jax.Array:
-            return jax.jvp(angle, (start,), (tangent,))[1]
+        def along(tangent: dict[str, jax.Array], values: dict[str, jax.Array]) -> jax.Array:
+            return jax.jvp(angle, (values,), (tangent,))[1]
 
         start = bend.start
         pulled = jax.tree.map(np.zeros_like, start) | {"tension": np.ones((1, 1))}
         units = [jax.tree.map(np.zeros_like, start) | {name: np.ones(())} for name in numbers]
         three = jax.tree.map(lambda *rows: np.stack(rows), *units)
-        functions: dict[str, tuple[Callable[..., Any], Any]] = {
-            "value": (angle, start),
-            "jvp": (along, pulled),
-            "three": (jax.vmap(along), three),
-            "reverse": (jax.grad(angle), start),
+        functions: dict[str, Callable[..., Any]] = {
+            "value": angle,
+            "jvp": partial(along, pulled),
+            "three": lambda values: jax.vmap(along, in_axes=(0, None))(three, values),
+            "reverse": jax.grad(angle),
         }
-        function, argument = functions[kind]
-        compiled = jax.jit(function)
-        return lambda: jax.block_until_ready(compiled(argument))
+        # The last result is kept, so no tension may follow itself.
+        changing = cycle(start | {"tension": start["tension"] + more} for more in (0.0, 0.01))
+        return _next(jax.jit(functions[kind]), changing)
 
     return make
+
+
+def _by_dimensions(kind: str) -> Callable[[], Run]:
+    """Time a function of 27 dimensions, or its value and gradient, at ever other dimensions."""
+
+    def make() -> Run:
+        names = [f"notch[{number}].strip_thickness" for number in range(1, 28)]
+        bend = nf.differentiable(_links(), nf.pull(6.0, 6.0, steps=1), names)
+
+        def angle(values: dict[str, jax.Array]) -> jax.Array:
+            return bend(values)["total_angle"][-1]
+
+        random = np.random.default_rng(0)
+
+        def changing() -> Iterator[dict[str, Any]]:
+            while True:
+                yield {name: 0.7 + 1e-3 * random.uniform(-1.0, 1.0) for name in names}
+
+        function = {"value": angle, "reverse": jax.value_and_grad(angle)}[kind]
+        return _next(jax.jit(function), changing())
+
+    return make
+
+
+def _next(function: Callable[[Any], Any], arguments: Iterator[Any]) -> Run:
+    return lambda: jax.block_until_ready(function(next(arguments)))
 
 
 _FIRST = """
@@ -174,6 +201,7 @@ def _run(arguments: list[str], cache: dict[str, str] | None = None) -> str:
 
 
 _FUNCTION = "links (Gao) as a JAX function"
+_DIMENSIONS = "links (Gao) as a function of 27 dimensions, new ones"
 _TIP = {"tip_force": (0.05 * 9.81, 0.0, 0.0)}  # 50 g, N
 _FOUR: dict[str, Any] = {"tension": [0.1, 0.05, 0.0, 0.02], "tip_force": (0.002, 0.001, 0.0)}
 # fmt: off
@@ -195,6 +223,8 @@ CASES: tuple[Case, ...] = (
     Case("its slope along one direction (jvp)", 1.6, _derivative("jvp"), of=_FUNCTION),
     Case("its slopes by three parameters", 2.5, _derivative("three"), of=_FUNCTION),
     Case("its gradient by all (reverse)", 3.0, _derivative("reverse"), of=_FUNCTION),
+    Case(_DIMENSIONS, None, _by_dimensions("value")),
+    Case("its value and gradient by all 27", 3.0, _by_dimensions("reverse"), of=_DIMENSIONS),
     Case("first call, wrist, nothing compiled", 1.5,
          partial(first_call, "pacheco2021-a"), unit="s"),
     Case("first call, links (Gao), nothing compiled", 5.0,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -102,12 +102,13 @@ class ForwardModel:
         others = tuple(name for name in names if name not in found)
         if len(others) == 1:
             at = number_at(robot, others[0])
-            one = self.change_along(lambda value: robot.with_value(others[0], value), at, load)
-            return [found.get(name, one) for name in names]
-        if others not in self._geometry:
-            self._geometry[others] = GeometrySlopes(self.ready, others)
-        slopes = self._geometry[others].at(self._moved, robot, load)
-        found |= zip(others, slopes, strict=True)
+            moved = partial(robot.with_value, others[0])
+            found[others[0]] = self.change_along(moved, at, load)
+        elif others:
+            if others not in self._geometry:
+                self._geometry[others] = GeometrySlopes(self.ready, others)
+            slopes = self._geometry[others].at(self._moved, robot, load)
+            found |= zip(others, slopes, strict=True)
         return [found[name] for name in names]
 
     def _of_law(self, robot: Robot, name: str) -> Change:
@@ -136,7 +137,6 @@ class ForwardModel:
         Raises:
             InputError: The number cannot be varied.
         """
-
         size = self.ready.long.chain_layout.size
         by_number = slope(lambda value: self._packed(robot_at(value), load), at, order=order)
         return Change(by_number[size:].reshape(len(load), -1), by_number[:size])

@@ -36,7 +36,8 @@ def slope(
     Raises:
         InputError: The number cannot be varied.
     """
-    return differences(lambda values: vector_of(float(values)), value, order) / width_at(value, order)
+    per_width = differences(lambda moved: vector_of(float(moved)), value, order)
+    return per_width / width_at(value, order)
 
 
 def differences(

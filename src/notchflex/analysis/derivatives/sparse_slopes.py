@@ -38,7 +38,7 @@ class SparseSlopes:
     """
 
     order: int
-    parts: Sequence[Int[np.ndarray, "..."]]
+    parts: Sequence[Int[np.ndarray, ...]]
     derived: Int[np.ndarray, " d"]
 
     def at(
@@ -76,10 +76,13 @@ class SparseSlopes:
         here, width = vector_of(at), width_at(at, self.order)
         changed = np.empty((len(at), len(here)), bool)
         for number in range(len(at)):
-            try:
-                moved = vector_of(_with(at, number, at[number] + width[number]))
-            except InputError:  # at the end of its range
-                moved = vector_of(_with(at, number, at[number] - width[number]))
+            moved = here
+            for side in (1.0, -1.0):
+                try:
+                    moved = vector_of(_with(at, number, at[number] + side * width[number]))
+                except InputError:  # at an end of its range; `slope` raises where at both
+                    continue
+                break
             with np.errstate(invalid="ignore"):
                 changed[number] = self._differs(moved - here, here)
         changed[:, self.derived] = False
@@ -88,7 +91,7 @@ class SparseSlopes:
     def _differs(
         self, change: Float[np.ndarray, " m"], values: Float[np.ndarray, " m"]
     ) -> Bool[np.ndarray, " m"]:
-        """Which entries change by more than rounding; NaN, between infinite ones, counts as none."""
+        """Which entries change by more than rounding; NaN, between infinite ones, does not."""
         differs = np.zeros(len(change), bool)
         for part in self.parts:
             finite = np.abs(values[part])

@@ -169,10 +169,9 @@ def shape_of(
 ) -> Shaped:
     """What of a robot's chain follows from its shape alone; for the arguments see `assemble`."""
     chord, fibres = robot.friction.turns_with_chord, robot.material.by_fibres
-    given = (robot.tube, robot.notches, sites_of(robot), robot.tendon, level, refinement, chord)
-    if flexures is None:
-        return _kept_shape(*given, fibres)
-    return _shaped(*given, fibres, flexures)
+    sites = sites_of(robot)
+    shaped = _kept_shape if flexures is None else partial(_shaped, flexures=flexures)
+    return shaped(robot.tube, robot.notches, sites, robot.tendon, level, refinement, chord, fibres)
 
 
 def _shaped(
@@ -184,7 +183,7 @@ def _shaped(
     refinement: int,
     turns_with_chord: bool,
     by_fibres: bool,
-    flexures: FlexureOf,
+    flexures: FlexureOf = flexure,
 ) -> Shaped:
     # Notches that are alike are worked out once.
     placed = tuple(zip(notches, sites, strict=True))
@@ -220,7 +219,7 @@ def _shaped(
 
 
 # A search for constants of the material or of friction assembles one shape hundreds of times.
-_kept_shape = lru_cache(maxsize=64)(partial(_shaped, flexures=flexure))
+_kept_shape = lru_cache(maxsize=64)(_shaped)
 
 
 def _flat(chain: Chain, frame: Float[np.ndarray, "3 3"]) -> Chain:

@@ -23,7 +23,9 @@ class FlexureOf(Protocol):
         level: str,
         refinement: int,
         by_fibres: bool,
-    ) -> tuple[Rod, Motion]: ...
+    ) -> tuple[Rod, Motion]:
+        """Make a flexure, and its pose in the free robot."""
+        ...
 
 
 @lru_cache(maxsize=512)

@@ -16,7 +16,7 @@ then nearly orthogonal, and a condition at the far edge leaves out one polynomia
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -47,7 +47,12 @@ def _polynomials(integrals: int) -> np.ndarray:
 
 
 _GAUSS = np.polynomial.legendre.leggauss(_COUNT)  # exact for products of two polynomials
-_IN_SURFACE, _OUTWARD = _polynomials(1), _polynomials(2)
+
+
+@cache
+def _surface() -> tuple[np.ndarray, np.ndarray]:
+    """Polynomials of the displacements in the surface, and of that outward."""
+    return _polynomials(1), _polynomials(2)
 
 
 def _strains() -> np.ndarray:
@@ -76,6 +81,8 @@ def _strains() -> np.ndarray:
     return factors
 
 
+# Robots with rigid ends do without; this takes a tenth of a second.
+@cache
 def _energies() -> np.ndarray:
     """Integrate the products of strains that the energy is made of, for r = 1.
 
@@ -84,7 +91,8 @@ def _energies() -> np.ndarray:
         of displacements × polynomials. Parts are the membrane and bending.
     """
     size = 3 * _COUNT
-    tables = np.stack([_IN_SURFACE, _IN_SURFACE, _OUTWARD])[:, :, 1:]
+    in_surface, outward = _surface()
+    tables = np.stack([in_surface, in_surface, outward])[:, :, 1:]
     strains = np.einsum("pdsk,kdgi->pdsgki", _strains(), tables).reshape(3, 3, 6, _COUNT, size)
     plane = np.array([np.diag([1.0, 1.0, 0.5]), [[0, 1, 0], [1, 0, 0], [0, 0, -0.5]]])
     found = np.zeros((2, 2, 5, 5, size, size))
@@ -109,13 +117,18 @@ def _held(boundary: str) -> np.ndarray:
     return held.reshape(HARMONICS, -1)
 
 
-_ENERGIES = _energies()
+@cache
+def _edge() -> np.ndarray:
+    """Axial displacement and slope at the loaded edge of every polynomial, (3 × polynomials, 2)."""
+    in_surface, outward = _surface()
+    edge = np.zeros((3 * _COUNT, 2))
+    edge[:_COUNT, 0] = in_surface[0, 0]
+    edge[2 * _COUNT :, 1] = outward[1, 0]
+    return edge
+
+
 _POWERS = np.arange(HARMONICS, dtype=float)[:, None] ** np.arange(5)
 _HELD = {boundary: _held(boundary) for boundary in ("between", "clamped", "free")}
-# Axial displacement and slope at the loaded edge of every polynomial, shape (3 × polynomials, 2).
-_EDGE = np.zeros((3 * _COUNT, 2))
-_EDGE[:_COUNT, 0] = _IN_SURFACE[0, 0]
-_EDGE[2 * _COUNT :, 1] = _OUTWARD[1, 0]
 
 
 @lru_cache(maxsize=256)  # rings of one length are equal, however deep the notches beside them
@@ -145,10 +158,10 @@ def edge_compliance(
     factors = np.einsum("a,b,c->abc", parts, material, slopes).ravel()
     held = _HELD[boundary]
     free = (~held[:, :, None] & ~held[:, None, :]).astype(float)
-    by_power = (factors @ _ENERGIES.reshape(20, -1)).reshape(5, -1)
+    by_power = (factors @ _energies().reshape(20, -1)).reshape(5, -1)
     stiffness = (_POWERS @ by_power).reshape(HARMONICS, 3 * _COUNT, 3 * _COUNT)
     stiffness = free * stiffness + np.eye(3 * _COUNT) * held[:, :, None]
-    edge = np.stack([_EDGE[:, 0] * one, _EDGE[:, 1] * ratio], axis=-1)
+    edge = np.stack([_edge()[:, 0] * one, _edge()[:, 1] * ratio], axis=-1)
     loads = np.where(held[:, :, None], 0.0, edge[None])
     flexibility = np.swapaxes(loads, 1, 2) @ np.linalg.solve(stiffness, loads)
     # Displacements are of order r² per N/mm over E t length; slopes have one r less.
