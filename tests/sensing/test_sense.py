@@ -103,6 +103,35 @@ def test_what_one_tendon_cannot_know_is_said_with_its_direction(wrist):
     assert seen.force[-1] == pytest.approx([0.02, 0.0], abs=1e-5)
 
 
+def test_a_direction_that_noise_alone_hides_is_not_said_to_stick(wrist):
+    # A force along z moves the tip of a bent robot little: its deviation is beyond a tenth of the
+    # range, and the tendon slides.
+    load = nf.Load(tension=0.8, tip_force=(0.02, 0.0, 0.0))
+    here = nf.solve(wrist, load)
+    drawn = (here.tension[None], here.stroke[None])
+    noise = SensorNoise(tension=0.01, stroke=0.01, tip=0.05)
+    sensed = sense(wrist, *drawn, tip=here.tip_position[None], noise=noise, components="xz")
+
+    def at(tension, x, z):
+        one = nf.solve(wrist, nf.Load(tension=tension, tip_force=(x, 0.0, z)))
+        return np.append(one.stroke, one.tip_position[[0, 2]])
+
+    # Least squares with differences: noise of the stroke and the tip, and of what drives the model.
+    step = 1e-4
+    moves = ((0.0, step, 0.0), (0.0, 0.0, step), (step, 0.0, 0.0))
+    x, z, drive = (
+        (at(0.8 + t, 0.02 + x, z) - at(0.8 - t, 0.02 - x, -z)) / (2.0 * step) for t, x, z in moves
+    )
+    covariance = np.diag([0.01, 0.05, 0.05]) ** 2 + 0.01**2 * np.outer(drive, drive)
+    slopes = np.stack([x, z], axis=1)
+    expected = np.linalg.inv(slopes.T @ np.linalg.solve(covariance, slopes))
+    assert np.sqrt(np.linalg.eigvalsh(expected)[-1]) > 0.1 * sensed.largest
+    # Differences of this step agree with the slopes to a thousandth.
+    np.testing.assert_allclose(sensed.covariance[0], expected, rtol=1e-3)
+    assert not sensed.stuck.any()
+    assert not sensed.not_observable
+
+
 def test_the_standard_deviation_is_that_of_repeated_readings(wrist):
     path = read(wrist, [0.3, 0.6, 0.8], [0.0, 0.01, 0.02])
     rng, found = np.random.default_rng(5), []

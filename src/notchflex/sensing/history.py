@@ -21,8 +21,8 @@ from notchflex.solver.continuation import SolverState
 
 Progress = Callable[[int, int], None]
 
-# A deviation beyond this part of the range of the search is none of first order.
-_LINEAR = 0.1
+LINEAR = 0.1
+"""A deviation beyond this part of the range of the search is none of first order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class History:
     @property
     def linear(self) -> float:
         """Largest deviation of a force that is of first order, N."""
-        return _LINEAR * self.model.largest
+        return LINEAR * self.model.largest
 
 
 def estimate(model: SensingModel, progress: Progress | None = None) -> History:
@@ -176,4 +176,12 @@ def _slopes_along(
     return results[0], results[1]
 
 
-__all__ = ["History", "Progress", "estimate", "known_inverse", "whitening_of", "with_noise"]
+__all__ = [
+    "LINEAR",
+    "History",
+    "Progress",
+    "estimate",
+    "known_inverse",
+    "whitening_of",
+    "with_noise",
+]

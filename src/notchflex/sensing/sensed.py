@@ -29,7 +29,7 @@ class SensedForce(Displayed):
         force: The force that fits best, (s, d); of averaged readings that of the mean, moved
             towards that of the reading by as much as noise does not explain.
         covariance: Its covariance by the noise of all readings up to it, to first order, N²,
-            (s, d, d). Along a direction that changes no reading it is that of the interval.
+            (s, d, d). Along a direction that changes hardly any reading the interval bounds it.
         low: Smallest component that fits the reading: noise and stuck friction together, (s, d);
             also where it was averaged with others, by its own noise.
         high: Largest component that fits, (s, d).

@@ -79,6 +79,7 @@ def sensed_columns(sensed: SensedForce) -> dict[str, Any]:
             f"force_{name}_high_N": sensed.high[:, which],
             f"force_{name}_sd_N": sensed.deviation[:, which],
             f"force_{name}_stuck": sensed.stuck[:, which],
+            f"force_{name}_limited": sensed.limited[:, which],
         }
     columns["averaged_as"] = sensed.group + 1
     columns["contact"] = sensed.contact
