@@ -104,6 +104,7 @@ def sensed_document(sensed: SensedForce) -> dict[str, Any]:
             "contact": bool(sensed.contact[number]),
             "contact_p": float(sensed.contact_probability[number]),
             "misfit": float(sensed.misfit[number]),
+            "explained": not sensed.unexplained[number],
             "numbers_read": int(sensed.read[number]),
             "averaged_as": int(sensed.group[number]) + 1,
             "not_observable": sensed.hidden[number],

@@ -126,6 +126,13 @@ def sense(
             progress=show,
         )
     _write(sensed, outputs)
+    if sensed.unexplained.any():
+        first, count = int(sensed.unexplained.argmax()) + 1, int(sensed.unexplained.sum())
+        terminal.warn(
+            f"{count} of {len(sensed)} readings, first reading {first}, are explained by no force "
+            "within the noise; the robot may differ from its model, or the noise be larger. "
+            "Intervals from there on may not hold the force."
+        )
     if not sensed.reason:
         return DONE
     terminal.error(f"not converged: {sensed.reason}. The readings after it are left out.")
