@@ -92,14 +92,17 @@ class RobotCore:
         place = _finite(position, 3)
         if place is None:
             return "INVALID_INPUT"
-        found = nf.reach(
-            self.robot,
-            MM_PER_M * place,
-            state=self.now.state,
-            drive=self.drive,
-            approach="direct",
-            search=SEARCH,
-        )
+        try:
+            found = nf.reach(
+                self.robot,
+                MM_PER_M * place,
+                state=self.now.state,
+                drive=self.drive,
+                approach="direct",
+                search=SEARCH,
+            )
+        except nf.InputError as problem:
+            return problem.code.name
         return self._go(found.load) or found.code
 
     def joints(self) -> JointValues:

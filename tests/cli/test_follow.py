@@ -48,6 +48,17 @@ def test_a_target_out_of_reach_exits_with_1(call, tmp_path):
     assert "target 2" in err
 
 
+@pytest.mark.parametrize(("unit", "scale"), [("m", 1e-3), ("µm", 1e3)])
+def test_positions_in_another_unit_are_told_from_targets_out_of_reach(call, tmp_path, unit, scale):
+    (tmp_path / "other.csv").write_text(f"tip_x_mm,tip_z_mm\n{2.4 * scale},{9.3 * scale}\n")
+    code, _, err = call("follow", "pacheco2021-a", "other.csv")
+    assert code == 1
+    assert err.rstrip().endswith(f"in {unit}.")
+    # A target that is too far in mm is none of these.
+    (tmp_path / "far.csv").write_text("tip_x_mm,tip_z_mm\n30,0\n")
+    assert "positions are in mm" not in call("follow", "pacheco2021-a", "far.csv")[2]
+
+
 def test_overshoots_are_shown(call, tmp_path):
     (tmp_path / "angle.csv").write_text("total_deg\n40\n")
     code, out, _ = call("follow", "pacheco2021-a", "angle.csv", "--approach", "least")

@@ -83,6 +83,15 @@ def test_bad_input_is_refused(refused, read, code, arguments):
     refused(code, "sense", ROBOT, *arguments)
 
 
+def test_tensions_that_are_all_negative_are_refused(refused, tmp_path):
+    text = "tendon_force_N,tendon_displacement_mm,tip_x_mm\n-0.2,0.225,1.4\n-0.4,0.473,2.9\n"
+    (tmp_path / "pushed.csv").write_text(text)
+    message = refused("OUT_OF_RANGE", "sense", ROBOT, "pushed.csv", "--with", "tip")
+    assert "-0.4 N" in message
+    message = refused("OUT_OF_RANGE", "compare", ROBOT, "pushed.csv")
+    assert "pushed.csv" in message
+
+
 def mutated(rng: random.Random) -> str:
     """A table with something wrong, or nothing."""
     text = list(READ)

@@ -72,6 +72,13 @@ def test_commands_that_cannot_be_used_change_nothing(core, values):
     assert core.joints() == before
 
 
+def test_a_target_beyond_all_robots_changes_nothing(core):
+    core.command([0.5])
+    before = core.joints()
+    assert core.steer([1e300, 0.0, 0.0]) == "OUT_OF_RANGE"
+    assert core.joints() == before
+
+
 def test_codes_of_failures_and_of_wrong_settings(core, core_module):
     assert core.command([-1.0]) == "OUT_OF_RANGE"
     by_stroke = core_module.RobotCore(core.robot, "stroke")

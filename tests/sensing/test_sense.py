@@ -103,6 +103,76 @@ def test_what_one_tendon_cannot_know_is_said_with_its_direction(wrist):
     assert seen.force[-1] == pytest.approx([0.02, 0.0], abs=1e-5)
 
 
+def test_a_direction_that_noise_alone_hides_is_not_said_to_stick(wrist):
+    # A force along z moves the tip of a bent robot little: its deviation is beyond a tenth of the
+    # range, and the tendon slides.
+    load = nf.Load(tension=0.8, tip_force=(0.02, 0.0, 0.0))
+    here = nf.solve(wrist, load)
+    drawn = (here.tension[None], here.stroke[None])
+    noise = SensorNoise(tension=0.01, stroke=0.01, tip=0.05)
+    sensed = sense(wrist, *drawn, tip=here.tip_position[None], noise=noise, components="xz")
+
+    def at(tension, x, z):
+        one = nf.solve(wrist, nf.Load(tension=tension, tip_force=(x, 0.0, z)))
+        return np.append(one.stroke, one.tip_position[[0, 2]])
+
+    # Least squares with differences: noise of the stroke and the tip, and of what drives the model.
+    step = 1e-4
+    moves = ((0.0, step, 0.0), (0.0, 0.0, step), (step, 0.0, 0.0))
+    x, z, drive = (
+        (at(0.8 + t, 0.02 + x, z) - at(0.8 - t, 0.02 - x, -z)) / (2.0 * step) for t, x, z in moves
+    )
+    covariance = np.diag([0.01, 0.05, 0.05]) ** 2 + 0.01**2 * np.outer(drive, drive)
+    slopes = np.stack([x, z], axis=1)
+    expected = np.linalg.inv(slopes.T @ np.linalg.solve(covariance, slopes))
+    assert np.sqrt(np.linalg.eigvalsh(expected)[-1]) > 0.1 * sensed.largest
+    # Differences of this step agree with the slopes to a thousandth.
+    np.testing.assert_allclose(sensed.covariance[0], expected, rtol=1e-3)
+    assert not sensed.stuck.any()
+    assert not sensed.not_observable
+
+
+def test_readings_that_no_force_explains_are_told(wrist):
+    path = read(wrist, [0.4, 0.8], [0.02, 0.02])
+    tip = path.tip_position.copy()
+    noise = SensorNoise(tension=0.001, stroke=0.001, tip=0.01)
+    good = sense(wrist, path.tension, path.stroke, tip=tip, noise=noise)
+    assert not good.unexplained.any()
+    tip[1, 2] += 1.0  # a hundred times the noise, where the force along x moves the tip sideways
+    bad = sense(wrist, path.tension, path.stroke, tip=tip, noise=noise)
+    assert bad.unexplained.tolist() == [False, True]
+    assert "not explained" in str(bad)
+    document = sensed_document(bad)
+    assert [one["explained"] for one in document["readings"]] == [True, False]
+
+
+@pytest.mark.nightly
+def test_a_force_is_found_across_the_crease_where_a_contact_begins_to_slide():
+    # Gauss-Newton steps stopped at the crease, with the interval beside the force.
+    robot = nf.load_robot("two-axis-wrist")
+    pulled = [
+        0.20686388169386827,
+        0.2637277633877365,
+        0.3205916450816048,
+        0.3774555267754731,
+        0.43431940846934136,
+        0.4911832901632096,
+        0.548047171857078,
+    ]
+    tension = np.full((len(pulled), 4), 0.15)
+    tension[:, 0] = pulled
+    force = np.zeros((len(pulled), 3))
+    force[-1, :2] = [-0.011813493902268758, -0.007339284233082442]
+    external = tuple(nf.Load(tip_force=tuple(one)).external for one in force.tolist())
+    path = nf.simulate(
+        robot, nf.LoadPath(tension, np.full_like(tension, np.nan), external=external)
+    ).raise_if_failed()
+    sensed = sense(robot, path.tension, path.stroke, noise=EXACT, components="xy")
+    assert not sensed.reason
+    assert np.abs(sensed.force - force[:, :2]).max() < 1e-8
+    assert ((sensed.low <= force[:, :2]) & (force[:, :2] <= sensed.high)).all()
+
+
 def test_the_standard_deviation_is_that_of_repeated_readings(wrist):
     path = read(wrist, [0.3, 0.6, 0.8], [0.0, 0.01, 0.02])
     rng, found = np.random.default_rng(5), []

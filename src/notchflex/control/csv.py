@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from difflib import get_close_matches
 
 import numpy as np
 
 from notchflex._quantity import DEGREES
 from notchflex.control.targets import DIRECTION, Targets, make_targets, sizes_of, target_shapes
 from notchflex.errors import InputError
+from notchflex.loads.validation import short_repr
 from notchflex.results.files.csv_reading import read_table
 from notchflex.results.quantities.registry import AXES, QUANTITIES
 from notchflex.robot import Robot
@@ -46,9 +48,10 @@ def read_targets(source: str | os.PathLike[str], robot: Robot) -> Targets:
     columns = dict(_columns(robot))
     unknown = [name for name in table.header if name not in columns]
     if unknown:
+        near = get_close_matches(unknown[0], columns, 2, 0.6)
+        meant = f"did you mean {' or '.join(near)}" if near else f"there are {_shown(columns)}"
         raise InputError.TABLE_COLUMNS(
-            f"{table.name}: {unknown[0]!r} is not a column of targets; there are "
-            f"{', '.join(_shown(columns))}"
+            f"{table.name}: {short_repr(unknown[0])} is not a column of targets; {meant}"
         )
     shapes = target_shapes(robot)
     values: dict[str, np.ndarray] = {}
@@ -84,6 +87,7 @@ def _columns(robot: Robot) -> Iterator[tuple[str, tuple[str, tuple[int, ...]]]]:
                 continue
 
 
-def _shown(columns: dict[str, tuple[str, tuple[int, ...]]]) -> list[str]:
+def _shown(columns: dict[str, tuple[str, tuple[int, ...]]]) -> str:
     """Columns for a message: of those per notch the first alone."""
-    return [name for name, (_, index) in columns.items() if not ("notch_" in name and index[0])]
+    names = [name for name, (_, index) in columns.items() if not ("notch_" in name and index[0])]
+    return ", ".join(names)

@@ -13,6 +13,7 @@ from notchflex._summary import Displayed, Summary, short, vector
 from notchflex.analysis.solve import simulate
 from notchflex.control.search.problem import Attempt
 from notchflex.control.targets import Targets
+from notchflex.control.units import unit_hint
 from notchflex.errors import Failure
 from notchflex.loads import Load, LoadPath
 from notchflex.results.equilibrium import Equilibrium
@@ -91,7 +92,17 @@ class Following(Displayed):
     @property
     def reason(self) -> list[str]:
         """Why each target is not met; empty where it is."""
-        return [_reason(one.failure, one.error) for one in self.attempts]
+        return [self._reason(target) for target in range(len(self))]
+
+    def _reason(self, target: int) -> str:
+        failure, error = self.attempts[target].failure, self.attempts[target].error
+        if failure is None:
+            return ""
+        hint = ""
+        if failure is not Failure.SEARCH_STOPPED:
+            positions = self.targets.values.get("tip_position")
+            hint = unit_hint(self.robot, None if positions is None else positions[target])
+        return f"{failure.text.format(error=error)}; {failure.remedy}{hint}"
 
     @cached_property
     def tension(self) -> Float[np.ndarray, "k t"]:
@@ -126,10 +137,6 @@ class Following(Displayed):
             rows.append((f"target {first + 1}", self.reason[first]))
         hint = "[target] is one result; also .tension, .stroke, .path, .state"
         return Summary(f"Targets followed by {self.robot.name}", rows, hint)
-
-
-def _reason(failure: Failure | None, error: float) -> str:
-    return f"{failure.text.format(error=error)}; {failure.remedy}" if failure else ""
 
 
 class Reach(Displayed):

@@ -12,6 +12,9 @@ import numpy as np
 from notchflex.errors import InputError
 from notchflex.robot import Robot
 
+# Offsets of sensors of tension: so large, N, or such a part of the largest tension.
+_OFFSET, _PART = 0.05, 0.1
+
 
 def check_number(value: Any, what: str, form: str = "a number") -> float:
     """Return a number as a float; text and truth values are refused."""
@@ -90,6 +93,31 @@ def check_table(value: Any, what: str) -> np.ndarray:
         ) from None
 
 
+def check_pulls(tension: np.ndarray, least: float = 0.0, source: str = "") -> None:
+    """Refuse measured tensions of a tendon that are all negative.
+
+    Small ones are the offset of a sensor, of a slack tendon or beside others that are pulled.
+
+    Args:
+        tension: Tensions by rows and tendons, N, NaN where not measured.
+        least: Negative tensions up to this are an offset, N, if it is more than 0.05 N.
+        source: The file, for the message.
+
+    Raises:
+        InputError: The sign or the zero of the sensor is wrong.
+    """
+    largest = float(np.nanmax(np.abs(tension), initial=0.0))
+    least = max(least, _OFFSET, _PART * largest)
+    place = f"{source}: " if source else ""
+    for tendon, values in enumerate(tension.T, 1):
+        known = values[np.isfinite(values)]
+        if len(known) and known.max() < 0.0 and known.min() < -least:
+            raise InputError.OUT_OF_RANGE(
+                f"{place}all tensions of tendon {tendon} are negative, down to {known.min():g} N, "
+                "but a tendon only pulls; change their sign, or take away the sensor's offset"
+            )
+
+
 def one_or_several(value: Any, kind: type, what: str) -> list[Any]:
     """Return one value of a kind, or several in order, as a list; the entries are not checked."""
     try:
@@ -117,5 +145,5 @@ def short_repr(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-__all__ = ["check_bool", "check_integer", "check_is_robot", "check_number", "check_table"]
-__all__ += ["check_vector", "one_or_several", "short_repr"]
+__all__ = ["check_bool", "check_integer", "check_is_robot", "check_number", "check_pulls"]
+__all__ += ["check_table", "check_vector", "one_or_several", "short_repr"]

@@ -13,6 +13,9 @@ from notchflex.sensing.model import SensingModel, Step
 from notchflex.solver.programs.run import SolverRun
 from notchflex.solver.solver_state import SolverState
 
+# Part of the range over which differences stand for slopes.
+_NARROW = 1e-5
+
 
 @dataclass(frozen=True, eq=False)
 class Solved:
@@ -127,16 +130,17 @@ class ReadingProblem:
         """
         change = at.solved.slopes[self.step.entries]
         if not np.isfinite(change).all():
-            change = self._differences(at)
+            return self.differences(at, _NARROW)
         return self.whitening @ change
 
-    def _differences(self, at: Candidate) -> Float[np.ndarray, "m d"]:
-        width = 1e-5 * self.model.largest
+    def differences(self, at: Candidate, part: float) -> Float[np.ndarray, "m d"]:
+        """Return the same by differences over twice this part of the range."""
+        width = part * self.model.largest
         moves = width * np.eye(self.model.size)
         every = self._solved(np.concatenate([at.force + moves, at.force - moves]))
         values = np.array([one.values for one in every])[:, self.step.entries]
         half = len(moves)
-        return np.nan_to_num((values[:half] - values[half:]).T / (2.0 * width))
+        return self.whitening @ np.nan_to_num((values[:half] - values[half:]).T / (2.0 * width))
 
     def clipped(self, forces: Float[np.ndarray, "k d"]) -> Float[np.ndarray, "k d"]:
         """Return forces within the range of the search."""

@@ -21,8 +21,8 @@ from notchflex.solver.solver_state import SolverState
 
 Progress = Callable[[int, int], None]
 
-# A deviation beyond this part of the range of the search is none of first order.
-_LINEAR = 0.1
+LINEAR = 0.1
+"""A deviation beyond this part of the range of the search is none of first order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class History:
     @property
     def linear(self) -> float:
         """Largest deviation of a force that is of first order, N."""
-        return _LINEAR * self.model.largest
+        return LINEAR * self.model.largest
 
 
 def estimate(model: SensingModel, progress: Progress | None = None) -> History:
@@ -80,8 +80,8 @@ def _estimate_one(
     if not len(step.entries):
         return step, at
     if np.isfinite(at.misfit):
-        drives = model.slopes(at.solved.alone, of_drives=True)[0][step.entries]
-        noise = np.diag(step.variance) + (np.nan_to_num(drives) * step.driving) @ drives.T
+        drives = model.drive_slopes(state, at.solved.alone, number)[step.entries]
+        noise = np.diag(step.variance) + (drives * step.driving) @ drives.T
         problem = replace(problem, whitening=whitening_of(noise))
         at = best(problem, at.force[None])
     if state is not None and np.isfinite(at.misfit):
@@ -110,6 +110,12 @@ def with_noise(history: History) -> History:
     forces = np.array([one.force for one in found])
     path = model.follow(forces)
     by_drive, by_force = _slopes_along(model, path)
+    for k, own in enumerate(by_drive[range(len(found)), range(len(found))]):
+        if not np.isfinite(own).all():
+            start = found[k - 1].state if k else None
+            by_drive[k, k] = model.drive_slopes(start, found[k].solved.alone, k).T
+    # What is not known of the memory of so hard a state is left out.
+    by_drive, by_force = np.nan_to_num(by_drive), np.nan_to_num(by_force)
     sizes = [len(step.entries) for step in steps]
     tendons = by_drive.shape[2]
     first = np.cumsum([0, *sizes])
@@ -170,10 +176,18 @@ def _slopes_along(
                 load[step] = change
                 along = tangents.along(Change(load, None))
                 parts = [along[name].reshape(len(path), -1) for name in model.outputs]
-                row.append(np.nan_to_num(np.concatenate(parts, axis=1)))
+                row.append(np.concatenate(parts, axis=1))
             slopes.append(np.stack(row, axis=1))
         results.append(np.array(slopes))
     return results[0], results[1]
 
 
-__all__ = ["History", "Progress", "estimate", "known_inverse", "whitening_of", "with_noise"]
+__all__ = [
+    "LINEAR",
+    "History",
+    "Progress",
+    "estimate",
+    "known_inverse",
+    "whitening_of",
+    "with_noise",
+]

@@ -167,6 +167,38 @@ class SensingModel:
             columns.append(np.concatenate(parts, axis=1))
         return np.stack(columns, axis=-1)
 
+    def drive_slopes(
+        self, start: SolverState | None, path: EquilibriumPath, number: int
+    ) -> Float[np.ndarray, "outputs t"]:
+        """Return the change of what is read by each tendon's command, in one reading.
+
+        Where a state was so hard to reach that its derivatives are not known, by differences over
+        the deviation of the command; without noise that is 0.
+
+        Args:
+            start: The state at the reading before.
+            path: The reading, solved.
+            number: Which reading.
+        """
+        change = self.slopes(path, of_drives=True)[0]
+        width = self.readings.driving_deviation[number]
+        if np.isfinite(change).all() or not width.any():
+            return np.nan_to_num(change)
+        load, count = path.load, len(width)
+        moves = np.concatenate([np.diag(width), -np.diag(width)])
+        moved = LoadPath.of_valid(
+            np.maximum(load.tension + moves, 0.0),  # NaN stays NaN: not commanded
+            load.stroke + moves,
+            load.base_rotation,
+            load.external * len(moves),
+        )
+        values = self.values(self._each.solve(self.robot, moved, start))
+        solved = np.asarray(np.isfinite(values).all(axis=1))
+        values = np.where(solved[:, None], values, self.values(path))
+        over = width * solved.reshape(2, count).sum(axis=0)
+        apart = values[:count] - values[count:]
+        return np.asarray(apart.T / np.where(over > 0.0, over, np.inf))
+
     def force_changes(self, path: EquilibriumPath) -> list[Float[np.ndarray, " command"]]:
         """Change of a packed load by a unit of each component; loads are linear in them."""
         load, ready = path.load, path.prepared

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
 from notchflex.sensing.bounds import Bounds
+from notchflex.sensing.history import LINEAR
 from notchflex.sensing.model import SensingModel
 from notchflex.sensing.own_reading import OwnReading
 
@@ -24,8 +25,8 @@ class LeftOpen:
     """What one reading leaves open.
 
     Attributes:
-        covariance: Of the force by noise, to first order; along a direction that changes nothing by
-            the width of the interval, or by the range of the search where nothing bounds it, N².
+        covariance: Of the force by noise, to first order, N². Along a direction that hardly changes
+            what is read, the interval bounds it; where nothing does, it is the range of the search.
         stuck: Components that friction hides within the interval, (d,).
         hidden: Directions that are not observable, unit rows, (k, d).
     """
@@ -43,20 +44,24 @@ class LeftOpen:
         """
         number, factor = reading.number, float(np.sqrt(chi2.ppf(level, 1)))
         half = 0.5 * (ends.high[number] - ends.low[number])
-        flat = _flat(reading.information, model.largest)
-        keeps = np.eye(model.size) - flat.T @ flat
+        directions, spreads = _spreads(reading.information)
+        far = spreads > LINEAR * model.largest
+        keeps = np.eye(model.size) - directions[far].T @ directions[far]
         of_mean, more = keeps @ reading.gain, keeps @ reading.more
         noise, beyond = of_mean @ of_mean.T, more @ more.T
         stuck, hidden, open_ = np.zeros(model.size, bool), [], np.zeros_like(noise)
-        for row in flat:
+        for row, spread in zip(directions[far], spreads[far], strict=True):
             part = np.abs(row) > _PART
-            endless = bool((ends.limited[number] & part).any())
-            width = model.largest if endless else float(np.abs(row) @ half) / factor
-            open_ += width**2 * np.outer(row, row)
-            if endless:
+            interval = float(np.abs(row) @ half) / factor
+            if spread > model.largest and (ends.limited[number] & part).any():
+                width = model.largest
                 hidden.append(row)
-            else:
+            elif spread > min(model.largest, _STUCK * interval):
+                width = interval
                 stuck |= part
+            else:  # far, but by noise alone
+                width = spread
+            open_ += width**2 * np.outer(row, row)
         own = noise + beyond + open_
         wide = half > _STUCK * factor * np.sqrt(np.diagonal(own))
         rows = np.array(hidden).reshape(-1, model.size)
@@ -65,14 +70,20 @@ class LeftOpen:
         return cls(covariance, stuck | (wide & ~ends.limited[number]), rows)
 
 
-def _flat(slopes: Float[np.ndarray, "m d"], largest: float) -> Float[np.ndarray, "k d"]:
-    """Return the directions along which the noise exceeds the range, as unit rows."""
+def _spreads(
+    slopes: Float[np.ndarray, "m d"],
+) -> tuple[Float[np.ndarray, "d d"], Float[np.ndarray, " d"]]:
+    """Return directions as unit rows, and the standard deviation of the force by noise along each.
+
+    It is infinite where nothing that is read depends on the force.
+    """
     _, values, rows = np.linalg.svd(slopes.reshape(-1, slopes.shape[1]))
     values = np.concatenate([values, np.zeros(len(rows) - len(values))])
-    flat = rows[values * largest < 1.0]
+    spreads = np.full(len(rows), np.inf)
+    np.divide(1.0, values, out=spreads, where=values > 0.0)
     # One sign of each: the largest entry is positive.
-    signs = np.sign(flat[np.arange(len(flat)), np.abs(flat).argmax(axis=1)])
-    return flat * signs[:, None]
+    signs = np.sign(rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)])
+    return rows * signs[:, None], spreads
 
 
 def direction_in_words(names: Sequence[str], direction: Float[np.ndarray, " d"]) -> str:

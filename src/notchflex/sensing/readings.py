@@ -10,12 +10,15 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from notchflex.errors import InputError
-from notchflex.loads.validation import check_number, short_repr
+from notchflex.loads.validation import check_number, check_pulls, short_repr
 from notchflex.results.quantities.registry import AXES
 from notchflex.robot import Robot
 
 MOST_READINGS = 2000
 """More readings than this are refused: the time grows with the square of their number."""
+
+# Negative tensions up to so many standard deviations may be noise.
+_MOST_NOISE = 10.0
 
 
 @dataclass(frozen=True)
@@ -168,6 +171,7 @@ def readings_of(
 
 
 def _check_driven(readings: Readings) -> None:
+    check_pulls(readings.tension, _MOST_NOISE * readings.noise.tension)
     neither = np.isnan(readings.tension) & np.isnan(readings.stroke)
     if neither.any():
         row, tendon = np.argwhere(neither)[0]

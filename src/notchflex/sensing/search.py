@@ -18,9 +18,11 @@ _BETWEEN = np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 _MOST_STEPS, _MOST_REACHES, _MOST_HALVINGS = 20, 16, 6
 # So many forces are solved at once.
 _TOGETHER = 3
-# A fit that misses the readings by more than this, in squares of the noise for each number that
-# was read, is tried again from all over the range.
-_BAD_FIT, _STARTS = 12.0, 9
+BAD_FIT = 12.0
+"""A fit that misses the readings by more than this, in squares of the noise for each number that
+was read, explains nothing."""
+# It is tried again from all over the range, and with differences over these parts of it.
+_STARTS, _WIDTHS = 9, (1e-2, 1e-3, 1e-4, 1e-5)
 # A whole step is taken where it brings this part of what slopes promise.
 _GOOD_GAIN = 0.5
 # The search ends where the misfit falls, or an extreme moves, by less than these parts.
@@ -31,10 +33,17 @@ _NARROW, _NO_MOVE = 1e-7, 1e-9
 _WEAK = 1e-3
 
 
-def best(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate:
+def best(
+    problem: ReadingProblem, forces: Float[np.ndarray, "k d"], part: float | None = None
+) -> Candidate:
     """Find the force that fits best, by Gauss-Newton steps from the best of some.
 
     Where several fit equally well, it stays near the one it began at.
+
+    Args:
+        problem: The reading.
+        forces: Where to begin.
+        part: Part of the range over which differences are taken in the place of slopes.
     """
     at = min(problem.candidates(forces), key=lambda one: one.misfit)
     if not len(problem.step.entries):
@@ -43,7 +52,7 @@ def best(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate
     for _ in range(_MOST_STEPS):
         if not np.isfinite(at.misfit) or at.misfit < _SMALL_GAIN:
             break
-        slopes = problem.slopes(at)
+        slopes = problem.slopes(at) if part is None else problem.differences(at, part)
         normal = slopes.T @ slopes + weak**2 * np.eye(problem.model.size)
         step = np.linalg.solve(normal, slopes.T @ at.deviations)
         size = np.abs(step).max()
@@ -68,7 +77,7 @@ def best(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate
 
 def bad_fit(at: Candidate) -> bool:
     """Return whether a force misses the readings by far more than their noise."""
-    return not at.misfit <= _BAD_FIT * max(len(at.deviations), 1)
+    return not at.misfit <= BAD_FIT * max(len(at.deviations), 1)
 
 
 def best_of_all(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Candidate:
@@ -79,7 +88,14 @@ def best_of_all(problem: ReadingProblem, forces: Float[np.ndarray, "k d"]) -> Ca
     model = problem.model
     steps = np.linspace(-model.largest, model.largest, _STARTS)
     every = np.concatenate([np.multiply.outer(steps, row) for row in np.eye(model.size)])
-    return min(at, best(problem, every), key=lambda one: one.misfit)
+    at = min(at, best(problem, every), key=lambda one: one.misfit)
+    # Where a contact begins to slide the slopes of one side lead nowhere: over both sides they do.
+    for part in _WIDTHS:
+        if not bad_fit(at):
+            break
+        at = best(problem, at.force[None], part)
+        at = best(problem, at.force[None])
+    return at
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,4 +196,4 @@ def _step_along(
     return move * min(1.0, 2.0 * problem.model.largest / max(size, 1e-300))
 
 
-__all__ = ["Extreme", "bad_fit", "best", "best_of_all", "extreme"]
+__all__ = ["BAD_FIT", "Extreme", "bad_fit", "best", "best_of_all", "extreme"]

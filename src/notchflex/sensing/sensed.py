@@ -14,6 +14,7 @@ from notchflex.errors import ConvergenceError
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
 from notchflex.sensing.observability import direction_in_words
+from notchflex.sensing.search import BAD_FIT
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,7 +30,7 @@ class SensedForce(Displayed):
         force: The force that fits best, (s, d); of averaged readings that of the mean, moved
             towards that of the reading by as much as noise does not explain.
         covariance: Its covariance by the noise of all readings up to it, to first order, N²,
-            (s, d, d). Along a direction that changes no reading it is that of the interval.
+            (s, d, d). Along a direction that changes hardly any reading the interval bounds it.
         low: Smallest component that fits the reading: noise and stuck friction together, (s, d);
             also where it was averaged with others, by its own noise.
         high: Largest component that fits, (s, d).
@@ -81,6 +82,11 @@ class SensedForce(Displayed):
     def converged(self) -> Bool[np.ndarray, " s"]:
         """Whether a force was found for each reading, (s,)."""
         return np.asarray(np.isfinite(self.force).all(axis=1))
+
+    @property
+    def unexplained(self) -> Bool[np.ndarray, " s"]:
+        """Whether even the best force misses a reading by far more than noise does, (s,)."""
+        return np.asarray(self.misfit > BAD_FIT * np.maximum(self.read, 1.0))
 
     @property
     def vector(self) -> Float[np.ndarray, "s 3"]:
@@ -170,5 +176,7 @@ class SensedForce(Displayed):
         if last >= 0:
             touched = "yes" if self.contact[last] else "not shown"
             rows.append(("contact", f"{touched}, p = {self.contact_probability[last]:.2g}"))
+        if count := int(self.unexplained.sum()):
+            rows.append(("not explained", f"{count} of {len(self)} readings, by any force"))
         rows += [("note", text) for text in self.not_observable]
         return Summary(title, rows, self.reason)

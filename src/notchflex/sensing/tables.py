@@ -79,6 +79,7 @@ def sensed_columns(sensed: SensedForce) -> dict[str, Any]:
             f"force_{name}_high_N": sensed.high[:, which],
             f"force_{name}_sd_N": sensed.deviation[:, which],
             f"force_{name}_stuck": sensed.stuck[:, which],
+            f"force_{name}_limited": sensed.limited[:, which],
         }
     columns["averaged_as"] = sensed.group + 1
     columns["contact"] = sensed.contact
@@ -103,6 +104,7 @@ def sensed_document(sensed: SensedForce) -> dict[str, Any]:
             "contact": bool(sensed.contact[number]),
             "contact_p": float(sensed.contact_probability[number]),
             "misfit": float(sensed.misfit[number]),
+            "explained": not sensed.unexplained[number],
             "numbers_read": int(sensed.read[number]),
             "averaged_as": int(sensed.group[number]) + 1,
             "not_observable": sensed.hidden[number],

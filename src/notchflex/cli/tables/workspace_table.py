@@ -24,8 +24,8 @@ def print_workspace(label: str, document: dict[str, Any]) -> None:
     console = terminal.output()
     counts = document["states"]
     name = f"{label}: {document['name']}" if label else document["name"]
-    largest = document["largest_tension_N"]
-    pulled = ", ".join(f"{one:.4g}" for one in largest)
+    each = [f"{one:.4g}" for one in document["largest_tension_N"]]
+    pulled = each[0] if len(set(each)) == 1 else ", ".join(each)
     console.print(f"Workspace of {name}, tendons up to {pulled} N", soft_wrap=True)
     for text in document["limits"]:
         console.print(f"limit: {text}", soft_wrap=True)

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 _MOST_ROWS = 60
 
 
-def _deviation(option: str, what: str, default: float) -> Any:
+def _deviation(option: str, what: str) -> Any:
     form = "a finite standard deviation, 0 or more"
     return (
         converted(partial(number, form=form, least=0.0), "SD", name=option),
-        Parameter(help=f"Standard deviation of {what}; {default:g} by default."),
+        Parameter(help=f"Standard deviation of {what}."),
     )
 
 
@@ -70,23 +70,22 @@ def sense(
     ] = "tip",
     beside: Annotated[
         tuple[str, ...],
-        converted(_beside, "NAMES", name="--with"),
+        converted(_beside, "NAMES", name="--with", show_default=False),
         Parameter(help="Also use measured columns: `tip` (tip_x_mm, ...), `angles` (notch_1_deg)."),
     ] = (),
-    tension_noise: Annotated[
-        float, *_deviation("--tension-noise", "the tensions [N]", 0.01)
-    ] = 0.01,
-    stroke_noise: Annotated[float, *_deviation("--stroke-noise", "the strokes [mm]", 0.01)] = 0.01,
+    tension_noise: Annotated[float, *_deviation("--tension-noise", "the tensions [N]")] = 0.01,
+    stroke_noise: Annotated[float, *_deviation("--stroke-noise", "the strokes [mm]")] = 0.01,
     tip_noise: Annotated[
-        float, *_deviation("--tip-noise", "each coordinate of the tip [mm]", 0.1)
+        float, *_deviation("--tip-noise", "each coordinate of the tip [mm]")
     ] = 0.1,
-    angle_noise: Annotated[
-        float, *_deviation("--angle-noise", "the notch angles [deg]", 0.5)
-    ] = 0.5,
+    angle_noise: Annotated[float, *_deviation("--angle-noise", "the notch angles [deg]")] = 0.5,
     largest: Annotated[
         float | None,
         converted(partial(number, form="a force in N, above 0"), "N"),
-        Parameter(help="Largest force that is looked for [N]."),
+        Parameter(
+            help="Largest component of the force that is looked for [N]; by default three times "
+            "the force at the tip that balances the largest tension at the base."
+        ),
     ] = None,
     external: ExternalLoads = ExternalLoads(),  # noqa: B008 - frozen
     settings: Settings = (),
@@ -127,6 +126,13 @@ def sense(
             progress=show,
         )
     _write(sensed, outputs)
+    if sensed.unexplained.any():
+        first, count = int(sensed.unexplained.argmax()) + 1, int(sensed.unexplained.sum())
+        terminal.warn(
+            f"{count} of {len(sensed)} readings, first reading {first}, are explained by no force "
+            "within the noise; the robot may differ from its model, or the noise be larger. "
+            "Intervals from there on may not hold the force."
+        )
     if not sensed.reason:
         return DONE
     terminal.error(f"not converged: {sensed.reason}. The readings after it are left out.")
@@ -152,6 +158,13 @@ def _write(sensed: SensedForce, outputs: Outputs) -> None:
         _print(sensed)
 
 
+def _mark(sensed: SensedForce, reading: int, which: int) -> str:
+    """Return what else than noise makes an interval as wide as it is."""
+    if sensed.limited[reading, which]:
+        return "open"
+    return "stuck" if sensed.stuck[reading, which] else ""
+
+
 def _print(sensed: SensedForce) -> None:
     console = terminal.output()
     where = "the tip" if sensed.place is None else f"body {sensed.place}"
@@ -169,11 +182,15 @@ def _print(sensed: SensedForce) -> None:
         for which in range(len(sensed.components)):
             values = (sensed.force, sensed.low, sensed.high)
             row += [f"{one[number_, which]:.4f}" for one in values]
-            row.append("stuck" if sensed.stuck[number_, which] else "")
+            row.append(_mark(sensed, number_, which))
         row.append("yes" if sensed.contact[number_] else "")
         rows.append(row)
     console.print(terminal.table(heads, rows))
     if step > 1:
         console.print(f"every {step}th of {count} readings; --csv and --json have all")
+    if sensed.limited.any():
+        terminal.note(
+            f"open: the interval ends at the range of the search, {sensed.largest:.3g} N."
+        )
     for sentence in sensed.not_observable:
         terminal.note(f"{sentence}.")

@@ -16,6 +16,7 @@ from notchflex.fit.measurements.loading_order import Order, commands_of, loading
 from notchflex.fit.measurements.measurements import Measurements
 from notchflex.fit.measurements.reader import MeasurementReader
 from notchflex.loads import LoadPath
+from notchflex.loads.validation import check_pulls
 from notchflex.results.files.csv_reading import Table, read_table
 from notchflex.robot import Robot
 
@@ -69,6 +70,7 @@ def read_measurements(
     reader.check_numbers()
     external = reader.external()
     tension, stroke = reader.commands()
+    check_pulls(tension, source=table.name)
     observed, deviation, axis_at = _observed(reader)
     base_rotation = reader.base_rotation()
     labels = next((reader.texts(name) for name in columns.PULL if name in table.header), None)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from notchflex.plotting.output import Picture
-from notchflex.plotting.sheet import BELOW, Cell, Curve, Mark, Panel, Span, dots, stack
+from notchflex.plotting.sheet import BELOW, BESIDE, Cell, Curve, Mark, Panel, Span, dots, stack
 from notchflex.plotting.style import BLUE, GREY, ORANGE, VERMILLION, sequence_colours
 from notchflex.results.quantities.registry import AXES, QUANTITIES
 
@@ -58,9 +58,12 @@ def _tips(found: Following) -> Panel:
         ends = found.tip_position[missed][:, axes]
         items.append(dots(ends, VERMILLION, 4.0, name="nearest", layer=4))
     tip = QUANTITIES["tip_position"]
-    labels = [f"{tip.title} {AXES[axis]} [{tip.unit}]" for axis in axes]
-    third = {"z_label": labels[2]} if len(labels) > 2 else {}
-    return Panel(items, *labels[:2], **third, equal=True, legend=BELOW)
+    if flat is not None:
+        labels = [f"{tip.title} {AXES[axis]} [{tip.unit}]" for axis in axes]
+        return Panel(items, *labels, equal=True, legend=BELOW)
+    # In space the labels stand close to each other, and the upright one needs room beside it.
+    labels = [f"{axis} [{tip.unit}]" for axis in AXES]
+    return Panel(items, *labels, equal=True, legend=BESIDE)
 
 
 def _drives(found: Following) -> Panel:
@@ -75,7 +78,7 @@ def _drives(found: Following) -> Panel:
         for tendon, colour in enumerate(sequence_colours(tendons))
     ]
     label = QUANTITIES["tension"].label
-    return Panel(items, _NUMBER, label, legend=BELOW if tendons > 1 else "", shared="x")
+    return Panel(items, _NUMBER, label, legend=BESIDE if tendons > 1 else "", shared="x")
 
 
 def _errors(found: Following) -> Panel:
@@ -85,4 +88,4 @@ def _errors(found: Following) -> Panel:
     items: list[Mark] = [Curve(points, BLUE, marker="o", size=2.0, hover=True)]
     tolerance = float(np.log10(found.tolerance))
     items.append(Span("y", tolerance, tolerance, GREY, name="tolerance"))
-    return Panel(items, _NUMBER, r"$\log_{10}$ of the error [mm, rad]", legend=BELOW, shared="x")
+    return Panel(items, _NUMBER, "log10 of the error [mm, rad]", legend=BESIDE, shared="x")

@@ -77,11 +77,12 @@ def workspaces_picture(found: Mapping[str, Workspace]) -> Picture:
         items: list[Mark] = []
         for (label, one), colour in zip(found.items(), colours, strict=False):
             points = _thinned(one)[:, [across, 2]]
-            name = f"{label}: {one.hull.size:.3g} {one.hull.unit}"
+            name = f"{label}: convex hull {one.hull.size:.3g} {one.hull.unit}"
             items.append(dots(points, colour, 2.0, name=name, group=label))
         legend = BELOW if across or flat else ""
         panels.append(Panel(items, _LABELS[across], _LABELS[2], equal=True, legend=legend))
-    title = "Workspaces of " + " and ".join(found)
+    *others, last = found
+    title = f"Workspaces of {', '.join(others)} and {last}"
     return Picture(title, 5.2 * len(panels), 5.2, grid(panels, 2))
 
 
