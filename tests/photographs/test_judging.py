@@ -9,7 +9,7 @@ import pytest
 import notchflex as nf
 from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.chain.outline import SPINE, OutlineModel
+from notchflex.photographs.chain.outline import SIDE, SPINE, OutlineModel
 from notchflex.photographs.edges import Edges
 from notchflex.photographs.fitting import Fit, cost, covariance, misfit
 from notchflex.photographs.missing import missing
@@ -25,7 +25,7 @@ def made_up(residual, cut=0.0):
     looked = np.ones(len(offset), bool)
     jacobian = np.random.default_rng(0).normal(size=(len(offset), len(numbers)))
     outline = MODEL.outline(numbers)
-    return Fit(numbers, outline, Edges(offset, looked), jacobian, offset, 1.0)
+    return Fit(numbers, outline, Edges(offset, looked, looked.astype(float)), jacobian, offset, 1.0)
 
 
 def test_a_shift_of_all_lines_is_no_misfit():
@@ -47,3 +47,18 @@ def test_notches_of_another_depth_are_refused():
     assert missing(MODEL, made_up(0.0)) == ""
     inner = (MODEL.kind == SPINE) & (MODEL.which > 0.0)
     assert "depth" in missing(MODEL, made_up(np.where(inner, np.nan, 0.0)))
+
+
+def test_one_side_of_one_ring_may_look_like_the_background():
+    """The other side shows the ring; where two rings lack a side, or one both, nothing is said."""
+    side = MODEL.kind == SIDE
+
+    def hidden(*lines):
+        off = np.zeros(len(side))
+        for ring, which in lines:
+            off[side & (MODEL.ring == ring) & (MODEL.which == which)] = np.nan
+        return missing(MODEL, made_up(off))
+
+    assert hidden((3, 1.0)) == ""
+    assert "before notch 1" in hidden((0, 1.0), (3, 1.0))
+    assert "behind notch 3" in hidden((3, 1.0), (3, -1.0))

@@ -304,6 +304,23 @@ def test_places_that_cannot_be_used(tmp_path, refused):
             nf.read_sweep(tmp_path / place)
 
 
+def test_a_manifest_that_was_changed_after_its_pieces_is_refused(tmp_path):
+    """Its pieces are marked with the former one: they are not shown as a sweep without rows."""
+    nf.sweep(plan(), tmp_path / "s")
+    file = tmp_path / "s" / "sweep.json"
+    former = file.read_text()
+    changed = json.loads(former)
+    changed["robot"]["name"] = "another"
+    file.write_text(json.dumps(changed))
+    with pytest.raises(
+        nf.InputError, match=r"sweep\.json was changed after piece-0+\.parquet"
+    ) as no:
+        nf.read_sweep(tmp_path / "s")
+    assert no.value.code is nf.ErrorCode.FILE_DAMAGED
+    file.write_text(former)
+    assert nf.read_sweep(tmp_path / "s").finished
+
+
 def test_command_line(tmp_path, monkeypatch, capsys):
     """The commented plan, its cost, the sweep, its picture; and what is refused."""
     monkeypatch.chdir(tmp_path)

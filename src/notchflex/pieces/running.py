@@ -25,6 +25,8 @@ _TRIM_THRESHOLD, _TOP_PAD, _MMAP_THRESHOLD = -1, -2, -3
 """Numbers of the options in <malloc.h>."""
 _KEPT = 2**25
 """glibc takes no larger threshold."""
+_USUAL_PAD = 2**17
+"""glibc's own pad."""
 _SPARE = 2**26
 """The size of a heap of a thread: glibc gives back every heap that is empty but for so much."""
 
@@ -41,15 +43,21 @@ _BEAT, _FETCH = 1.0, 10.0
 def in_threads(
     task: PieceTask, folder: str, pieces: Iterable[int], cores: int | None = None
 ) -> Generator[Done]:
-    """Work on pieces in threads of this process; each piece keeps to one of them."""
-    keep_memory()
+    """Work on pieces in threads of this process; each piece keeps to one of them.
+
+    Until the end the C library keeps more memory than it does by itself, for all of the process.
+    """
     cores = cores or number_of_cores()
     work = partial(make_piece, task, folder)
-    if cores == 1:
-        yield from map(work, pieces)
-        return
-    with closing(on_cores(work, pieces, cores)) as found:
-        yield from found
+    keep_memory()
+    try:
+        if cores == 1:
+            yield from map(work, pieces)
+            return
+        with closing(on_cores(work, pieces, cores)) as found:
+            yield from found
+    finally:
+        give_memory_back()
 
 
 def on_cluster(client: Any, task: PieceTask, folder: str, pieces: Iterable[int]) -> Generator[Done]:
@@ -141,17 +149,33 @@ def _work(recipe: Recipe, text: str, folder: str, piece: int) -> Done:
         return make_piece(task_of(recipe, text), folder, piece)
 
 
-@lru_cache(maxsize=1)
 def keep_memory() -> None:
     """Let the C library keep the memory that arrays gave back, for the next ones.
 
     Threads give theirs back to the system at once, and so does all of a worker of dask, which sets
     MALLOC_TRIM_THRESHOLD_: a batch then spends as much time on new pages as on solving.
     """
+    if (library := _c_library()) is not None:
+        library.mallopt(_TRIM_THRESHOLD, _KEPT)
+        library.mallopt(_MMAP_THRESHOLD, _KEPT)
+        library.mallopt(_TOP_PAD, _SPARE)
+
+
+def give_memory_back() -> None:
+    """Give the system what `keep_memory` kept; the process is not ours alone.
+
+    The thresholds stay where glibc takes its own to, once a program has freed an array of 32 MB.
+    """
+    if (library := _c_library()) is not None:
+        library.mallopt(_TRIM_THRESHOLD, 2 * _KEPT)
+        library.mallopt(_TOP_PAD, _USUAL_PAD)
+        library.malloc_trim(0)
+
+
+@lru_cache(maxsize=1)
+def _c_library() -> Any:
+    """Return the C library, None where it is not glibc."""
     if not sys.platform.startswith("linux"):
-        return
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
-    if mallopt is not None:
-        mallopt(_TRIM_THRESHOLD, _KEPT)
-        mallopt(_MMAP_THRESHOLD, _KEPT)
-        mallopt(_TOP_PAD, _SPARE)
+        return None
+    library = ctypes.CDLL(None)
+    return library if hasattr(library, "mallopt") and hasattr(library, "malloc_trim") else None

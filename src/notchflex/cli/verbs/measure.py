@@ -85,6 +85,14 @@ def measure(
             "`notchflex board` draws it.",
         ),
     ] = None,
+    uncertainty: Annotated[
+        float | None,
+        converted(_angle, "DEG"),
+        Parameter(
+            help="Refuse photographs whose standard deviations have a larger root mean square; "
+            "0.11 deg by default."
+        ),
+    ] = None,
     correct: Annotated[
         bool,
         flag(
@@ -134,6 +142,8 @@ def measure(
     anything is doubtful is refused with its reason (exit code 1); look at the overlays.
     """
     _check_options(cut, turn, write_robot, exif or loads is not None or pattern is not None)
+    if cut and uncertainty is not None:
+        raise InputError.CONFLICT("--cut: --uncertainty is of angles; leave it out")
     _check_page(correct, cut, port, open_browser)
     inputs = [*photographs, *robot_files(robot), *([] if loads is None else [loads])]
     folder = overlays
@@ -159,6 +169,7 @@ def measure(
         from notchflex.photographs import board_of, measure_cut
         from notchflex.photographs import measure as measured
 
+        limit: dict[str, Any] = {}
         ruler: dict[str, Any] = {
             "scale": scale,
             "board": None if board is None else board_of(board),
@@ -166,12 +177,13 @@ def measure(
         if cut:
             as_cut = measure_cut(photographs, chosen, turn_deg=turn, progress=progress, **ruler)
             return write_cut(as_cut, outputs, output, write_robot, files)
-        found = measured(
-            photographs, chosen, loads=loads, pattern=pattern, exif=exif, progress=progress, **ruler
-        )
+        if uncertainty is not None:
+            limit["uncertainty_deg"] = uncertainty
+        given: dict[str, Any] = {"loads": loads, "pattern": pattern, "exif": exif}
+        found = measured(photographs, chosen, progress=progress, **given, **ruler, **limit)
     done = True
     if correct:
-        found, done = _corrected(found, ruler, port or PORT, open_browser)
+        found, done = _corrected(found, {**ruler, **limit}, port or PORT, open_browser)
     _write(found, outputs, output, files)
     if not done:
         return INTERRUPTED
@@ -190,17 +202,16 @@ def _check_page(correct: bool, cut: bool, port: int | None, open_browser: bool) 
 
 
 def _corrected(
-    found: MeasuredPhotographs, ruler: dict[str, Any], port: int, open_browser: bool
+    found: MeasuredPhotographs, options: dict[str, Any], port: int, open_browser: bool
 ) -> tuple[MeasuredPhotographs, bool]:
     """Serve the page until every photograph was accepted or left out, or until Ctrl-C.
 
     Returns:
         What was accepted, and whether every photograph was looked at.
     """
-    from notchflex.photographs.board.ruler import Ruler
     from notchflex.viewer.correction.correction import Correction
 
-    page = Correction(found, Ruler(**ruler), port=port)
+    page = Correction(found, port=port, **options)
     terminal.note(f"correct the fits on {page.address} (Ctrl+C ends, what was accepted is written)")
     if open_browser:
         import webbrowser

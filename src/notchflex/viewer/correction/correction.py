@@ -12,10 +12,16 @@ from html import escape
 import numpy as np
 
 from notchflex.errors import InputError
-from notchflex.photographs.board.ruler import NO_RULER, Ruler
+from notchflex.photographs.board.layout import Board
+from notchflex.photographs.board.ruler import Ruler
 from notchflex.photographs.chain.axis_points import straight_chain
 from notchflex.photographs.chain.chain_table import chain_table
-from notchflex.photographs.measure import measure_picture, refused_photograph
+from notchflex.photographs.judging import UNCERTAINTY
+from notchflex.photographs.measure import (
+    checked_uncertainty,
+    measure_picture,
+    refused_photograph,
+)
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.reading import read_photograph
 from notchflex.viewer.correction.picture_plane import PicturePlane
@@ -40,7 +46,9 @@ class Correction:
 
     Args:
         found: What was measured without corrections.
-        ruler: What gives the scale.
+        scale: Pixels of the photographs per mm, as for `measure`.
+        board: Board beside the robot, as for `measure`.
+        uncertainty_deg: Standard deviations that are allowed, as for `measure`.
         host: Address to serve on.
         port: Port to serve on, or the next one that is free.
 
@@ -51,15 +59,18 @@ class Correction:
     def __init__(
         self,
         found: MeasuredPhotographs,
-        ruler: Ruler = NO_RULER,
         *,
+        scale: float | None = None,
+        board: Board | None = None,
+        uncertainty_deg: float = math.degrees(UNCERTAINTY),
         host: str = HOST,
         port: int = PORT,
     ) -> None:
         check_installed()
         check_host(host, port)
         self.found, self.number = found, 0
-        self._ruler = ruler
+        self._ruler = Ruler(scale, board)
+        self._uncertainty = checked_uncertainty(uncertainty_deg)
         self.results = list(found.photographs)
         self._table = chain_table(found.robot)
         self._tasks = Tasks()
@@ -117,7 +128,9 @@ class Correction:
         now = self.results[self.number]
         chain = self.plane.chain
         try:
-            fitted = measure_picture(self.picture, self._table, now.source, self._ruler, chain)
+            fitted = measure_picture(
+                self.picture, self._table, now.source, self._ruler, chain, self._uncertainty
+            )
         except InputError as problem:
             self.message = str(problem)
             self._update()
