@@ -118,6 +118,21 @@ def test_a_number_that_changes_more_than_before():
         np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
+def test_a_number_that_begins_to_change_an_entry_of_another():
+    """Entry 0 depends on the second number only where the first is above 1: both move together."""
+
+    def vector_of(values: np.ndarray) -> np.ndarray:
+        first, second = values
+        return np.array([first + max(first - 1.0, 0.0) * second, second])
+
+    slopes = SparseSlopes(6, [np.arange(2)], np.zeros(0, int))
+    for first in (0.5, 2.0):
+        found = slopes.at(vector_of, np.array([first, 3.0]))
+        above = first > 1.0
+        expected = [[4.0 if above else 1.0, 0.0], [first - 1.0 if above else 0.0, 1.0]]
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
 def test_numbers_at_different_ends_of_their_ranges():
     def vector_of(values: np.ndarray) -> np.ndarray:
         if values[0] < 1.0 or values[1] > 2.0:

@@ -3,7 +3,7 @@
 A dimension of a notch changes what belongs to that notch, and little beside it. Numbers that change
 different entries of the vector are moved together, and each takes the slopes of its own entries
 (Curtis, Powell & Reid 1974, J. Inst. Maths Applics 13:117). Which entries a number changes is
-observed once.
+observed once. One difference with all numbers moved, each by an amount of its own, checks them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,11 @@ from notchflex.errors import InputError
 
 # Changes that rounding makes, of the largest number of a part.
 _ROUNDING = 1e-13
+
+# The check of slopes: by so much of a difference's width, and how far they may be off. The error of
+# a difference of two points, and an entry whose slope is that of another number, lie far apart.
+_CHECKED, _AGREEMENT = 0.1, 1e-2
+_GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
 Vector = Callable[[Float[np.ndarray, " k"]], Float[np.ndarray, " m"]]
 
@@ -63,7 +68,7 @@ class SparseSlopes:
         if found is None:  # a number changes more than it did where it was observed
             self._changed[form] |= self._observed(vector_of, at)
             found = self._compressed(vector_of, at, self._changed[form])
-        if found is None:
+        if found is None or not self._agree(vector_of, at, found):
             return [self._alone(vector_of, at, number) for number in range(len(at))]
         return found
 
@@ -122,6 +127,33 @@ class SparseSlopes:
                 own = np.where(changed[number], together, 0.0)
                 found[number] = own / width_at(at[number], self.order)
         return found
+
+    def _agree(
+        self, vector_of: Vector, at: Float[np.ndarray, " k"], slopes: list[Float[np.ndarray, " m"]]
+    ) -> bool:
+        """Whether slopes explain a difference in which every number moves by another amount.
+
+        An entry whose change was ascribed to one number of a group, but is that of another, is seen
+        here. At a kink they do not agree either, nor where no number may move to both sides.
+        """
+        if not slopes:
+            return True
+        amounts = 0.5 + np.arange(1, len(at) + 1) * _GOLDEN_RATIO % 1.0
+        steps = _CHECKED * width_at(at, self.order) * amounts
+        try:
+            behind, before = vector_of(at - steps), vector_of(at + steps)
+        except InputError:
+            return False
+        with np.errstate(invalid="ignore"):
+            change = 0.5 * (before - behind)
+        change[self.derived] = 0.0
+        terms = steps[:, None] * np.stack(slopes)
+        bound = _AGREEMENT * np.abs(terms).sum(axis=0)
+        for part in self.parts:
+            finite = np.abs(before[part])
+            size = np.max(finite, where=np.isfinite(finite), initial=0.0)
+            bound[part] += 10.0 * _ROUNDING * size
+        return not np.any(np.abs(change - terms.sum(axis=0)) > bound)
 
     def _alone(
         self, vector_of: Vector, at: Float[np.ndarray, " k"], number: int
