@@ -209,9 +209,11 @@ def reversal() -> None:
         plain = nf.simulate(robot, nf.LoadPath(drives, np.full_like(drives, np.nan)))
         tip = np.abs(plain.tip_position - found.tip_position)[21:].max()
         errors = [np.abs(one.total_angle - angle)[21:].max() for one in (plain, found.path)]
+        places = found.path.tip_position
+        met = np.abs(nf.follow(robot, places).path.tip_position - places)[21:].max()
         print(
             f"{name:15s} by the loading curve {errors[0]:.4f} rad (tip {tip:.3f} mm), "
-            f"with friction history {errors[1]:.1e} rad"
+            f"with friction history {errors[1]:.1e} rad (tip {met:.1e} mm)"
         )
 
 

@@ -45,8 +45,8 @@ def _limit(text: str) -> tuple[str, tuple[float | None, float | None]]:
 
 
 def _tensions(text: str) -> list[float]:
-    return [number(word, "tensions in N, one or one per tendon joined by commas", least=0.0)
-            for word in text.split(",")]  # fmt: skip
+    form = "tensions of 0 N or more, one or one per tendon joined by commas"
+    return [number(word, form, least=0.0) for word in text.split(",")]
 
 
 def workspace(
