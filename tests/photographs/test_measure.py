@@ -281,7 +281,7 @@ def test_uncertain_angles_are_refused(photograph, capsys):
     spread = float(np.degrees(np.sqrt((one.notch_angle_deviation**2).mean())))
     words = ["measure", str(photograph), "--robot", "pacheco2021-a"]
     assert run([*words, "--uncertainty", str(0.9 * spread)]) == 1
-    assert f"uncertain by {spread:.2f} deg" in " ".join(capsys.readouterr().err.split())
+    assert f"uncertain by {spread:.3f} deg" in " ".join(capsys.readouterr().err.split())
     for value, code in ((0.0, "OUT_OF_RANGE"), (np.nan, "OUT_OF_RANGE"), ("1", "WRONG_TYPE")):
         with refused(code, "uncertainty_deg"):
             nf.measure(photograph, ROBOT, uncertainty_deg=value)
@@ -289,7 +289,7 @@ def test_uncertain_angles_are_refused(photograph, capsys):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("seed", [90117, 90206, 90312])
+@pytest.mark.parametrize("seed", [90117, 90206, 90362])
 def test_hard_views(seed, monkeypatch):
     """A side like the background, a fit that ends in another view, a fit from tip to base.
 

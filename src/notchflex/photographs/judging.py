@@ -93,7 +93,7 @@ def _of_uncertainty(deviation: Numbers, most: float) -> str:
     if mean <= most:
         return ""
     return (
-        f"the angles are uncertain by {math.degrees(mean):.2f} deg (standard deviations, root mean "
+        f"the angles are uncertain by {math.degrees(mean):.3f} deg (standard deviations, root mean "
         f"square), and {math.degrees(most):g} deg are allowed; go nearer, take it sharper and in "
         "even light, or allow more"
     )

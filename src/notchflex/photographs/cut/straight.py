@@ -26,6 +26,7 @@ from notchflex.photographs.measure import (
 )
 from notchflex.photographs.measured import MeasuredPhotograph
 from notchflex.photographs.missing import NEAR
+from notchflex.photographs.start import reversed_view
 
 _WIDTH = 300.0  # of the tube beyond which a photograph is made smaller, px
 _REACH, _LAST = 0.08, 4.0  # of the width of the tube, and px, within which edges are looked for
@@ -114,11 +115,13 @@ def _refused(photograph: MeasuredPhotograph, n: int) -> StraightFit:
 
 
 def _tilted(table: ChainTable, numbers: Numbers) -> list[Numbers]:
-    """Return starts whose tilts differ: edges of a straight robot hardly show it at first."""
+    """Return starts whose views differ: edges of a straight robot hardly show them at first."""
     found: list[Numbers] = []
-    for tilt in (float(numbers[5]), -float(numbers[5]), 0.0):
+    roll, tilt = float(numbers[4]), float(numbers[5])
+    mirrored = float(reversed_view(numbers)[4])
+    for view in ((roll, tilt), (roll, -tilt), (roll, 0.0), (mirrored, 0.0)):
         start = numbers.copy()
-        start[5], start[6] = tilt, 0.003 / table.outer
+        start[4:7] = *view, 0.003 / table.outer
         found.append(start)
     return found
 
