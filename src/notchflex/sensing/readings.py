@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -29,7 +30,7 @@ class SensorNoise:
         tension: Of the measured tensions, N.
         stroke: Of the measured strokes, mm.
         tip: Of each coordinate of the measured tip position, mm.
-        angle: Of the measured notch angles, rad.
+        angle: Of the measured notch angles, rad; half a degree by default.
 
     Raises:
         InputError: A number that is negative or not finite.
@@ -42,7 +43,7 @@ class SensorNoise:
     tension: float = 0.01
     stroke: float = 0.01
     tip: float = 0.1
-    angle: float = 0.01
+    angle: float = math.radians(0.5)
 
     def __post_init__(self) -> None:
         """Check the numbers."""

@@ -264,6 +264,8 @@ def _write(
 def _print(found: MeasuredPhotographs) -> None:
     import numpy as np
 
+    if not found.measured:
+        return
     console = terminal.output()
     console.print(f"Notch angles of {found.robot.name}, with standard deviations")
     heads = ["\nphotograph"]
@@ -277,5 +279,4 @@ def _print(found: MeasuredPhotographs) -> None:
         ):
             row += [f"{angle:.2f}", f"{spread:.2f}"]
         rows.append(row)
-    if rows:
-        console.print(terminal.table(heads, rows))
+    console.print(terminal.table(heads, rows))
