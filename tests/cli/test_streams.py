@@ -86,6 +86,7 @@ def test_answers_in_another_encoding_are_told(shell):
     assert b"is not text in utf-8" in done.stderr
 
 
+@pytest.mark.nightly
 def test_the_command_that_new_proposes_can_be_pasted(shell):
     made = shell(
         "notchflex new 'q ü' --outer-diameter 1.62 --inner-diameter 1.40 --cut on-axis "

@@ -64,6 +64,7 @@ def test_a_board_gives_scale_tilt_and_distance(photograph):
     assert known.perspective_deviation < 0.004
 
 
+@pytest.mark.nightly
 def test_angles_beside_a_board(photograph):
     """The board itself is not taken for the robot; its scale and tilt enter the fit."""
     table = chain_table(ROBOT)
@@ -76,6 +77,7 @@ def test_angles_beside_a_board(photograph):
     assert wrong.reason
 
 
+@pytest.mark.nightly
 def test_a_given_scale_that_contradicts_the_diameter(photograph):
     found = measure_picture(photograph, chain_table(ROBOT), "wrist", Ruler(scale=43.0))
     assert "outer diameter" in found.reason

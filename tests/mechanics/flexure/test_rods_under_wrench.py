@@ -187,6 +187,7 @@ def test_link_by_default(side, margin):
     margin.within(f"{side}, moment, relative", moment, 3e-6)
 
 
+@pytest.mark.nightly
 def test_link_converges_with_its_modes(margin):
     pose, moment = link_errors("away", lambda notch: u_link_rod(notch, GAO, 4, 2, (6, 4)))
     margin.note(f"4 moment modes and 2 pairs of force modes: {np.abs(pose).max():.1e} mm, rad")
