@@ -37,6 +37,8 @@ _NODES = chebyshev.chebpts1(_POINTS)
 _ROUNDING = 1e-14
 # Flexures of a family that are asked for before it is interpolated: as many as that takes.
 _ASKED = _POINTS
+# Families whose polynomials are kept.
+_KEPT = 64
 
 
 class Family(tuple[Any, ...]):
@@ -109,6 +111,8 @@ class FlexureTable:
                 asked.clear()
                 new = _interpolate(key, name, float(np.mean(near)))
                 if new is not None:
+                    if len(self._polynomials) >= _KEPT:
+                        del self._polynomials[next(iter(self._polynomials))]
                     self._polynomials.setdefault(family, []).append(new)
                     return new.at(value)
         return None
