@@ -252,7 +252,8 @@ def misfit(fit: Fit, model: OutlineModel, noise: float) -> float:
     lines = lines_of(model)
     errors, left = lines.errors(fit.residual, 1.0)
     capped = np.minimum(np.nan_to_num(np.abs(left) / noise, nan=np.inf), _CAP) ** 2
-    own = (errors - [float(np.nanmedian(errors[:, 0])), 0.0]) / _LINE
+    seen = errors[np.isfinite(errors[:, 0]), 0]  # none where a start lies beside the tube
+    own = (errors - [float(np.median(seen)) if seen.size else 0.0, 0.0]) / _LINE
     of_lines = float(np.nansum(2.0 * np.log1p(own**2 / 2.0)))
     centre, spread = priors(model, fit.numbers)
     unlikely = float((((fit.numbers - centre) / spread) ** 2).sum())
