@@ -113,12 +113,17 @@ def _quick(offset: Numbers, robust: float) -> _Weighed:
     return _Weighed(weight / _EDGE**2, np.zeros((len(offset), 0)), np.zeros(0))
 
 
+def _noise_of(errors: Numbers) -> float:
+    known = np.abs(errors[np.isfinite(errors)])
+    return max(1.4826 * float(np.median(known)), _LEAST_NOISE) if known.size else _LEAST_NOISE
+
+
 def _weighed(lines: Lines, edges: Edges, fitted: int | None) -> _Weighed:
     """Weigh edges by their distance from their line, and lines by their distance from others."""
     noise, strength = 0.3, edges.strength
     errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
     for _ in range(2):
-        noise = max(1.4826 * float(np.nanmedian(np.abs(left))), _LEAST_NOISE)
+        noise = _noise_of(left)
         errors, left = lines.errors(edges.offset, _ROBUST * noise, strength)
     weight = strength**2 / (1.0 + (np.nan_to_num(left) / (_ROBUST * noise)) ** 2) / noise**2
     weight = np.where(np.isfinite(left), weight, 0.0)
@@ -229,10 +234,10 @@ def covariance(fit: Fit, model: OutlineModel) -> tuple[NDArray[np.float64], floa
     """
     weighed = _weighed(lines_of(model), fit.edges, len(fit.numbers))
     normal, _ = _normal(model, fit.numbers, fit.jacobian, fit.residual, weighed)
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-200))
     inverse = np.linalg.pinv(normal * scale[:, None] * scale, hermitian=True)
     count = len(fit.numbers)
-    noise = max(1.4826 * float(np.nanmedian(np.abs(_own(fit, model)))), _LEAST_NOISE)
+    noise = _noise_of(_own(fit, model))
     return (inverse * scale[:, None] * scale)[:count, :count], noise
 
 

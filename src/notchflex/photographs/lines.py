@@ -97,7 +97,7 @@ class Lines(NamedTuple):
         known = errors[np.isfinite(errors[:, 0])]
         own = errors - np.array([np.median(known[:, 0]) if len(known) else 0.0, 0.0])
         typical = np.array(FIRST_SPREAD)
-        if fitted is not None:
+        if fitted is not None and len(known):
             freedom = max(0.25, 1.0 - fitted / max(1, 2 * len(known)))
             typical = 1.4826 * np.nanmedian(np.abs(own), axis=0) / np.sqrt(freedom)
             typical = np.clip(np.nan_to_num(typical, nan=_MOST_SPREAD), _LEAST_SPREAD, _MOST_SPREAD)
