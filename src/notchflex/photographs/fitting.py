@@ -12,7 +12,7 @@ from notchflex.photographs.chain.camera import NUMBERS
 from notchflex.photographs.chain.outline import Numbers, Outline, OutlineModel
 from notchflex.photographs.contrast import Contrast
 from notchflex.photographs.edges import Edges, find_edges
-from notchflex.photographs.lines import Lines, lines_of
+from notchflex.photographs.lines import Lines, lines_of, relative
 
 _PRIOR_ROLL, _PRIOR_TILT = math.radians(10.0), math.radians(8.0)
 _PRIOR_KERF, _PRIOR_CUT = 0.01, 0.006  # of the outer diameter: how well notches are made
@@ -257,8 +257,7 @@ def misfit(fit: Fit, model: OutlineModel, noise: float) -> float:
     lines = lines_of(model)
     errors, left = lines.errors(fit.residual, 1.0)
     capped = np.minimum(np.nan_to_num(np.abs(left) / noise, nan=np.inf), _CAP) ** 2
-    seen = errors[np.isfinite(errors[:, 0]), 0]  # none where a start lies beside the tube
-    own = (errors - [float(np.median(seen)) if seen.size else 0.0, 0.0]) / _LINE
+    own = relative(errors) / _LINE
     of_lines = float(np.nansum(2.0 * np.log1p(own**2 / 2.0)))
     centre, spread = priors(model, fit.numbers)
     unlikely = float((((fit.numbers - centre) / spread) ** 2).sum())

@@ -95,7 +95,7 @@ class Lines(NamedTuple):
                 small; None in first rounds, whose errors say little about the lines.
         """
         known = errors[np.isfinite(errors[:, 0])]
-        own = errors - np.array([np.median(known[:, 0]) if len(known) else 0.0, 0.0])
+        own = relative(errors)
         typical = np.array(FIRST_SPREAD)
         if fitted is not None and len(known):
             freedom = max(0.25, 1.0 - fitted / max(1, 2 * len(known)))
@@ -114,3 +114,9 @@ def lines_of(model: OutlineModel) -> Lines:
     high = np.array([model.place[which == one].max() for one in range(len(names))])
     place = 2.0 * (model.place - low[which]) / (high - low)[which] - 1.0
     return Lines(which, place, len(names), model.shift)
+
+
+def relative(errors: Numbers) -> Numbers:
+    """Return shifts and turns of lines, (number, 2), with the shifts from their median."""
+    known = errors[np.isfinite(errors[:, 0]), 0]  # none where a start lies beside the tube
+    return errors - np.array([np.median(known) if len(known) else 0.0, 0.0])

@@ -62,12 +62,13 @@ class SparseSlopes:
         Raises:
             InputError: A number cannot be varied.
         """
+        here = vector_of(at)
         if form not in self._changed:
-            self._changed[form] = self._observed(vector_of, at)
-        found = self._compressed(vector_of, at, self._changed[form])
+            self._changed[form] = self._observed(vector_of, at, here)
+        found = self._compressed(vector_of, at, here, self._changed[form])
         if found is None:  # a number changes more than it did where it was observed
-            self._changed[form] |= self._observed(vector_of, at)
-            found = self._compressed(vector_of, at, self._changed[form])
+            self._changed[form] |= self._observed(vector_of, at, here)
+            found = self._compressed(vector_of, at, here, self._changed[form])
         if found is None or not self._agree(vector_of, at, found):
             return [self._alone(vector_of, at, number) for number in range(len(at))]
         return found
@@ -76,9 +77,11 @@ class SparseSlopes:
     def _changed(self) -> dict[bytes, Bool[np.ndarray, "k m"]]:
         return {}
 
-    def _observed(self, vector_of: Vector, at: Float[np.ndarray, " k"]) -> Bool[np.ndarray, "k m"]:
+    def _observed(
+        self, vector_of: Vector, at: Float[np.ndarray, " k"], here: Float[np.ndarray, " m"]
+    ) -> Bool[np.ndarray, "k m"]:
         """Which entries each number changes."""
-        here, width = vector_of(at), width_at(at, self.order)
+        width = width_at(at, self.order)
         changed = np.empty((len(at), len(here)), bool)
         for number in range(len(at)):
             moved = here
@@ -97,18 +100,25 @@ class SparseSlopes:
         self, change: Float[np.ndarray, " m"], values: Float[np.ndarray, " m"]
     ) -> Bool[np.ndarray, " m"]:
         """Which entries change by more than rounding; NaN, between infinite ones, does not."""
-        differs = np.zeros(len(change), bool)
+        return np.abs(change) > self._rounding(values)
+
+    def _rounding(self, values: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
+        """Return the changes that rounding makes of each entry."""
+        rounding = np.full(len(values), np.inf)
         for part in self.parts:
             finite = np.abs(values[part])
-            size = np.max(finite, where=np.isfinite(finite), initial=0.0)
-            differs[part] = np.abs(change[part]) > _ROUNDING * size
-        return differs
+            rounding[part] = _ROUNDING * np.max(finite, where=np.isfinite(finite), initial=0.0)
+        return rounding
 
     def _compressed(
-        self, vector_of: Vector, at: Float[np.ndarray, " k"], changed: Bool[np.ndarray, "k m"]
+        self,
+        vector_of: Vector,
+        at: Float[np.ndarray, " k"],
+        here: Float[np.ndarray, " m"],
+        changed: Bool[np.ndarray, "k m"],
     ) -> list[Float[np.ndarray, " m"]] | None:
         """Slopes of numbers that are moved together; None where something else changes too."""
-        found, here = [np.zeros(0)] * len(at), vector_of(at)
+        found = [np.zeros(0)] * len(at)
         for group in _groups(changed):
             try:
                 together = differences(
@@ -148,11 +158,7 @@ class SparseSlopes:
             change = 0.5 * (before - behind)
         change[self.derived] = 0.0
         terms = steps[:, None] * np.stack(slopes)
-        bound = _AGREEMENT * np.abs(terms).sum(axis=0)
-        for part in self.parts:
-            finite = np.abs(before[part])
-            size = np.max(finite, where=np.isfinite(finite), initial=0.0)
-            bound[part] += 10.0 * _ROUNDING * size
+        bound = _AGREEMENT * np.abs(terms).sum(axis=0) + 10.0 * self._rounding(before)
         return not np.any(np.abs(change - terms.sum(axis=0)) > bound)
 
     def _alone(
