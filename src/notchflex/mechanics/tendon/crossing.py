@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple
 
 from jaxtyping import Array, Float, Int
 
-from notchflex._jax import jnp
+from notchflex._jax import jax, jnp
 from notchflex._pytree import Pytree, static
 from notchflex.mechanics.flexure import FlexureState, Rod
 from notchflex.mechanics.motion import Motion
@@ -93,8 +93,28 @@ class TendonGroup(Pytree, ABC):
         """
 
 
-def guarded_norm(vector: Float[Array, "... d"]) -> Float[Array, ...]:
-    """Return length of vectors, with derivative 0 where it is 0 (a straight tendon has no kink)."""
+def guarded_norm(
+    vector: Float[Array, "*s d"],
+    slope: Float[Array, "*s d"] | None = None,
+    rounding: float = 0.0,
+) -> Float[Array, "*s"]:
+    """Return the length of vectors, with a stated derivative where it is 0.
+
+    Args:
+        vector: The vectors.
+        slope: Derivative of the length by a vector that is 0; 0 where not given.
+        rounding: Lengths up to this count as 0.
+    """
     squared = jnp.sum(vector * vector, axis=-1)
-    zero = squared == 0.0
-    return jnp.where(zero, 0.0, jnp.sqrt(jnp.where(zero, 1.0, squared)))
+    zero = squared <= rounding**2
+    length = jnp.where(zero, 0.0, jnp.sqrt(jnp.where(zero, 1.0, squared)))
+    if slope is None:
+        return length
+    along = jnp.sum(vector * slope, axis=-1)
+    return jnp.where(zero, along - jax.lax.stop_gradient(along), length)
+
+
+def direction(vector: Float[Array, "*s d"]) -> Float[Array, "*s d"]:
+    """Return unit vectors; 0 for vectors that are 0."""
+    length = guarded_norm(vector)
+    return vector / jnp.where(length == 0.0, 1.0, length)[..., None]

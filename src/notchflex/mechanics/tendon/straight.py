@@ -17,7 +17,10 @@ from notchflex._jax import jax, jnp
 from notchflex._pytree import static
 from notchflex.mechanics.flexure import FlexureState, Rod
 from notchflex.mechanics.motion import Motion, moment_of, wrench_at
-from notchflex.mechanics.tendon.crossing import Crossing, TendonGroup, guarded_norm
+from notchflex.mechanics.tendon.crossing import Crossing, TendonGroup, direction, guarded_norm
+
+# Products of unit vectors that are parallel are off 0 by less.
+_ROUNDING = 1e-15
 
 
 class Straight(TendonGroup):
@@ -61,7 +64,10 @@ class Straight(TendonGroup):
             if chord is not None:
                 onward = jnp.where(chord > 0.0, self._onward(flexure, before), channel)
             pulled = {"gap": gap, "dead": before, "follower": channel}[self.pulls]
-            return length, turning(before, gap), turning(gap, onward), wrench_at(enters, pulled)
+            # A pull turns the distal body toward the tendon's side.
+            pulls = direction(moment_of(channel, enters))
+            turns = turning(before, gap, pulls), turning(gap, onward, pulls)
+            return length, *turns, wrench_at(enters, pulled)
 
         found = jax.vmap(one)(anchors, self.leaves, self.enters, self.along)
         return Crossing(*found, slope=None)
@@ -75,11 +81,21 @@ class Straight(TendonGroup):
         return (turn @ before) @ pose.rotation
 
 
-def turning(before: Float[Array, " d"], after: Float[Array, " d"]) -> Float[Array, ""]:
-    """Angle between two unit directions, exact for small angles, with slope 0 at zero.
+def turning(
+    before: Float[Array, " d"], after: Float[Array, " d"], pulls: Float[Array, " a"]
+) -> Float[Array, ""]:
+    """Return the angle between two unit directions, exact for small angles.
 
+    A straight tendon turns with any rotation, to whichever side; its slope here is that of the
+    rotation that its own pull causes. With it the first step from rest knows the friction.
     A span without length has no direction (its vector is 0) and turns nothing, with slope 0.
+
+    Args:
+        before: The one direction.
+        after: The other.
+        pulls: Unit axis about which a pull turns the distal body; 0 where it turns nothing.
     """
-    sine, cosine = guarded_norm(moment_of(before, after)), jnp.sum(before * after)
-    nowhere = (sine == 0.0) & (cosine == 0.0)
+    across, cosine = moment_of(before, after), jnp.sum(before * after)
+    nowhere = jnp.all(across == 0.0) & (cosine == 0.0)
+    sine = guarded_norm(across, jnp.where(nowhere, 0.0, pulls), _ROUNDING)
     return jnp.atan2(sine, jnp.where(nowhere, 1.0, cosine))

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from notchflex._jax import jnp
 from notchflex.mechanics.flexure import FlexureState, Rod, fibre_slope, fibre_stretch, of_rod
 from notchflex.mechanics.motion import Motion
-from notchflex.mechanics.tendon.crossing import Crossing, TendonGroup, guarded_norm
+from notchflex.mechanics.tendon.crossing import Crossing, TendonGroup, direction, guarded_norm
 
 
 class WallArc(TendonGroup):
@@ -40,7 +40,8 @@ class WallArc(TendonGroup):
         """Return the length and turning on the wall arc; half the turning at each edge."""
         del anchors
         weights = of_rod(rod, fibre_stretch(self.across))
-        half_turning = 0.5 * jnp.broadcast_to(guarded_norm(flexure.bend), self.natural_gap.shape)
+        bend = jnp.broadcast_to(flexure.bend, (len(self.across), len(flexure.bend)))
+        half_turning = 0.5 * guarded_norm(bend, self._pulls(len(flexure.bend)))
         return Crossing(
             length=self.natural_gap + (rod.length @ flexure.strain) @ weights.T,
             exit_turning=half_turning,
@@ -48,3 +49,8 @@ class WallArc(TendonGroup):
             wrench=None,
             slope=fibre_slope(rod, weights),
         )
+
+    def _pulls(self, axes: int) -> Float[Array, "t axes"]:
+        """Unit axes about which the tendons bend the rod, the slope of the turning at rest."""
+        x, y = self.across[:, 0], self.across[:, 1]
+        return direction(jnp.stack([x] if axes == 1 else [-y, x], axis=-1))
