@@ -8,6 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex._jax import jax, jnp
 from notchflex.analysis import axis_places, axis_points, bodies_from_angles, points_on_axis
+from notchflex.analysis.axis_points import axis_point_changes
 from notchflex.errors import ErrorCode
 from refusals import refused
 
@@ -106,6 +107,28 @@ def test_slopes_by_the_poses():
     expected = (both[0] - both[1]) / (2.0 * step)
     found = np.tensordot(slopes[0], moved[0], 2) + np.tensordot(slopes[1], moved[1], 3)
     np.testing.assert_allclose(found, expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_changes_are_those_of_jax(name):
+    robot, bodies = bent(name, 0.3)
+    places = axis_places(robot, np.linspace(0.0, length_of(robot), 40))
+    poses = [np.asarray(one)[0] for one in bodies]
+    random = np.random.default_rng(2)
+    changes = [random.normal(size=(3, *one.shape)) for one in poses]
+    lengths = random.normal(size=(3, len(poses[0])))
+    tip = np.arange(40) == 39
+
+    def points(position, rotation, longer):
+        more = longer[places.body]
+        moved = places._replace(length=places.length + more, along=places.along + tip * more)
+        return points_on_axis(moved, position, rotation)
+
+    start = (*map(jnp.asarray, poses), jnp.zeros(len(poses[0])))
+    found = axis_point_changes(places, poses, changes, lengths)
+    for one, *moves in zip(found, *changes, lengths, strict=True):
+        expected = jax.jvp(points, start, tuple(map(jnp.asarray, moves)))[1]
+        np.testing.assert_allclose(one, expected, atol=1e-13 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("wrong", [-0.1, 10.1, np.nan, np.inf])

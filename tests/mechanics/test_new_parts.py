@@ -25,6 +25,8 @@ MODULUS, LIMIT, LOSS, PULL = 40_000.0, 0.03, 0.4, 2.0
 SCRIPT = f"""
 import json
 import notchflex as nf
+from notchflex.mechanics.chain.fibres import with_fibres
+from notchflex.mechanics.flexure import rod
 robot = nf.Robot(
     name="new parts",
     tube=nf.Tube{TUBE},
@@ -35,6 +37,10 @@ robot = nf.Robot(
 )
 from notchflex.robot import robot_from_text, robot_text
 assert robot_from_text(robot_text(robot)) == robot
+notch, tube = robot.notches[0], robot.tube
+section = with_fibres(rod(notch, tube), notch, tube).section
+linear = section.fibres.area * section.fibres.arm**2
+assert abs(linear.sum(axis=-1) / ({WIDTH} * {THICK}**3 / 12.0) - 1.0).max() < 1e-12
 state = nf.solve(robot, nf.Load(tension={PULL}))
 print(json.dumps([state.converged, *state.notch_angle.tolist(), sorted(nf.json_schema()["$defs"])]))
 """

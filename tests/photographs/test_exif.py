@@ -1,5 +1,7 @@
 """Tensions from the EXIF of photographs."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,16 @@ def test_comments_of_other_codes():
     inner = (1).to_bytes(2, "little") + (0x9286).to_bytes(2, "little") + (7).to_bytes(2, "little")
     inner += len(text).to_bytes(4, "little") + (36).to_bytes(4, "little")
     assert exif_texts(little + inner + text) == ["tension=2 N"]
+
+
+def test_exif_of_a_png_may_stand_behind_the_picture(tmp_path):
+    file = Path(written(tmp_path / "a.png", description="Größe, tension=2 N".encode()))
+    data = file.read_bytes()
+    at = data.index(b"eXIf") - 4
+    end = at + 12 + int.from_bytes(data[at : at + 4], "big")
+    last = data.index(b"IEND") - 4
+    moved = data[:at] + data[end:last] + data[at:end] + data[last:]
+    assert exif_texts(data) == exif_texts(moved) == ["Größe, tension=2 N"]
 
 
 def test_what_gives_no_tension(tmp_path):

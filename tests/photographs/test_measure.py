@@ -1,12 +1,15 @@
 """Rendered photographs of known wrists: measured, or refused with the reason; never wrong."""
 
 import json
+import tracemalloc
+import zlib
 from contextlib import suppress
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from PIL import ImageFile
 
 import notchflex as nf
 from notchflex.cli.app import run
@@ -93,13 +96,40 @@ def test_a_refused_photograph_exits_with_1_and_writes_no_row(tmp_path, capsys):
     assert (tmp_path / "m-overlays" / "blank.png").exists()
 
 
+@pytest.mark.parametrize("sides", [(141_000, 142_000), (2**31 - 1, 2**31 - 1), (12_001, 10_000)])
+def test_too_large_a_picture_is_refused_before_it_is_decoded(tmp_path, monkeypatch, sides):
+    head = b"IHDR" + b"".join(side.to_bytes(4, "big") for side in sides) + b"\x08\x02\0\0\0"
+    pixels = b"IDAT" + zlib.compress(bytes(1_000_000))
+    chunks = [
+        (len(chunk) - 4).to_bytes(4, "big") + chunk + zlib.crc32(chunk).to_bytes(4, "big")
+        for chunk in (head, pixels, b"IEND")
+    ]
+    file = tmp_path / "large.png"
+    file.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(chunks))
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("the picture was decoded"))
+    monkeypatch.setattr(ImageFile.ImageFile, "load", lambda _: pytest.fail("it was decoded"))
+    tracemalloc.start()
+    with refused("OUT_OF_RANGE", f"{sides[0]} x {sides[1]}"):
+        read_photograph(file)
+    with refused("MISSING_VALUE"):
+        nf.measure(str(file), nf.load_robot("pacheco2021-a"), exif=True)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 5e6  # bytes; the smallest of them would take 3.6e8
+
+
 def test_bad_files(tmp_path, photograph):
     data = photograph.read_bytes()
     (tmp_path / "text.png").write_text("no photograph")
     (tmp_path / "empty.jpg").write_bytes(b"")
     (tmp_path / "half.png").write_bytes(data[:60])
-    huge = data[:16] + (20000).to_bytes(4, "big") + (10000).to_bytes(4, "big") + data[24:]
-    (tmp_path / "huge.png").write_bytes(huge)
+    huge = data[12:16] + (20000).to_bytes(4, "big") + (10000).to_bytes(4, "big") + data[24:29]
+    (tmp_path / "sum.png").write_bytes(data[:12] + huge + data[29:])  # a wrong checksum
+    huge += zlib.crc32(huge).to_bytes(4, "big")
+    (tmp_path / "huge.png").write_bytes(data[:12] + huge + data[33:])
+    jpeg = cv2.imencode(".jpg", np.zeros((70, 70), np.uint8))[1].tobytes()
+    at = jpeg.index(b"\xff\xc0") + 5
+    (tmp_path / "huge.jpg").write_bytes(jpeg[:at] + b"\xff" * 4 + jpeg[at + 4 :])
     wide = cv2.imencode(".tif", np.zeros((70, 70), np.uint8))[1].tobytes()
     first = int.from_bytes(wide[4:8], "little")
     for tag in (256, 257):  # width and height become 30000
@@ -116,7 +146,9 @@ def test_bad_files(tmp_path, photograph):
         ("text.png", "FILE_FORMAT"),
         ("empty.jpg", "FILE_FORMAT"),
         ("half.png", "FILE_FORMAT"),
+        ("sum.png", "FILE_FORMAT"),
         ("huge.png", "OUT_OF_RANGE"),
+        ("huge.jpg", "OUT_OF_RANGE"),
         ("wide.tif", "OUT_OF_RANGE"),
         ("other.bmp", "FILE_FORMAT"),
         ("tiny.png", "OUT_OF_RANGE"),

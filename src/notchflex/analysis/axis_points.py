@@ -7,8 +7,9 @@ the arc within 5e-6 of its radius up to 45 degrees. It depends on the poses of t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 # A place may stick out of the robot by this part of its length: a tip that was rounded.
 _BEYOND = 1e-6
+# Its square is far below rounding, its product with a change of any size is no denormal.
+_COMPLEX_STEP = 1e-30
 
 
 class AxisPlaces(NamedTuple):
@@ -119,8 +122,8 @@ def points_on_axis(
     axis = body_rotation[..., :, 2]
     first, last = axis[..., places.body, :], axis[..., places.after, :]
     origin = body_position[..., places.body, :]
-    on_body = origin + places.along[:, None] * first
-    near = origin + places.length[:, None] * first
+    on_body = origin + places.along[..., None] * first
+    near = origin + places.length[..., None] * first
     far = body_position[..., places.after, :]
     inside = places.fraction >= 0.0
     # Length of the tangents: 2 c / (1 + cos(turn / 2)) with the chord c, which makes the cubic meet
@@ -136,6 +139,43 @@ def points_on_axis(
         + reach * (u * (1.0 - u) ** 2 * first - u**2 * (1.0 - u) * last)
     )
     return xp.where(inside[:, None], across, on_body)
+
+
+def axis_point_changes(
+    places: AxisPlaces,
+    bodies: Sequence[Float[np.ndarray, ...]],
+    changes: Sequence[Float[np.ndarray, ...]],
+    lengths: Float[np.ndarray, "k bodies"] | float = 0.0,
+) -> Float[np.ndarray, "k *s m 3"]:
+    """Differentiate the points on the axis along k changes of the bodies.
+
+    By a complex step: `points_on_axis` is analytic, so the derivative is exact to rounding. It
+    takes one evaluation; `jax.jvp` takes a compilation for every shape.
+
+    Args:
+        places: Where the points lie on the straight robot.
+        bodies: Origins of the bodies, mm, (*s, bodies, 3), and their rotations, (*s, bodies, 3, 3).
+        changes: Changes of both, with k in front.
+        lengths: Changes of the lengths of the bodies; the last point, the tip, moves with its end.
+
+    Returns:
+        The changes of the points.
+
+    Example:
+        >>> from notchflex import load_robot
+        >>> robot = load_robot("pacheco2021-a")
+        >>> bodies = [pose[0] for pose in bodies_from_angles(robot, np.zeros((1, 5)))]
+        >>> along_z = np.tile([0.0, 0.0, 1.0], (1, 6, 1)), np.zeros((1, 6, 3, 3))
+        >>> print(axis_point_changes(axis_places(robot, [0.4]), bodies, along_z)[0, 0].round(9))
+        [0. 0. 1.]
+    """
+    step = _COMPLEX_STEP * 1j
+    grown = step * np.broadcast_to(lengths, changes[0].shape[:-1])[..., places.body]
+    at_tip = np.arange(len(places.body)) == len(places.body) - 1
+    moved = places._replace(along=places.along + at_tip * grown, length=places.length + grown)
+    poses = (pose + step * change for pose, change in zip(bodies, changes, strict=True))
+    points: Any = points_on_axis(moved, *poses)  # pyright: ignore[reportArgumentType]
+    return points.imag / _COMPLEX_STEP
 
 
 def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64]:

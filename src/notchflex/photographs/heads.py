@@ -1,88 +1,82 @@
-"""Heads of image files: segments of JPEG, directories of TIFF."""
+"""What Pillow reads in the head of a PNG, JPEG or TIFF file: its size and its EXIF."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Literal, NamedTuple
+import io
+import struct
+import warnings
+import zlib
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
-PNG = b"\x89PNG\r\n\x1a\n"
-"""The first bytes of a PNG."""
+from notchflex._extras import need
 
-_LITTLE, _BIG = b"II*\0", b"MM\0*"
-# Bytes of a value, by the type of an entry.
-_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 13: 4}
-_MOST_ENTRIES = 500
-_IMAGE = 0xDA
+MOST_PIXELS = 120e6
+"""A picture of more pixels is not decoded."""
 
-
-class Entry(NamedTuple):
-    """An entry of a directory.
-
-    Attributes:
-        tag: What it tells.
-        kind: The type of its values.
-        value: Their bytes.
-    """
-
-    tag: int
-    kind: int
-    value: bytes
+_DAMAGED = (
+    SyntaxError, ValueError, TypeError, OSError, EOFError, LookupError, ArithmeticError,
+    struct.error, zlib.error,
+)  # fmt: skip
+_WIDTH, _HEIGHT, _EXIF_PART = 256, 257, 0x8769
 
 
-class Tiff(NamedTuple):
-    """A TIFF file, or an EXIF block, which is laid out as one.
+class Head(NamedTuple):
+    """Head of an image file.
 
     Attributes:
-        data: Its bytes.
-        order: Their order in numbers.
+        width: Width, pixels; 0 where it is not stated.
+        height: Height, pixels; likewise.
+        tags: Values of the tags of its EXIF, or of a TIFF, by their numbers.
+        order: Order of the bytes in them, "<" or ">".
     """
 
-    data: bytes
-    order: Literal["little", "big"]
-
-    @property
-    def entries(self) -> Iterator[Entry]:
-        """Entries of the first directory."""
-        return self.entries_at(self.number(self.data[4:8]))
-
-    def entries_at(self, start: int) -> Iterator[Entry]:
-        """Yield the entries of a directory; none where it lies outside the file."""
-        if not 8 <= start <= len(self.data) - 2:
-            return
-        for number in range(min(self.number(self.data[start : start + 2]), _MOST_ENTRIES)):
-            entry = self.data[start + 2 + 12 * number : start + 14 + 12 * number]
-            if len(entry) < 12:
-                return
-            tag, kind = self.number(entry[:2]), self.number(entry[2:4])
-            size = _SIZES.get(kind, 1) * self.number(entry[4:8])
-            value = entry[8 : 8 + size]
-            if size > 4:
-                where = self.number(entry[8:12])
-                value = self.data[where : where + size]
-            if len(value) == size:
-                yield Entry(tag, kind, value)
-
-    def number(self, word: bytes) -> int:
-        """Return the number that some bytes stand for."""
-        return int.from_bytes(word, self.order)
+    width: int
+    height: int
+    tags: Mapping[int, Any]
+    order: str
 
 
-def tiff_of(data: bytes) -> Tiff | None:
-    """Return bytes as a TIFF; None if they are another file."""
-    if data[:4] == _LITTLE:
-        return Tiff(data, "little")
-    return Tiff(data, "big") if data[:4] == _BIG else None
+def head_of(data: bytes, exif: bool = False) -> Head | None:
+    """Read the head of a file; None if it is damaged, or neither PNG, JPEG nor TIFF.
+
+    The picture is decoded only if the EXIF of a PNG is asked for and does not stand before the
+    picture, and never if it has more than `MOST_PIXELS`.
+    """
+    need("PIL", "photographs", "reading photographs")
+    with warnings.catch_warnings():  # Pillow warns of damaged tags, which it leaves out
+        warnings.simplefilter("ignore")
+        try:
+            return _head(data, exif)
+        except _DAMAGED:
+            return None
 
 
-def jpeg_segments(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield marker and content of the segments of a JPEG before its image; none of other files."""
-    if data[:2] != b"\xff\xd8":
-        return
-    at = 2
-    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != _IMAGE:
-        if data[at + 1] == 0xFF:  # fills up
-            at += 1
-            continue
-        length = max(int.from_bytes(data[at + 2 : at + 4], "big"), 2)
-        yield data[at + 1], data[at + 4 : at + 2 + length]
-        at += 2 + length
+def _head(data: bytes, exif: bool) -> Head:
+    from PIL import JpegImagePlugin, PngImagePlugin
+
+    if data[:4] in (b"II*\0", b"MM\0*"):
+        tags, order = _tags(data)
+        return Head(_side(tags.get(_WIDTH)), _side(tags.get(_HEIGHT)), tags, order)
+    # `Image.open` would refuse large pictures without telling how large they are.
+    if data[:2] == b"\xff\xd8":
+        picture: Any = JpegImagePlugin.JpegImageFile(io.BytesIO(data))
+    else:
+        picture = PngImagePlugin.PngImageFile(io.BytesIO(data))
+        if exif and "exif" not in picture.info and picture.width * picture.height <= MOST_PIXELS:
+            picture.load()
+    tags, order = _tags(picture.info.get("exif", b"")) if exif else ({}, "<")
+    return Head(picture.width, picture.height, tags, order)
+
+
+def _side(value: object) -> int:
+    return value if isinstance(value, int) and value > 0 else 0
+
+
+def _tags(block: bytes) -> tuple[Mapping[int, Any], str]:
+    """Return the tags of an EXIF block, or of a TIFF, and the order of its bytes."""
+    from PIL import Image
+
+    found = Image.Exif()
+    found.load(block)
+    return {**found.get_ifd(_EXIF_PART), **found}, found.endian or "<"

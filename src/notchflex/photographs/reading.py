@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from notchflex._extras import need
 from notchflex.errors import InputError
-from notchflex.photographs.heads import PNG, Tiff, jpeg_segments, tiff_of
+from notchflex.photographs.heads import MOST_PIXELS, head_of
 
-MOST_PIXELS = 120e6
 LARGEST_FILE = 400_000_000
 _LEAST_SIDE = 64
 
@@ -27,9 +26,10 @@ def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
     need("cv2", "photographs", "measuring photographs")
     name = os.fspath(source)
     data = photograph_bytes(name)
-    size = _size_in_head(data)
-    _check_size(name, *size)
-    image = _decoded(data) if min(size) > 0 else None
+    head = head_of(data)
+    width, height = (0, 0) if head is None else head[:2]
+    _check_size(name, width, height)
+    image = _decoded(data) if min(width, height) > 0 else None
     if image is None or image.ndim != 3:
         raise InputError.FILE_FORMAT(
             f"{name} is not a photograph that can be read; give a PNG, JPEG or TIFF file"
@@ -77,30 +77,6 @@ def photograph_bytes(name: str) -> bytes:
             f"{name} is larger than {LARGEST_FILE / 1e6:.0f} MB; give a smaller photograph"
         )
     return data
-
-
-def _size_in_head(data: bytes) -> tuple[int, int]:
-    """Return width and height by the head of a PNG, JPEG or TIFF, before it is decoded.
-
-    Files of another kind, whose size is not known beforehand, give (0, 0) and are not decoded.
-    """
-    if data.startswith(PNG):
-        return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
-    if (tiff := tiff_of(data)) is not None:
-        return _size_of_tiff(tiff)
-    for marker, content in jpeg_segments(data):
-        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
-            height = int.from_bytes(content[1:3], "big")
-            return int.from_bytes(content[3:5], "big"), height
-    return 0, 0
-
-
-def _size_of_tiff(tiff: Tiff) -> tuple[int, int]:
-    size = {256: 0, 257: 0}  # tags of width and height
-    for tag, kind, value in tiff.entries:
-        if tag in size and kind in (3, 4):  # numbers of 16 or of 32 bits
-            size[tag] = tiff.number(value[: 2 if kind == 3 else 4])
-    return size[256], size[257]
 
 
 def _check_size(name: str, width: int, height: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,12 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from notchflex._jax import constant
-from notchflex.analysis.axis_points import AxisPlaces, axis_places, points_on_axis
+from notchflex.analysis.axis_points import (
+    AxisPlaces,
+    axis_places,
+    axis_point_changes,
+    points_on_axis,
+)
 from notchflex.designing.model.reading import Reading
 from notchflex.designing.specification.asked import TargetCurve
 from notchflex.robot import Robot
@@ -21,8 +25,6 @@ _STATIONS, _ROUNDS = 241, 4
 _POINTS, _FINE = 20, 50
 # How far to both sides of a point the direction of the axis is taken, mm.
 _ASIDE = 1e-3
-# A step of the poses along a direction, relative; points are cubic in them, or nearly so.
-_STEP = 1e-4
 
 
 def target_points(curve: TargetCurve) -> Float[np.ndarray, "m 3"]:
@@ -61,7 +63,7 @@ def offsets(
     robot: Robot,
     bodies: Bodies,
     points: Float[np.ndarray, "m 3"],
-    lengths: Sequence[Float[np.ndarray, " bodies"]] | None,
+    lengths: Float[np.ndarray, "variables bodies"] | None,
 ) -> Reading:
     """Return the vector from each point to the nearest of the axis, from the last one to the tip.
 
@@ -85,10 +87,10 @@ def offsets(
     along = ends[1] - ends[0]
     along /= np.linalg.norm(along, axis=1)[:, None]
     along[-1] = 0.0  # the tip does not slide
-    columns = zip(bodies.positions, bodies.rotations, lengths, strict=True)
-    moved = [_moved(places, bodies, *one) for one in columns]
-    across = [one - np.sum(one * along, axis=1)[:, None] * along for one in moved]
-    return Reading(off.ravel(), np.stack([one.ravel() for one in across], axis=1))
+    changes = bodies.positions, bodies.rotations
+    moved = axis_point_changes(places, bodies[:2], changes, lengths)
+    across = moved - np.sum(moved * along, axis=-1)[..., None] * along
+    return Reading(off.ravel(), across.reshape(-1, off.size).T)
 
 
 def distances(off: Reading) -> Reading:
@@ -131,27 +133,3 @@ def _length(robot: Robot) -> float:
     from notchflex.designing.model.quantities import OF_ROBOTS
 
     return float(OF_ROBOTS["length"].formula(robot)[0])
-
-
-def _moved(
-    places: AxisPlaces,
-    bodies: Bodies,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    length: Float[np.ndarray, " bodies"],
-) -> Float[np.ndarray, "m 3"]:
-    """Change of points of the axis, by a central difference of fourth order of plain formulas."""
-    on_tip = np.zeros(len(places.body))
-    on_tip[-1] = 1.0
-
-    def at(part: float) -> np.ndarray:
-        moved = places._replace(
-            length=places.length + part * length[places.body],
-            along=places.along + part * on_tip * length[places.body],
-        )
-        poses = bodies.position + part * position, bodies.rotation + part * rotation
-        return _axis(moved, *poses)
-
-    size = max(float(np.abs(position).max()), float(np.abs(rotation).max()), 1e-9)
-    step = _STEP / size
-    return (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step)

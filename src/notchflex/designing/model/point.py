@@ -151,7 +151,7 @@ class Point:
         lengths = self._of_robot(lambda one: body_lengths(one.tube, one.notches)).slopes
         assert lengths is not None
         changes = [self.slopes_of(name)[:, step] for name in ("body_position", "body_rotation")]
-        return offsets(self.robot, Bodies(*poses, *changes), points, list(lengths.T))
+        return offsets(self.robot, Bodies(*poses, *changes), points, lengths.T)
 
     def moved(self, number: int, part: float) -> Robot:
         """Return the robot with a variable moved by a part of its span."""

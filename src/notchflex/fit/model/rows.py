@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -11,9 +10,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from notchflex._jax import constant
-from notchflex.analysis.axis_points import AxisPlaces, axis_places, points_on_axis
+from notchflex.analysis.axis_points import (
+    AxisPlaces,
+    axis_places,
+    axis_point_changes,
+    points_on_axis,
+)
 from notchflex.analysis.derivatives.forward_model import Change, ForwardModel
-from notchflex.analysis.derivatives.numbers import slope
 from notchflex.fit.measurements.measurements import Measurements, rows_of
 from notchflex.fit.model.constants import RobotNumber
 from notchflex.loads.load_path import LoadPath
@@ -103,11 +106,12 @@ class Sample:
             slopes = self._model.derivatives(path, changes, solved)
         if self._places is not None:
             bodies = [outputs[name] for name in _BODIES]
-            outputs["axis_points"] = _points(self._places, bodies)
+            outputs["axis_points"] = np.asarray(
+                points_on_axis(self._places, *map(constant, bodies))
+            )
             if slopes:
-                moves = zip(*(slopes[name] for name in _BODIES), strict=True)
-                along = [_points_slope(self._places, bodies, move) for move in moves]
-                slopes["axis_points"] = np.stack(along)
+                changes = [slopes[name] for name in _BODIES]
+                slopes["axis_points"] = axis_point_changes(self._places, bodies, changes)
         back = np.argsort(self._order)
         return Predicted(
             {name: outputs[name][back] for name in names},
@@ -179,21 +183,3 @@ class Sample:
         more = value / factor if size is None else np.where(value > 0.0, size, 0.0)
         varied = self._model.load_change(path, replace(load, **{command: value + more}))
         return varied if size is None else -varied
-
-
-def _points(places: AxisPlaces, bodies: Sequence[np.ndarray]) -> Float[np.ndarray, "p m 3"]:
-    position, rotation = map(constant, bodies)
-    return np.asarray(points_on_axis(places, position, rotation))
-
-
-def _points_slope(
-    places: AxisPlaces, bodies: Sequence[np.ndarray], move: Sequence[np.ndarray]
-) -> Float[np.ndarray, "p m 3"]:
-    """Derivative of the points on the axis along a change of the poses of the bodies."""
-    size = max(float(np.max(np.abs(one))) for one in move) or 1.0
-
-    def points(part: float) -> np.ndarray:
-        moved = [pose + part / size * change for pose, change in zip(bodies, move, strict=True)]
-        return _points(places, moved)
-
-    return size * slope(points, 0.0)

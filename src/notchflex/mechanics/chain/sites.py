@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from notchflex.mechanics.chain.mass import body_lengths
 from notchflex.mechanics.ends import Side
-from notchflex.mechanics.flexure import Site, unchecked
+from notchflex.mechanics.flexure import Site, validity_warnings
 from notchflex.robot import Notch, Robot
 
 _SAME_DIRECTION = 1e-6
@@ -62,7 +62,7 @@ def unchecked_dimensions(robot: Robot) -> list[str]:
     found: dict[str, list[str]] = {}
     for number, (notch, site) in enumerate(zip(robot.notches, sites_of(robot), strict=True), 1):
         if site is not None:
-            for sentence in unchecked(notch, robot.tube, site):
+            for sentence in validity_warnings(notch, robot.tube, site):
                 found.setdefault(sentence, []).append(str(number))
     return [
         f"notch{'es' if len(notches) > 1 else ''} {', '.join(notches)}: {sentence}."

@@ -4,7 +4,13 @@ from notchflex._packages import import_all
 from notchflex.mechanics.flexure.build import LEVELS, MOST_REFINEMENT, stack, with_level
 from notchflex.mechanics.flexure.elastica import Elastica, elastica, modulus_from_single_notch
 from notchflex.mechanics.flexure.geometric_stiffness import geometric_stiffness
-from notchflex.mechanics.flexure.registry import Site, rod, rod_at, unchecked
+from notchflex.mechanics.flexure.registry import (
+    Site,
+    rod,
+    rod_at,
+    section_fibres,
+    validity_warnings,
+)
 from notchflex.mechanics.flexure.rod import Rod, flattened
 from notchflex.mechanics.flexure.rod_kinematics import free_pose, relative_pose, rod_end, turn_doubt
 from notchflex.mechanics.flexure.state import (
@@ -41,8 +47,9 @@ __all__ = [
     "rod",
     "rod_at",
     "rod_end",
+    "section_fibres",
     "stack",
     "turn_doubt",
-    "unchecked",
+    "validity_warnings",
     "with_level",
 ]

@@ -30,10 +30,11 @@ from notchflex.mechanics.flexure.notch_rod import (
     shifted,
 )
 from notchflex.mechanics.flexure.quadrature import rod_quadrature
-from notchflex.mechanics.flexure.registry import Site, rod, unchecked
+from notchflex.mechanics.flexure.registry import Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import NotchEnds
 from notchflex.mechanics.section import SECTION_OF_CUT, Section
+from notchflex.mechanics.section.fibres import FibresAt, cut_fibres
 from notchflex.robot import ArcNotch, Tube
 
 # Part of the end compliance that follows the material beyond its elastic limit (finite elements).
@@ -125,7 +126,14 @@ def _ends(
     return ends, (in_plane, sideways)
 
 
-@unchecked.register
+@section_fibres.register
+def _(notch: ArcNotch, tube: Tube) -> FibresAt:
+    shape = tube.outer_radius, tube.inner_radius, notch.section_depth(tube)
+    points = cut_fibres(notch.cut, *shape)
+    return lambda _near, _spine: points
+
+
+@validity_warnings.register
 def _(notch: ArcNotch, tube: Tube, site: Site) -> list[str]:
     depth = notch.section_depth(tube)
     shape = tube.outer_radius, tube.inner_radius, notch.cut, depth, notch.height

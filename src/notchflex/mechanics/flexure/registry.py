@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 from notchflex.mechanics.ends import Side
 from notchflex.mechanics.flexure.rod import Rod
+from notchflex.mechanics.registration import unregistered
+from notchflex.mechanics.section.fibres import FibresAt
 from notchflex.robot import Tube
 
 
@@ -45,10 +47,7 @@ def rod(notch: Any, tube: Tube, refinement: int = 0, site: Site | None = None) -
         TypeError: There is no rod for this kind of description.
     """
     del tube, refinement, site
-    raise TypeError(
-        f"no rod is registered for a notch of type {type(notch).__name__}; "
-        "add one to notchflex/mechanics/flexure with @rod.register"
-    )
+    raise unregistered("rod", notch, "flexure", "rod")
 
 
 def rod_at(site: Site | None, notch: Any, tube: Tube, refinement: int = 0) -> Rod:
@@ -64,7 +63,26 @@ def rod_at(site: Site | None, notch: Any, tube: Tube, refinement: int = 0) -> Ro
 
 
 @singledispatch
-def unchecked(notch: Any, tube: Tube, site: Site) -> list[str]:
+def section_fibres(notch: Any, tube: Tube) -> FibresAt:
+    """Fibres of the sections of a notch, for materials that sum up stresses.
+
+    Args:
+        notch: A notch description.
+        tube: The tube it is cut into.
+
+    Returns:
+        The fibres about any axis, as a function of the distances of the edges of the section
+        from its neutral axis (`edge_near`, `edge_spine`), mm.
+
+    Raises:
+        TypeError: The fibres of this kind of notch are not stated.
+    """
+    del tube
+    raise unregistered("section of fibres", notch, "flexure", "section_fibres")
+
+
+@singledispatch
+def validity_warnings(notch: Any, tube: Tube, site: Site) -> list[str]:
     """List where the law of a notch with elastic ends was not checked.
 
     Args:

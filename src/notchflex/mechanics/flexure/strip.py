@@ -22,7 +22,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     legendre_modes,
 )
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import Site, rod, unchecked
+from notchflex.mechanics.flexure.registry import Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.roots import (
     CheckedRange,
@@ -33,6 +33,7 @@ from notchflex.mechanics.flexure.roots import (
 )
 from notchflex.mechanics.motion import Motion
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
+from notchflex.mechanics.section.fibres import FibresAt, two_walls_fibres
 from notchflex.robot import StripNotch, Tube
 
 # Polynomials of the sideways curvature and of the twist.
@@ -105,7 +106,13 @@ def strip_rod(
     )
 
 
-@unchecked.register
+@section_fibres.register
+def _(notch: StripNotch, tube: Tube) -> FibresAt:
+    del notch, tube
+    return two_walls_fibres
+
+
+@validity_warnings.register
 def _(notch: StripNotch, tube: Tube, site: Site) -> list[str]:
     del site
     if not notch.has_elastic_ends:  # a model of a paper

@@ -21,7 +21,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     shifted,
 )
 from notchflex.mechanics.flexure.quadrature import rod_quadrature
-from notchflex.mechanics.flexure.registry import Site, rod, unchecked
+from notchflex.mechanics.flexure.registry import Site, rod, section_fibres, validity_warnings
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.flexure.roots import (
     CheckedRange,
@@ -35,6 +35,7 @@ from notchflex.mechanics.flexure.wrench_modes import wrench_modes
 from notchflex.mechanics.material import FibreSection
 from notchflex.mechanics.motion import Motion, rotation_about
 from notchflex.mechanics.section import clamped_torsion_constant, two_walls
+from notchflex.mechanics.section.fibres import FibresAt, two_walls_fibres
 from notchflex.robot import Tube, ULink
 
 # Poisson's ratio of a robot file that names none. It only gives the modes their shape and tells
@@ -137,7 +138,13 @@ def _section(link: Link, tube: Tube, course: Course, poisson_ratio: float) -> Fi
     return about_neutral_axis(walls, torsion)
 
 
-@unchecked.register
+@section_fibres.register
+def _(notch: ULink, tube: Tube) -> FibresAt:
+    del notch, tube
+    return two_walls_fibres
+
+
+@validity_warnings.register
 def _(notch: ULink, tube: Tube, site: Site) -> list[str]:
     del site
     if not notch.has_elastic_ends:  # a model of a paper

@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float
 
 from notchflex._jax import jnp
 from notchflex._pytree import Pytree
+from notchflex.mechanics.registration import unregistered
 
 LEAST_RATIO = 1e-12
 """Part of a constant loss that stands for no tension: a contact below its loss holds 1e12 to 1."""
@@ -143,7 +144,4 @@ def friction_law(friction: Any) -> FrictionLaw:
     Raises:
         TypeError: There is no law for this kind of description.
     """
-    raise TypeError(
-        f"no friction law is registered for a description of type {type(friction).__name__}; "
-        "add one to notchflex/mechanics/friction with @friction_law.register"
-    )
+    raise unregistered("friction law", friction, "friction", "friction_law")

@@ -28,6 +28,7 @@ from notchflex._pytree import Pytree
 from notchflex.mechanics.material.fibre_section import FibreSection
 from notchflex.mechanics.material.flattening import Flattening, flattening
 from notchflex.mechanics.material.root import bracketed_root
+from notchflex.mechanics.registration import unregistered
 
 
 class SectionResponse(NamedTuple):
@@ -290,7 +291,4 @@ def section_law(material: Any) -> SectionLaw:
     Raises:
         TypeError: There is no law for this kind of description.
     """
-    raise TypeError(
-        f"no section law is registered for a material of type {type(material).__name__}; "
-        "add one to notchflex/mechanics/material with @section_law.register"
-    )
+    raise unregistered("section law", material, "material", "section_law")

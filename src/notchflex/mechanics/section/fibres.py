@@ -7,6 +7,7 @@ what the strips leave, about 1e-7 of them. Used when a robot is put together, in
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -24,6 +25,20 @@ _RADII, _ANGLES, _STRIPS = 10, 40, 160
 Strips = Float[np.ndarray, " strips"]
 Points = tuple[Float[np.ndarray, " fibres"], Float[np.ndarray, " fibres"]]
 """Arms (mm) and areas (mm^2)."""
+
+FibresAt = Callable[[float, float], Points]
+"""Fibres of a section by the distances of its edges, near and spine, from its neutral axis, mm."""
+
+
+def two_walls_fibres(near: float, spine: float) -> Points:
+    """Few fibres of walls of constant width (`two_walls`, or any rectangle)."""
+    return reduced(rectangle_fibres(near, spine))
+
+
+@lru_cache(maxsize=1024)  # the same for all sites and heights
+def cut_fibres(cut: str, outer: float, inner: float, depth: float) -> Points:
+    """Few fibres of what a cut leaves of a tube."""
+    return reduced(_FIBRES_OF_CUT[cut](outer, inner, depth))
 
 
 def rectangle_fibres(near: float, spine: float) -> Points:
@@ -64,6 +79,9 @@ def segment_fibres(outer: float, inner: float, depth: float) -> Points:
         2.0 * wall * inner * np.sin(bore) * of_bore,
     )
     return np.append(outer * np.cos(solid), height), np.concatenate(area)
+
+
+_FIBRES_OF_CUT = {"on-axis": sector_fibres, "off-axis": segment_fibres}
 
 
 def _between(first: float, last: float, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ place where finite elements have it. The two walls of the strip are curved bars:
 
 The shear areas of strip and root are 5/6 of the whole. The constants were fitted, all at once, to
 the cells of finite elements in `tests/reference/fem_strip_cells.csv` and `fem_u_link_cells.csv`
-(`benchmarks/fe`); `unchecked` of a notch tells how far they hold.
+(`benchmarks/fe`); `validity_warnings` of a notch tells how far they hold.
 """
 
 from __future__ import annotations

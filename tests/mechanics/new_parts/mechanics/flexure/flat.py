@@ -2,9 +2,10 @@
 
 from notchflex.mechanics.flexure import notch_rod as nr
 from notchflex.mechanics.flexure.quadrature import RodQuadrature
-from notchflex.mechanics.flexure.registry import rod
+from notchflex.mechanics.flexure.registry import rod, section_fibres
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.section import two_walls
+from notchflex.mechanics.section.fibres import two_walls_fibres
 from notchflex.robot import Tube
 from notchflex.robot.notches.flat import FlatNotch
 
@@ -18,3 +19,8 @@ def _(notch: FlatNotch, tube: Tube, refinement: int = 0) -> Rod:
     closure = tube.outer_radius + notch.offset
     section = nr.about_neutral_axis(strip)
     return nr.build_rod(axis, section, modes, closure, direction_deg=notch.direction_deg)
+
+
+@section_fibres.register
+def _(notch: FlatNotch, tube: Tube):
+    return two_walls_fibres

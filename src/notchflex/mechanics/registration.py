@@ -1,0 +1,18 @@
+"""What is raised for parts of a robot that no law is registered for."""
+
+from __future__ import annotations
+
+
+def unregistered(wanted: str, part: object, folder: str, function: str) -> TypeError:
+    """Make the error of a kind that a function was not told of.
+
+    Args:
+        wanted: What was asked for, such as "rod".
+        part: A description.
+        folder: The folder in `mechanics` where kinds register themselves.
+        function: The function that they register for.
+    """
+    return TypeError(
+        f"no {wanted} is registered for a description of type {type(part).__name__}; "
+        f"add one to notchflex/mechanics/{folder} with @{function}.register"
+    )

@@ -1,0 +1,35 @@
+"""Every kind of notch states the fibres of its section; nothing is guessed for others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import notchflex as nf
+from notchflex.mechanics.chain.fibres import with_fibres
+from notchflex.mechanics.flexure import rod
+
+TUBE = nf.Tube(1.62, 1.40)
+ARC = nf.ArcNotch("on-axis", 1.40, 0.8, uncut_length=1.2)
+STRIP = nf.StripNotch(0.7, 0.3, 1.3, uncut_length=1.2)
+LINK = nf.ULink(0.08, 0.2, 0.6, "away")
+
+
+class Unknown:
+    """A description whose fibres nobody stated."""
+
+
+def test_unknown_kinds_are_refused_by_name() -> None:
+    with pytest.raises(TypeError, match=r"type Unknown.*@section_fibres\.register"):
+        with_fibres(rod(ARC, TUBE), Unknown(), TUBE)
+
+
+@pytest.mark.parametrize("notch", [STRIP, LINK], ids=["strip", "link"])
+def test_fibres_of_strips_are_those_of_a_rectangle(notch: nf.StripNotch | nf.ULink) -> None:
+    section = with_fibres(rod(notch, TUBE), notch, TUBE).section
+    half = np.asarray(section.edge_spine)
+    assert section.fibres is not None
+    arm, area = np.asarray(section.fibres.arm), np.asarray(section.fibres.area)
+    for power in (2, 4, 6):  # moments of h over 2 b h: h^n / (n + 1) of the half thickness
+        mean = np.sum(area * arm**power, axis=-1) / np.sum(area, axis=-1)
+        np.testing.assert_allclose(mean, half**power / (power + 1), rtol=1e-9)
